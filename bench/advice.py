@@ -18,9 +18,9 @@ from soilml.experiment_design import (
     samples_of_rows,
 )
 from soilml.experiment_design.candidate_rows import SLIPS
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.fit import Fit
 from soilml.io.table import Table
 
 LOADS = (30.0, 42.0, 60.0, 85.0, 120.0)
@@ -61,7 +61,7 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
         first, other = ((rng.choice(SLIPS), rng.choice(LOADS)) for _ in range(2))
         normal = rng.standard_normal(rows + 1)
         table = _measured(case, truth, [first] * rows, normal[:rows])
-        data = read_observations(case, table)
+        data = usable_readings(case, table)
         belief = samples_of_rows(case, data, free, samples)
         best = advise(case, belief, candidate_grid(SLIPS, LOADS), channels=("torque",)).best()
         points = {
@@ -178,7 +178,7 @@ def from_file(soils: int = SOILS, seed: int = 5) -> str:
         told = estimator(**readings)
         moments = samples_of_moments(free, estimator.names, told.mean, told.covariance)
         theirs = advise(case, moments, ranges, channels=("torque",)).best().candidate
-        exact = advise(case, samples_of_rows(case, read_observations(case, table), free), ranges)
+        exact = advise(case, samples_of_rows(case, usable_readings(case, table), free), ranges)
         torque = exact.with_channels(("torque",))
         left["the file's"] += [c.overall for c in torque if c.candidate == theirs]
         left["the posterior's"].append(exact.best().overall)

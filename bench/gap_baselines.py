@@ -9,8 +9,8 @@ from importlib.util import find_spec
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.fitting.coordinates import linearise, predict_readings, soil_coordinate
-from soilml.fitting.free_parameters import select_free
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
@@ -23,14 +23,13 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     readings = stack_readings(case, table)
     effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
     known, _ = effect_signatures(soil_only, readings, effects)
-    y = predict_readings(soil_only, [], np.zeros((1, 0)), readings)[0]
+    y = predict(soil_only, [], np.zeros((1, 0)), readings)[0]
     r = (readings.reading - y) / readings.std
     g = np.stack([s.column for s in known], axis=1) / readings.std[:, None]
     labels = [s.name for s in known]
     free = select_free(case, None)
-    axes = [soil_coordinate(f) for f in free]
     at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
-    j = linearise(case, axes, at, readings)[1] / readings.std[:, None]
+    j = linearise(case, free, at, readings).jacobian / readings.std[:, None]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         named = {"residual correlation": _correlated(g, r, labels)}

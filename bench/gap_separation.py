@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.fitting.coordinates import linearise, soil_coordinate
-from soilml.fitting.free_parameters import select_free
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, run_effect_columns
 from soilml.gap.evidence.directions import effect_signatures
@@ -57,7 +57,7 @@ def separation(case: Case, table: Table, truth: dict[str, Any]) -> Separation:
     own = _own_signatures(causes, columns, truth, readings)
     free = select_free(case, None)
     at = np.asarray([f.prior.fraction(truth["soil"][f.path]) for f in free])
-    soil = linearise(true_case, [soil_coordinate(f) for f in free], at, readings)[1]
+    soil = linearise(true_case, free, at, readings).jacobian
     lower = np.linalg.cholesky(_covariance(true_case, truth, readings))
     white = {n: np.linalg.solve(lower, c) for n, c in (columns | own).items()}
     white_soil = np.linalg.solve(lower, soil)

@@ -15,8 +15,8 @@ from datagen.recipe import read_recipe
 from soilml import Operating, identify
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
@@ -103,7 +103,7 @@ def _measured(rng: np.random.Generator, rows: int, truth: dict[str, float]) -> t
 
 
 def _density(case: Case, table: Table) -> PosteriorDensity:
-    return PosteriorDensity(case, read_observations(case, table), select_free(case, None))
+    return PosteriorDensity(case, usable_readings(case, table), select_free(case, None))
 
 
 def _moments(sample: ImportanceSample) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -128,7 +128,7 @@ def run(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
     from soilml.cli.options import available_effects
     from soilml.cli.progress import progress_bar
-    from soilml.fitting.declared_discrepancy import ignored_discrepancy
+    from soilml.fitting.covariance import ignored_discrepancy
     from soilml.physics.computing_device import computing_on
 
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)

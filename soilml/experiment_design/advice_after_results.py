@@ -20,9 +20,9 @@ from soilml.experiment_design.parameter_samples import (
     samples_of_moments,
     samples_of_rows,
 )
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.fit import Fit
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.physics.operating_point import COVARIATES, Operating
@@ -57,12 +57,16 @@ def advice_after_fit(
     if case.gears:
         return None
     try:
-        data = read_observations(case, table)
+        readings = usable_readings(case, table)
         selected = select_free(case, free)
-        samples = samples_of_rows(case, data, selected, QUICK_SAMPLES, found=fit.samples)
+        samples = samples_of_rows(case, readings, selected, QUICK_SAMPLES, found=fit.samples)
         current = np.asarray([fit.remaining_fraction[f.path] for f in samples.free])
         return _quick(
-            case, samples, candidate_grid(None, None, data.load), data.at, current_fraction=current
+            case,
+            samples,
+            candidate_grid(None, None, readings.row_load),
+            readings.at,
+            current_fraction=current,
         )
     except (FitError, InputError):
         return None
@@ -92,7 +96,7 @@ def advice_after_estimate(
         free = select_free(case, None)
         if slip.size <= MAX_EXACT_ROWS:
             rows = Table({column(n): np.atleast_1d(readings[n]) for n in estimator.inputs})
-            samples = samples_of_rows(case, read_observations(case, rows), free, QUICK_SAMPLES)
+            samples = samples_of_rows(case, usable_readings(case, rows), free, QUICK_SAMPLES)
         else:
             samples = samples_of_moments(free, estimator.names, mean, covariance, QUICK_SAMPLES)
         advice = _quick(

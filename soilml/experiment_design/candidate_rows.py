@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.fitting.levels import rows_driven_alike
+from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.quantities import column
 
@@ -98,7 +98,7 @@ def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list
     The point of rows that are driven alike is their median.
     """
     slip, load = np.atleast_1d(measured.slip), np.atleast_1d(measured.load)
-    group = rows_driven_alike(Operating(slip=slip, load=load))
+    group = replicate_rows(Operating(slip=slip, load=load))
     ends = np.cumsum(np.unique(group, return_counts=True)[1])
     members = np.split(np.argsort(group, kind="stable"), ends[:-1])
     points = sorted((float(np.median(slip[i])), float(np.median(load[i]))) for i in members)

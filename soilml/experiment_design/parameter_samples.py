@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.free_parameters import FreeParameter
-from soilml.fitting.observations import Observations
-from soilml.identification.condensed_rows import condensed
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.readings import Readings
+from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.maximum_entropy import prior_quantiles
@@ -32,7 +32,7 @@ class ParameterSamples:
     earlier rows exceed it.
     """
 
-    free: tuple[FreeParameter, ...]
+    free: tuple[Coordinate, ...]
     u: Floats
     weights: Floats
     noise_scale: float = 1.0
@@ -52,7 +52,7 @@ class ParameterSamples:
 
 
 def samples_of_prior(
-    free: Sequence[FreeParameter], count: int = SAMPLES, seed: int = 0, case: Case | None = None
+    free: Sequence[Coordinate], count: int = SAMPLES, seed: int = 0, case: Case | None = None
 ) -> ParameterSamples:
     """Samples of the prior by Latin hypercube, equally weighted.
 
@@ -64,8 +64,8 @@ def samples_of_prior(
 
 def samples_of_rows(
     case: Case,
-    data: Observations,
-    free: Sequence[FreeParameter],
+    readings: Readings,
+    free: Sequence[Coordinate],
     count: int = SAMPLES,
     seed: int = 0,
     found: PosteriorSamples | None = None,
@@ -75,7 +75,7 @@ def samples_of_rows(
     `found` are samples that were drawn of it before.
     """
     if found is None:
-        found = posterior_samples(case, condensed(case, data, free), free)
+        found = posterior_samples(case, condensed(case, readings, free), free)
     offset = np.random.default_rng(seed).random()
     drawn = systematic_resampling(found.sample.weights, count, offset)
     index, multiplicity = np.unique(drawn, return_counts=True)
@@ -84,7 +84,7 @@ def samples_of_rows(
 
 
 def samples_of_moments(
-    free: Sequence[FreeParameter],
+    free: Sequence[Coordinate],
     names: Sequence[str],
     mean: Floats,
     covariance: Floats,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,9 @@ from soilml.config.case import Case
 from soilml.config.model_discrepancy import range_with_zero
 from soilml.errors import InputError
 from soilml.experiment_design.parameter_samples import ParameterSamples
-from soilml.fitting.channel_predictions import predict_channels, propagated_input_noise
-from soilml.fitting.observations import LEAST_RELATIVE_STD
+from soilml.fitting.covariance import noise_of_operation
+from soilml.fitting.predictions import predict_channels
+from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 
@@ -56,8 +58,7 @@ def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> 
             for n, v in zip(channels, y, strict=True)
         ]
     )
-    from_inputs = _input_noise(case, samples, at)
-    inputs = np.stack([from_inputs[name][0] for name in channels])
+    inputs = _input_noise(case, samples, at, channels)
     std = samples.noise_scale * np.hypot(sensor, inputs[..., None])
     failure = np.isnan(y).any(axis=0) @ samples.weights
     largest = np.nan_to_num(np.abs(y)).max(axis=(1, 2), keepdims=True)
@@ -74,11 +75,15 @@ def _model_error(case: Case, name: str, y: Floats) -> float:
     return own.amplitude(range_with_zero(np.nanmedian(y[carried], axis=1)))
 
 
-def _input_noise(case: Case, samples: ParameterSamples, at: Operating) -> dict[str, Floats]:
-    """Standard deviation (1, m) of each channel that noise of slip and load causes."""
+def _input_noise(
+    case: Case, samples: ParameterSamples, at: Operating, channels: Sequence[str]
+) -> Floats:
+    """Standard deviation (c, m) of each channel that noise of slip and load causes."""
     slip_std, load_std = (
         case.noise[key].std(value) if key in case.noise else np.zeros_like(value)
         for key, value in (("slip", np.asarray(at.slip)), ("load_N", np.asarray(at.load)))
     )
-    nearest = int(np.argmin((samples.standardised**2).sum(axis=1)))
-    return propagated_input_noise(case, samples.free, samples.u[nearest], at, slip_std, load_std)
+    rows = replace(Readings.of_every_row(at, channels), slip_std=slip_std, load_std=load_std)
+    nearest = samples.u[int(np.argmin((samples.standardised**2).sum(axis=1)))]
+    noise = noise_of_operation(case, rows, samples.free, nearest)
+    return noise.reshape(len(channels), -1)

@@ -1,8 +1,7 @@
-"""Coordinates of a fit: soil parameters, effect sizes and effect shapes in one vector."""
+"""Coordinates of a fit: parameters of soil, gear and effects in one vector, with their priors."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,82 +9,147 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.errors import InputError
-from soilml.fitting.free_parameters import FreeParameter
-from soilml.fitting.predictions import (
-    PredictionRequest,
-    linearise_many,
-    predict_many,
-)
-from soilml.fitting.readings import Readings
+from soilml.errors import InputError, did_you_mean
 from soilml.numerics.prior import Prior
-from soilml.parameters import declared
+from soilml.parameters import Parameter, declared
 from soilml.physics.effects.base import Effect, SlipLoadScaling
+from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
 
+#: Ranges of natural soils, for parameters without a prior.
+_DEFAULT_PRIORS = {
+    "cohesion": Prior(0.0, 10000.0),
+    "friction_angle": Prior(0.17, 0.96),
+    "shear_modulus": Prior(0.001, 0.1, log=True),
+    "n": Prior(0.3, 1.8),
+}
+#: An upper bound beyond this multiple of the value is too wide to search, two decades; the prior is
+#: then this factor to either side of the value, three decades in all.
+WIDE_BOUND, ASSUMED_FACTOR = 100.0, 30.0
 #: Prior standard deviations of an effect's shape coefficients, in their own units.
 SHAPE_STD = {"slip_power": 1.0, "by_slip": 3.0, "by_load": 1.0}
 
 
 @dataclass(frozen=True)
-class Coordinate(ABC):
+class Coordinate:
     """One coordinate x of a fit: its bounds, and how it maps to the value of a parameter.
 
-    `name` is the parameter's name within its soil or effect. `prior` maps x to the value. `std`
-    is the standard deviation of a Gaussian prior of x with mean zero, infinite where there is none.
+    A soil parameter's x is its cumulative probability under the prior, from 0 to 1; an effect's
+    size has x in reference sizes, and a shape coefficient is its own x.
+
+    Attributes
+    ----------
+    path
+        As in `Case.parameters`: `cohesion`, `slip-sinkage.n1`, `grousers@lugged.height`.
+    unit
+        SI unit of its values.
+    prior
+        Maps x to the value: the case's prior, or the one that is assumed.
+    nominal
+        The value that the case gives it.
+    assumed
+        Whether the case has no prior for it.
+    normal_std
+        Standard deviation of a normal density of the value about zero that is to be multiplied
+        with that of the prior; None where there is none.
+    lower, upper
+        Bounds of x.
+    is_shape
+        Whether it is a shape coefficient of an effect's law.
     """
 
-    name: str
+    path: str
     unit: str
-    lower: float
-    upper: float
     prior: Prior
-    std: float = float("inf")
-
-    @property
-    @abstractmethod
-    def path(self) -> str:
-        """Path of the parameter in the case."""
-
-    def value(self, x: Floats) -> Floats:
-        """Values of the parameter at coordinates x."""
-        return self.prior.at(x)
-
-    def rate(self, x: float) -> float:
-        """Derivative of the value with respect to x."""
-        return float(self.prior.rate(np.asarray([x]))[0])
-
-
-@dataclass(frozen=True)
-class SoilCoordinate(Coordinate):
-    """A soil parameter: x is its cumulative probability under the prior, from 0 to 1."""
-
-    @property
-    def path(self) -> str:
-        """Path of the parameter in the case: its name."""
-        return self.name
-
-
-@dataclass(frozen=True, kw_only=True)
-class EffectCoordinate(Coordinate):
-    """The size of an effect, x being in reference sizes, or one of its shape coefficients."""
-
-    effect: str
+    nominal: float = 0.0
+    assumed: bool = False
+    normal_std: float | None = None
+    lower: float = 0.0
+    upper: float = 1.0
     is_shape: bool = False
 
     @property
-    def path(self) -> str:
-        """Path of the parameter in the case: effect.parameter."""
-        return f"{self.effect}.{self.name}"
+    def effect(self) -> str:
+        """Name of the effect, or of the part of the case, that has the parameter; "" for soil."""
+        return self.path.rpartition(".")[0]
+
+    @property
+    def name(self) -> str:
+        """Name of the parameter within its soil or effect."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of x by the normal density about zero; infinite without one."""
+        if self.normal_std is None:
+            return float("inf")
+        return self.normal_std / abs(self.prior.upper - self.prior.lower)
+
+    @property
+    def centre(self) -> float:
+        """The x of the value zero, where there is a normal density about it; else 0."""
+        if self.normal_std is None:
+            return 0.0
+        return -self.prior.lower / (self.prior.upper - self.prior.lower)
+
+    @property
+    def fraction_precision(self) -> float:
+        """Precision of the normal distribution, in fractions, that stands for prior and density."""
+        return self.prior.fraction_precision if self.normal_std is None else self.std**-2
+
+    def value(self, x: Floats) -> Floats:
+        """Values of the parameter at coordinates x (...)."""
+        return self.prior.at(x)
+
+    def rate(self, x: Floats) -> Floats:
+        """Derivatives of the value by x, at x (...)."""
+        return self.prior.rate(x)
 
 
-def soil_coordinate(free: FreeParameter) -> SoilCoordinate:
-    """The coordinate of a free soil parameter."""
-    return SoilCoordinate(free.path, free.unit, 0.0, 1.0, free.prior)
+def select_free(case: Case, names: Sequence[str] | None) -> list[Coordinate]:
+    """The named parameters, by default those with a prior; `InputError` for an unknown name."""
+    known = case.parameters()
+    paths = list(case.prior) if names is None else list(dict.fromkeys(names))
+    if not paths:
+        raise InputError(
+            "nothing to identify: give [soil.prior] in the model file, or --free cohesion,..."
+        )
+    free = []
+    for path in paths:
+        if path not in known:
+            raise InputError(
+                f"--free {path!r}: no such parameter; {did_you_mean(path, known)}this model has: "
+                f"{', '.join(known)}"
+            )
+        parameter, nominal = known[path]
+        prior = case.prior.get(path) or _DEFAULT_PRIORS.get(path)
+        if prior is None:
+            prior = _wide_prior(parameter, float(nominal))
+        free.append(Coordinate(path, parameter.unit, prior, float(nominal), path not in case.prior))
+    return free
 
 
-def size_coordinate(effect: type[Effect], calibration: float | None) -> EffectCoordinate:
+def free_soil_parameters(case: Case, free: Sequence[str] | None) -> list[Coordinate]:
+    """The soil parameters to fit: those named, else those with a prior, else the shear parameters.
+
+    Raises `InputError` where a named parameter is one of the gear or of an effect.
+    """
+    selected = select_free(case, free if free is not None or case.prior else SHEAR)
+    other = [c.path for c in selected if c.effect]
+    if free is not None and other:
+        raise InputError(f"--free {other[0]} is not a soil parameter; only those can be freed here")
+    return [c for c in selected if not c.effect]
+
+
+def fixed_parameters(case: Case, free: Sequence[Coordinate]) -> list[str]:
+    """Soil and gear parameters that were fixed at the values of the model file."""
+    freed = {c.path for c in free}
+    soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]
+    return [*soil, *(path for path in case.parameters() if path.startswith(("gear.", "gears.")))]
+
+
+def size_coordinate(effect: type[Effect], calibration: float | None) -> Coordinate:
     """The coordinate of an effect's size.
 
     `calibration` is the prior standard deviation of the size in its own unit; None: no prior.
@@ -94,53 +158,51 @@ def size_coordinate(effect: type[Effect], calibration: float | None) -> EffectCo
     parameter = declared(effect)[size]
     unit = effect.about.reference[size]
     lower, upper = sorted((parameter.lower / unit, parameter.upper / unit))
-    return EffectCoordinate(
-        size,
+    return Coordinate(
+        f"{effect.name}.{size}",
         parameter.unit,
-        lower,
-        upper,
         Prior(0.0, unit),
-        float("inf") if calibration is None else calibration / abs(unit),
-        effect=effect.name,
+        normal_std=calibration,
+        lower=lower,
+        upper=upper,
     )
 
 
-def shape_coordinates(effect: type[Effect]) -> list[EffectCoordinate]:
+def shape_coordinates(effect: type[Effect]) -> list[Coordinate]:
     """The coordinates of an effect's shape coefficients; none where its law has no uncertainty."""
     coordinates = []
     for name in effect.law_terms if issubclass(effect, SlipLoadScaling) else ():
         std = SHAPE_STD[name]
         bound = min(declared(effect)[name].upper, 4.0 * std)
         coordinates.append(
-            EffectCoordinate(
-                name,
+            Coordinate(
+                f"{effect.name}.{name}",
                 "1",
-                -bound,
-                bound,
                 Prior(0.0, 1.0),
-                std,
-                effect=effect.name,
+                normal_std=std,
+                lower=-bound,
+                upper=bound,
                 is_shape=True,
             )
         )
     return coordinates
 
 
-def predict_readings(
-    case: Case, coordinates: Sequence[Coordinate], x: Floats, readings: Readings
-) -> Floats:
-    """Predictions (sets, m) at coordinates `x` (sets, p); NaN where there is no equilibrium."""
-    (prediction,) = predict_many([PredictionRequest(case, coordinates, x, readings)])
-    if isinstance(prediction, InputError):
-        raise prediction
-    return prediction
+def values_at(coordinates: Sequence[Coordinate], x: Floats) -> Floats:
+    """Values (..., p) of all parameters at coordinates x (..., p)."""
+    each = [c.value(x[..., i]) for i, c in enumerate(coordinates)]
+    return np.stack(each, axis=-1) if each else np.zeros((*x.shape[:-1], 0))
 
 
-def linearise(
-    case: Case, coordinates: Sequence[Coordinate], x: Floats, readings: Readings
-) -> tuple[Floats, Floats]:
-    """Predictions (m,) at `x` (p,) and their Jacobian (m, p); see `linearise_many`."""
-    (found,) = linearise_many([PredictionRequest(case, coordinates, x[None, :], readings)])
-    if isinstance(found, InputError):
-        raise found
-    return found.prediction, found.jacobian
+def rates_at(coordinates: Sequence[Coordinate], x: Floats) -> Floats:
+    """Derivatives (p,) of the values by the coordinates, at x (p,)."""
+    each = [float(c.rate(x[i : i + 1])[0]) for i, c in enumerate(coordinates)]
+    return np.asarray(each, dtype=np.float64)
+
+
+def _wide_prior(parameter: Parameter, nominal: float) -> Prior:
+    """The parameter's bounds; about its value where they span too many decades."""
+    if nominal > 0.0 and parameter.upper > WIDE_BOUND * nominal:
+        lower = max(nominal / ASSUMED_FACTOR, parameter.lower)
+        return Prior(lower, nominal * ASSUMED_FACTOR, log=True)
+    return Prior(parameter.lower, parameter.upper)

@@ -209,12 +209,12 @@ def is_one_load(load: Floats) -> bool:
     return load_levels(load).count == 1
 
 
-def rows_driven_alike(
+def replicate_rows(
     at: Operating, run: Integers | None = None, slip_std: float = 0.0, load_std: float = 0.0
 ) -> Integers:
     """Groups of rows that are repeats of each other, (n,), numbered from 0.
 
-    Rows are driven alike if their slips, loads and covariates are of the same levels, their slips
+    Rows are replicates if their slips, loads and covariates are of the same levels, their slips
     differ by at most `ALIKE_SLIP` and the logarithms of their loads by at most `ALIKE_LOG_LOAD`,
     or by the measurement noise (`slip_std`, and `load_std` in N) where that is larger.
     """

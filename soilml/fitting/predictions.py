@@ -1,35 +1,80 @@
-"""Predictions and derivatives of several cases, from few calls of the physics."""
+"""What cases predict for readings, and how that changes with the coordinates: many at once."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from graphlib import CycleError
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.joined_cases import CaseSets, join_key, joined_load_case
+from soilml.fitting.operating_points import rows_by_gear
 from soilml.fitting.readings import Readings
-from soilml.fitting.readings_by_gear import GearReadings, readings_by_gear
 from soilml.physics.contact import Force
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.linear_response import linear_response
 from soilml.physics.model import in_chunks_near
+from soilml.physics.operating_point import Operating
 from soilml.physics.sinkage_estimate import SinkageEstimate
-
-if TYPE_CHECKING:
-    from soilml.fitting.coordinates import Coordinate
+from soilml.quantities import CHANNELS
 
 Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
 T = TypeVar("T")
 
-#: Step of the difference quotients, in units of the coordinate: a fraction of a soil parameter's
-#: prior range, or of an effect's reference size.
-DIFFERENCE_STEP = 1e-5
+#: Step of the difference quotients, in units of the coordinate: rounding errors of a reading at
+#: given sinkage (1e-14 of it) and curvature then both stay below 1e-5 of a derivative.
+DIFFERENCE_STEP = 1e-6
+
+
+@dataclass(frozen=True)
+class GearReadings:
+    """The readings of one gear, with its case and the coordinates that act on it.
+
+    `kept` (p,) are the positions of these coordinates among all, `rows` (n,) those of the rows and
+    `selected` (m,) those of the readings.
+    """
+
+    case: Case
+    coordinates: list[Coordinate]
+    kept: Integers
+    readings: Readings
+    rows: Integers
+    selected: Integers
+
+
+def readings_by_gear(
+    case: Case, coordinates: Sequence[Coordinate], readings: Readings
+) -> list[GearReadings]:
+    """The readings of each gear of a case with several; none where there is one gear.
+
+    A gear without readings is left out.
+    """
+    parts: list[GearReadings] = []
+    if not case.gears:
+        return parts
+    for gear in rows_by_gear(case, readings.at):
+        selected, own = readings.of_rows(gear.rows, gear.at)
+        if not selected.any():
+            continue
+        kept = [i for i, c in enumerate(coordinates) if c.path in gear.paths]
+        parts.append(
+            GearReadings(
+                gear.case,
+                [replace(coordinates[i], path=gear.paths[coordinates[i].path]) for i in kept],
+                np.asarray(kept, dtype=np.int64),
+                own,
+                gear.rows,
+                np.flatnonzero(selected),
+            )
+        )
+    return parts
 
 
 @dataclass(frozen=True)
@@ -37,7 +82,7 @@ class PredictionRequest:
     """The readings that a case predicts at sets of coordinates, x (sets, p).
 
     `estimate`, (sets, n) for the n operating points, is where the searches for equilibrium start;
-    see `soilml.physics.sinkage_search.SinkageEstimate`. `gears` are the readings of each of
+    see `soilml.physics.sinkage_estimate.SinkageEstimate`. `gears` are the readings of each of
     several gears, where they are known from an earlier request.
     """
 
@@ -68,6 +113,7 @@ class PredictionRequest:
 class Linearisation:
     """Predictions of m readings at coordinates x (p,), and their first-order changes."""
 
+    x: Floats  # (p,)
     prediction: Floats  # (m,)
     jacobian: Floats  # (m, p)
     log_sinkage: Floats  # (n,) logarithm of the sinkage in m
@@ -97,6 +143,58 @@ def linearise_many(requests: Sequence[PredictionRequest]) -> list[Linearisation 
     returned as by `predict_many`.
     """
     return _by_gear(requests, _linearise_each, _joined_linearisations)
+
+
+def predict(case: Case, coordinates: Sequence[Coordinate], x: Floats, readings: Readings) -> Floats:
+    """Predictions (sets, m) at coordinates `x` (sets, p); NaN where there is no equilibrium."""
+    (prediction,) = predict_many([PredictionRequest(case, coordinates, x, readings)])
+    if isinstance(prediction, InputError):
+        raise prediction
+    return prediction
+
+
+def linearise(
+    case: Case,
+    coordinates: Sequence[Coordinate],
+    x: Floats,
+    readings: Readings,
+    near: Linearisation | None = None,
+) -> Linearisation:
+    """Predictions at `x` (p,) and their derivatives; see `linearise_many`.
+
+    A linearisation `near` x, of the same coordinates, shows where the search for equilibrium
+    starts.
+    """
+    start = None if near is None else near.sinkage_at((x - near.x)[None, :])
+    (found,) = linearise_many([PredictionRequest(case, coordinates, x[None, :], readings, start)])
+    if isinstance(found, InputError):
+        raise found
+    return found
+
+
+def predict_channels(
+    case: Case, coordinates: Sequence[Coordinate], x: Floats, at: Operating
+) -> dict[str, Floats]:
+    """Each channel (sets, n) at operating points (n,), at coordinates `x` (sets, p)."""
+    y = predict(case, coordinates, x, Readings.of_every_row(at))
+    parts = np.split(y, len(CHANNELS), axis=1)
+    return dict(zip(CHANNELS, parts, strict=True))
+
+
+def forces(case: Case, at: Operating) -> Force:
+    """Forces (n,) of a case at operating points (n,), which several gears may have driven."""
+    if not case.gears:
+        return case.model(case.soil, at)
+    count = np.broadcast(at.slip, at.load).size
+    joined: dict[str, Any] = {
+        f.name: np.zeros(count, np.int64 if f.name == "status" else np.float64)
+        for f in fields(Force)
+    }
+    for part in rows_by_gear(case, at):
+        force = part.case.model(part.case.soil, part.at)
+        for name, values in joined.items():
+            values[part.rows] = getattr(force, name)
+    return Force(**joined)
 
 
 def _linearise_each(requests: Sequence[PredictionRequest]) -> list[Linearisation | InputError]:
@@ -148,6 +246,7 @@ def _joined_linearisations(
     """Linearisations of each gear together: a coordinate changes nothing where it does not act."""
     m, n, p = len(request.readings), len(request.readings.run), len(request.coordinates)
     joined = Linearisation(
+        x=request.x[0],
         prediction=np.full(m, np.nan),
         jacobian=np.zeros((m, p)),
         log_sinkage=np.full(n, np.nan),
@@ -216,6 +315,7 @@ def _linearise_joined(requests: Sequence[PredictionRequest]) -> list[Linearisati
         log_sinkage = response.sinkage.log_sinkage[rows].reshape(part.sets, part.points)
         linearisations.append(
             Linearisation(
+                x=request.x[0],
                 prediction=y[0],
                 jacobian=np.asarray(((y[1:] - y[0]) / step[:, None]).T),
                 log_sinkage=log_sinkage[0],

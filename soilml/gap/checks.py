@@ -12,8 +12,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.observations import LEAST_RELATIVE_STD
-from soilml.fitting.readings import Readings
+from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
 from soilml.io.table import Table
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -167,7 +166,7 @@ def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Re
         undeclared = np.flatnonzero((readings.channel == i) & ~np.isfinite(readings.std))
         if undeclared.size == 0:
             continue
-        _, group = np.unique(readings.driven_alike[undeclared], return_inverse=True)
+        _, group = np.unique(readings.replicates[undeclared], return_inverse=True)
         count = np.bincount(group)
         mean = np.bincount(group, readings.reading[undeclared]) / count
         degrees_of_freedom = int((count - 1).sum())

@@ -10,13 +10,12 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.errors import InputError
-from soilml.fitting.free_soil import fixed_parameters, free_soil_parameters
+from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
+from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import (
     Readings,
-    check_size,
     stack_readings,
 )
-from soilml.fitting.rover_rows import with_rover_columns
 from soilml.gap.candidate_effects import candidate_effects, effect_names
 from soilml.gap.checks import (
     DataCheckResult,
@@ -68,9 +67,15 @@ from soilml.gap.verdict.remainder import (
     with_uncertain_discrepancy,
 )
 from soilml.io.read_table import Rows, as_table
+from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark, texts
 from soilml.unsolvable import solvable
+
+#: Readings that an analysis may have. Its matrices are of this size squared, and many are held at
+#: a time: 1.1 GB in all.
+MOST_READINGS = 3600
 
 
 @solvable("the gap analysis")
@@ -154,7 +159,7 @@ def gap(
     known_costs = check_costs(costs or {})
     table = with_rover_columns(case, as_table(table))
     check_wheel_size(case, table)
-    check_size(table)
+    _check_size(table)
     usable = table.answered
     if not usable.any():
         raise InputError(f"{table.source}: no row has the status ok")
@@ -166,7 +171,7 @@ def gap(
     readings = stack_readings(case, split.analysed)
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes += [Remark("channel-excluded", text) for text in exclusions]
+    notes += exclusions
     checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
     if checks.errors:
         errors = (*checks.errors, *checks.naming_obstacles)
@@ -290,3 +295,16 @@ def _build_report(
         discrepancy=remaining_discrepancy(problem, beside, left_by),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )
+
+
+def _check_size(table: Table) -> None:
+    """Raise `InputError` for more readings than a gap analysis can hold, with what to leave out."""
+    columns = [table[column(name)] for name in CHANNELS if column(name) in table]
+    count = sum(int(np.isfinite(values).sum()) for values in columns)
+    if count > MOST_READINGS:
+        every = -(-count // MOST_READINGS)
+        raise InputError(
+            f"{table.source}: {count} readings in {len(table)} rows; an analysis takes at most "
+            f"{MOST_READINGS}, because its matrices grow with the square of their number: average "
+            f"replicate rows, or keep one row, or one run, of {every}"
+        )

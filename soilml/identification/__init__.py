@@ -1,6 +1,6 @@
 """Identification of soil parameters from measured rows, without training.
 
-Every method has the signature `(case, observations, free) -> Fit`; a new method is one new file and
+Every method has the signature `(case, readings, free) -> Fit`; a new method is one new file and
 one line in `METHODS`.
 """
 
@@ -13,13 +13,14 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
-from soilml.fitting.declared_discrepancy import ignored_discrepancy, included_discrepancy
-from soilml.fitting.free_parameters import FreeParameter, select_free
-from soilml.fitting.observations import Observations, read_observations
-from soilml.fitting.shared_errors_sizes import included_bias, usual_errors
-from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
-from soilml.identification.condensed_rows import condensed
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
+from soilml.fitting.readings import Readings
+from soilml.fitting.shared_errors import included_bias, usual_errors
+from soilml.fitting.soil_tests import disagreeing_soil_tests
+from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.condensing import condensed
+from soilml.identification.fit import Fit
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear
@@ -29,7 +30,7 @@ from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.remarks import Remark
 from soilml.unsolvable import solvable
 
-Method = Callable[[Case, Observations, Sequence[FreeParameter]], Fit]
+Method = Callable[[Case, Readings, Sequence[Coordinate]], Fit]
 
 #: Identification method by the name that `--method` takes.
 METHODS: dict[str, Method] = {
@@ -70,7 +71,7 @@ def identify(
         A key of `METHODS`: `nonlinear`, `linear`, `newton` or `posterior`.
     as_usual
         Whether sensors and model have the errors that they usually have
-        (`soilml.fitting.shared_errors_sizes`), beside those that the case declares; for
+        (`soilml.fitting.shared_errors`), beside those that the case declares; for
         `nonlinear` and `posterior`. Otherwise the model is right, but for its [discrepancy], and
         sensors have the errors of [noise] and [bias] alone.
 
@@ -127,25 +128,25 @@ def identify(
         raise InputError(
             f"the {method} method takes the model as right; take nonlinear or posterior"
         )
-    data, selected = read_observations(case, table), select_free(case, free)
+    readings, selected = usable_readings(case, table), select_free(case, free)
     if as_usual:
-        errors = usual_errors(case, data.load, [f.path for f in selected])
-        data = replace(data, shared_errors=errors)
+        errors = usual_errors(case, readings.row_load, [c.path for c in selected])
+        readings = replace(readings, shared_errors=errors)
     if method not in CLOSED_FORM:
-        data = condensed(case, data, selected)
-    fit = METHODS[method](case, data, selected)
+        readings = condensed(case, readings, selected)
+    fit = METHODS[method](case, readings, selected)
     if method not in CLOSED_FORM and fit.low is None:
         fit = _within_priors(fit, selected)
     remarks = [
-        *_method_limits(fit, data, free),
-        *_about_discrepancy(case, fit, data),
+        *_method_limits(fit, readings, free),
+        *_about_discrepancy(case, fit, readings),
         *_about_soil_tests(case, fit),
-        *data.notes,
+        *readings.notes,
     ]
     return replace(fit, warnings=(*fit.warnings, *remarks))
 
 
-def _within_priors(fit: Fit, selected: Sequence[FreeParameter]) -> Fit:
+def _within_priors(fit: Fit, selected: Sequence[Coordinate]) -> Fit:
     """A fit whose Gaussian intervals end where the prior ends: no cohesion is below zero."""
     low, high = fit.interval
     prior = {parameter.path: parameter.prior for parameter in selected}
@@ -153,7 +154,7 @@ def _within_priors(fit: Fit, selected: Sequence[FreeParameter]) -> Fit:
     return replace(fit, low=np.maximum(low, ends[:, 0]), high=np.minimum(high, ends[:, 1]))
 
 
-def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> list[Remark]:
+def _method_limits(fit: Fit, readings: Readings, free: Sequence[str] | None) -> list[Remark]:
     """Parameters not requested, and noise that a closed form does not propagate."""
     remarks = []
     if free is not None and (others := [name for name in fit.names if name not in free]):
@@ -162,13 +163,13 @@ def _method_limits(fit: Fit, data: Observations, free: Sequence[str] | None) -> 
             f"identifies {', '.join(fit.names)} together"
         )
         remarks.append(Remark("identified-together", text, tuple(others), "note"))
-    if fit.method in CLOSED_FORM and (np.any(data.slip_std) or np.any(data.load_std)):
+    if fit.method in CLOSED_FORM and (np.any(readings.slip_std) or np.any(readings.load_std)):
         text = f"the {fit.method} method does not propagate noise of slip and load into std"
         remarks.append(Remark("input-noise-ignored", text))
     return remarks
 
 
-def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[Remark]:
+def _about_discrepancy(case: Case, fit: Fit, readings: Readings) -> list[Remark]:
     """Whether discrepancy and bias of the case are in the intervals."""
     if fit.method in CLOSED_FORM:
         bias_ignored = f"the {fit.method} method ignores [bias]"
@@ -176,7 +177,7 @@ def _about_discrepancy(case: Case, fit: Fit, data: Observations) -> list[Remark]
             *ignored_discrepancy(case, f"the {fit.method} method"),
             *([Remark("bias-ignored", bias_ignored)] if case.bias else []),
         ]
-    return [*included_discrepancy(case, data), *included_bias(case)]
+    return [*included_discrepancy(case, readings), *included_bias(case)]
 
 
 def _about_soil_tests(case: Case, fit: Fit) -> list[Remark]:
@@ -197,4 +198,4 @@ def _about_soil_tests(case: Case, fit: Fit) -> list[Remark]:
     ]
 
 
-__all__ = ["METHODS", "Fit", "FreeParameter", "Observations", "identify"]
+__all__ = ["METHODS", "Coordinate", "Fit", "Readings", "identify"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.identification.fit_result import Fit
+from soilml.identification.fit import Fit
 from soilml.remarks import Remark
 
 #: One standard deviation of a uniform prior to either side of its middle, as fractions of it.

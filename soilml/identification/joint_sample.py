@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.descent import (
-    LeastSquaresProblem,
-    Optimum,
-    descend,
-    global_optimum,
-)
-from soilml.fitting.free_parameters import soil_test_rates
+from soilml.config.case import Case
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.readings import Readings
+from soilml.fitting.starts import descend, global_optimum
+from soilml.identification.nonlinear import WeightedRows
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample
@@ -36,7 +37,7 @@ MOST_SAMPLED_ROWS = 128
 ENOUGH, MOST_SOLUTIONS, FEWEST_SAMPLES = 1250.0, 500_000, 4096
 
 
-def joint_sample(density: PosteriorDensity, optimum: Optimum) -> ImportanceSample:
+def joint_sample(density: PosteriorDensity, optimum: Solution) -> ImportanceSample:
     """Weighted fractions (n, p) of the priors of soil and errors.
 
     The region is that of the linearised posterior at the most probable parameters. Polynomials take
@@ -46,7 +47,7 @@ def joint_sample(density: PosteriorDensity, optimum: Optimum) -> ImportanceSampl
     """
     start = normal_start(density, optimum)
     density.linearise_at_mean(start)
-    rows, p = len(density.data.slip), len(density.free)
+    rows, p = len(density.readings.row_slip), len(density.free)
     if rows >= FEWEST_ROWS:
         most = FEW_ROUNDS if density.noise_scale > UNEXPLAINED else MOST_ROUNDS
         found = surface_sample(density, p, start, tempered_rounds=TEMPERED_ROUNDS, most_rounds=most)
@@ -60,24 +61,25 @@ def joint_sample(density: PosteriorDensity, optimum: Optimum) -> ImportanceSampl
     return _of_model(density, start)
 
 
-def most_probable(problem: LeastSquaresProblem) -> Optimum:
-    """The most probable parameters, with normal priors of the same variances.
+def most_probable(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Solution:
+    """The most probable parameters and errors, with normal priors of the same variances.
 
     Raises `FitError` where the model has no equilibrium at the measured loads.
     """
-    optimum = global_optimum(problem)
-    return descend(problem.with_noise_at(optimum), optimum.u, with_prior=True)
+    weighted = WeightedRows.of(case, readings, free)
+    optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
+    return descend(weighted.with_noise_at(optimum).problem, optimum.x, with_prior=True)
 
 
-def normal_start(density: PosteriorDensity, optimum: Optimum) -> ImportanceSample:
+def normal_start(density: PosteriorDensity, optimum: Solution) -> ImportanceSample:
     """Samples of the linearised posterior about the most probable parameters, of equal weights."""
     precision = optimum.jacobian.T @ optimum.jacobian / density.noise_scale**2
     prior = np.diag([f.fraction_precision for f in density.free])
-    of_tests = soil_test_rates(density.case, density.free, optimum.u)
+    of_tests = optimum.soil_tests.rates(optimum.x)
     prior += of_tests.T @ of_tests
     root = np.linalg.cholesky(np.linalg.inv(precision + prior))
-    normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.u)))
-    u = optimum.u + WIDER * normal @ root.T
+    normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.x)))
+    u = optimum.x + WIDER * normal @ root.T
     u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
     return ImportanceSample(u, np.full(SAMPLES, 1.0 / SAMPLES), 0.0)
 
@@ -95,7 +97,7 @@ def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceS
 
     p, most = len(density.free), float("inf")
     if density.noise_scale > UNEXPLAINED:
-        most = max(MOST_SOLUTIONS // len(density.data.slip), FEWEST_SAMPLES)
+        most = max(MOST_SOLUTIONS // len(density.readings.row_slip), FEWEST_SAMPLES)
     found = importance_sample(
         log_density,
         p,

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.levels import is_one_load
-from soilml.fitting.observations import Channel, Observations
-from soilml.identification.fit_result import Fit
+from soilml.fitting.readings import Readings
+from soilml.identification.fit import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects
@@ -29,7 +29,7 @@ ITERATIONS = 50
 MOST_CONDITION = 1e16
 
 
-def linear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+def linear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     r"""Linear least squares on the stresses at the angle of maximum stress.
 
     With the entry angle from sinkage and K fixed, load and torque give sigma_m and tau_m of the
@@ -46,7 +46,7 @@ def linear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     ----------
     case
         Model of a rigid wheel, soil and noise; the shear modulus of its soil is used as it is.
-    data
+    readings
         Two or more rows with torque, sinkage and driving slip, at different loads or slips.
     free
         The parameters asked for; others than c, phi and K are reported as not identified.
@@ -60,7 +60,7 @@ def linear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     ----------
     Iagnemma, Kang, Shibly and Dubowsky, IEEE Trans. Robotics 20(5), 2004.
     """
-    return with_fixed_parameter(case, "shear_modulus", lambda c: _solve(c, data, free))
+    return with_fixed_parameter(case, "shear_modulus", lambda c: _solve(c, readings, free))
 
 
 @dataclass(frozen=True)
@@ -79,8 +79,8 @@ class _Rows:
         return bool(np.isfinite(self.torque_std).all() and np.isfinite(self.sinkage_std).all())
 
 
-def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
-    rows = _usable_rows(case, data)
+def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
+    rows = _usable_rows(case, readings)
     declared, freedom = rows.noise_declared, len(rows.slip) - 2
     if not declared and freedom == 0:
         raise FitError("two rows leave no residual to estimate the noise: declare it in [noise]")
@@ -108,23 +108,26 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     )
 
 
-def _usable_rows(case: Case, data: Observations) -> _Rows:
-    torque, sinkage = _channel(data, "torque"), _channel(data, "sinkage")
-    usable = np.isfinite(torque.reading) & np.isfinite(sinkage.reading) & (data.slip >= 0)
+def _usable_rows(case: Case, readings: Readings) -> _Rows:
+    (torque, torque_std), (sinkage, sinkage_std) = (
+        _of_rows(readings, name) for name in ("torque", "sinkage")
+    )
+    slip = readings.row_slip
+    usable = np.isfinite(torque) & np.isfinite(sinkage) & (slip >= 0)
     radius = float(getattr(case.model.gear, "radius"))  # noqa: B009 - gears of other kinds lack it
-    usable &= (sinkage.reading > 0) & (sinkage.reading < radius)
+    usable &= (sinkage > 0) & (sinkage < radius)
     if usable.sum() < 2:
         raise FitError(
             f"{int(usable.sum())} rows with driving slip, torque and sinkage: the linear method "
             "needs two at different loads or slips"
         )
     return _Rows(
-        slip=data.slip[usable],
-        load=data.load[usable],
-        torque=torque.reading[usable],
-        sinkage=sinkage.reading[usable],
-        torque_std=torque.std[usable],
-        sinkage_std=sinkage.std[usable],
+        slip=slip[usable],
+        load=readings.row_load[usable],
+        torque=torque[usable],
+        sinkage=sinkage[usable],
+        torque_std=torque_std[usable],
+        sinkage_std=sinkage_std[usable],
     )
 
 
@@ -179,18 +182,20 @@ def _equations(
     return np.stack([from_c, m1 * sigma_m], axis=1), T / scale
 
 
-def _channel(data: Observations, name: str) -> Channel:
-    for channel in data.channels:
-        if channel.name == name:
-            return channel
-    raise FitError(
-        f"the linear method needs {name}; declare the noise of torque and sinkage, or of no channel"
-    )
+def _of_rows(readings: Readings, name: str) -> tuple[Floats, Floats]:
+    """Readings of a channel by row, (n,), and their noise; NaN where it was not measured."""
+    if name not in readings.channels:
+        raise FitError(
+            f"the linear method needs {name}; declare the noise of torque and sinkage, or of no "
+            "channel"
+        )
+    own = readings.channel == readings.channels.index(name)
+    found = np.full((2, len(readings.row_slip)), np.nan)
+    found[:, readings.row[own]] = readings.reading[own], readings.std[own]
+    return found[0], found[1]
 
 
-def _limits(
-    case: Case, free: Sequence[FreeParameter], solution: Floats, load: Floats
-) -> list[Remark]:
+def _limits(case: Case, free: Sequence[Coordinate], solution: Floats, load: Floats) -> list[Remark]:
     """What the closed form leaves out, and values outside what soil can have."""
     remarks = [
         Remark("not-identified", f"{f.path} is not identified by the linear method", (f.path,))

@@ -10,14 +10,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.fitting.channel_predictions import (
-    predict_channels,
-    stack_channels,
-    stacked_readings,
-)
-from soilml.fitting.free_parameters import FreeParameter, values_at
-from soilml.fitting.observations import Observations
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import Coordinate, rates_at, values_at
+from soilml.fitting.predictions import predict
+from soilml.fitting.readings import Readings
+from soilml.identification.fit import Fit
 from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
@@ -44,7 +40,7 @@ ASSUMED_NOISE = 0.02
 Linearised = Callable[[Floats], tuple[Floats, Floats]]
 
 
-def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     r"""Newton's iteration on the closed form of the linear-stress wheel, with cohesion fixed.
 
     .. math:: \theta \leftarrow \theta - (J^T J)^{-1} J^T r, \quad
@@ -58,7 +54,7 @@ def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     ----------
     case
         Model of a rigid wheel, soil and noise; the cohesion of its soil is used as it is.
-    data
+    readings
         Rows with three readings or more.
     free
         The parameters asked for; others than the three unknowns are reported as not identified.
@@ -76,21 +72,21 @@ def newton(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     law = getattr(gear, "braking", LinearWheel.braking)
     closed = LinearWheel(radius=gear.radius, width=gear.width, braking=law)
     case = replace(case, model=replace(case.model, gear=closed))
-    if data.reading_count < 3:
+    if readings.reading_count < 3:
         raise FitError(
-            f"{data.reading_count} readings: the Newton-Raphson method needs three or more"
+            f"{readings.reading_count} readings: the Newton-Raphson method needs three or more"
         )
-    return with_fixed_parameter(case, "cohesion", lambda c: _solve(c, data, free))
+    return with_fixed_parameter(case, "cohesion", lambda c: _solve(c, readings, free))
 
 
-def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     unknowns = _unknowns(case.soil)
-    reading, declared = stacked_readings(data)
-    known = bool(np.isfinite(declared).all())
+    reading, declared = readings.reading, readings.std
+    known = not readings.undeclared
     std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(reading) + 1e-9)
 
     def linearised(u: Floats) -> tuple[Floats, Floats]:
-        prediction, jacobian = _central_differences(case, data, unknowns, u)
+        prediction, jacobian = _central_differences(case, readings, unknowns, u)
         return (prediction - reading) / std, jacobian / std[:, None]
 
     start = np.asarray([f.prior.fraction(f.nominal) for f in unknowns])
@@ -100,7 +96,7 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
     misfit = float(residual @ residual / freedom) if freedom > 0 else float("nan")
     noise_variance = misfit if freedom > 0 and (not known or misfit > 1.0) else 1.0
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14) * noise_variance
-    values, rate = values_at(unknowns, u)
+    values, rate = values_at(unknowns, u), rates_at(unknowns, u)
     warnings = [
         Remark(
             "not-identified",
@@ -115,8 +111,7 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
             "noise is not declared: estimated from the residuals; in [noise] of the model file "
             "torque_Nm = '3 %' would declare it"
         )
-        names = tuple(column(c.name) for c in data.channels if not c.declared)
-        warnings.append(Remark("undeclared-noise", text, names))
+        warnings.append(Remark("undeclared-noise", text, readings.undeclared))
     return Fit(
         method="newton",
         names=tuple(f.path for f in unknowns),
@@ -124,32 +119,30 @@ def _solve(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit
         values=values,
         covariance=np.asarray(covariance, dtype=np.float64) * np.outer(rate, rate),
         warnings=tuple(warnings),
-        rows_used=len(data.slip),
+        rows_used=readings.row_count,
         misfit=misfit if known else float("nan"),
-        channels=tuple(column(c.name) for c in data.channels),
+        channels=tuple(column(name) for name in readings.channels),
     )
 
 
 def _central_differences(
-    case: Case, data: Observations, unknowns: Sequence[FreeParameter], u: Floats
+    case: Case, readings: Readings, unknowns: Sequence[Coordinate], u: Floats
 ) -> tuple[Floats, Floats]:
     """Predictions (k,) and Jacobian (k, 3), each set solved for itself.
 
     The unknowns are nearly dependent, which magnifies errors of first-order derivatives.
     """
     sets = np.concatenate([u + DIFFERENCE_STEP * np.eye(3), u - DIFFERENCE_STEP * np.eye(3), [u]])
-    y = stack_channels(data, predict_channels(case, unknowns, sets, data.at))
+    y = predict(case, unknowns, sets, readings)
     return y[6], np.asarray((y[:3] - y[3:6]).T / (2.0 * DIFFERENCE_STEP))
 
 
-def _unknowns(soil: Soil) -> list[FreeParameter]:
+def _unknowns(soil: Soil) -> list[Coordinate]:
     """The three unknowns with search ranges wider than any soil; kphi includes kc / b."""
     return [
-        FreeParameter("friction_angle", "rad", Prior(0.02, 1.3), float(soil.friction_angle), False),
-        FreeParameter(
-            "shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus), False
-        ),
-        FreeParameter("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi), False),
+        Coordinate("friction_angle", "rad", Prior(0.02, 1.3), float(soil.friction_angle)),
+        Coordinate("shear_modulus", "m", Prior(1e-4, 1.0, log=True), float(soil.shear_modulus)),
+        Coordinate("kphi", "N/m^(n+2)", Prior(1e3, 1e9, log=True), float(soil.kphi)),
     ]
 
 

@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError
-from soilml.fitting.channel_predictions import stacked_readings
-from soilml.fitting.declared_discrepancy import discrepancy_columns, stacked_columns
-from soilml.fitting.descent import LeastSquaresProblem, Optimum, descend, global_optimum
-from soilml.fitting.free_parameters import FreeParameter, values_at
-from soilml.fitting.observations import Observations
-from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
-from soilml.fitting.shared_errors_sensor_columns import sensor_columns
-from soilml.identification.diagnostics import at_prior_bound, with_warnings
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import Coordinate, rates_at, values_at
+from soilml.fitting.covariance import (
+    Whitening,
+    discrepancy_process,
+    noise_of_operation,
+    sensor_columns,
+)
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.readings import Readings
+from soilml.fitting.shared_errors import errors_at, with_modelled_errors
+from soilml.fitting.starts import descend, global_optimum, normal_stds
+from soilml.identification.fit import Fit, at_prior_bound, with_warnings
+from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.quantities import column
 
 Floats = NDArray[np.float64]
@@ -29,9 +36,11 @@ NOISE_ROUNDS = 3
 INITIAL_NOISE = 0.05
 #: Sum of squared residuals that is significant where no degree of freedom is left: 3 sigma.
 SIGNIFICANT_COST = 9.0
+#: Readings of each channel of the few rows that tell good starts from bad ones.
+FEW = 16
 
 
-def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     r"""Weighted least squares within the bounds of the priors, from several starts.
 
     .. math:: \min_\theta \sum_i \left(\frac{y_i - f(s_i, W_i; \theta)}{\sigma_i}\right)^2
@@ -54,7 +63,7 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     ----------
     case
         Model, soil, priors and noise.
-    data
+    readings
         Rows with k readings.
     free
         The p free parameters.
@@ -75,64 +84,121 @@ def nonlinear(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     Bard, Nonlinear Parameter Estimation, 1974. Orear, Am. J. Phys. 50(10), 1982 (effective
     variance).
     """
-    undeclared = any(not c.declared for c in data.channels)
-    if undeclared and data.reading_count <= len(free):
+    undeclared = bool(readings.undeclared)
+    if undeclared and readings.reading_count <= len(free):
         raise FitError(
-            f"{data.reading_count} readings cannot determine {len(free)} parameters and their own "
-            "noise; declare it in [noise]"
+            f"{readings.reading_count} readings cannot determine {len(free)} parameters and their "
+            "own noise; declare it in [noise]"
         )
-    problem = least_squares_problem(case, data, free)
-    optimum = global_optimum(problem)
-    for _ in range(NOISE_ROUNDS if undeclared or data.shared_errors else 1):
-        problem = problem.with_noise_at(optimum)
-        optimum = descend(problem, optimum.u, near=optimum.about)
+    weighted = WeightedRows.of(case, readings, free)
+    optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
+    for _ in range(NOISE_ROUNDS if undeclared or readings.shared_errors else 1):
+        weighted = weighted.with_noise_at(optimum)
+        optimum = descend(weighted.problem, optimum.x, near=optimum.model)
     with_prior = optimum
-    if np.any(at_prior_bound(optimum.u[: len(free)])):
-        with_prior = descend(problem, optimum.u, with_prior=True, near=optimum.about)
-    return _fit(case, free, problem, optimum, with_prior, undeclared=undeclared)
+    if np.any(at_prior_bound(optimum.x[: len(free)])):
+        with_prior = descend(weighted.problem, optimum.x, with_prior=True, near=optimum.model)
+    return _fit(case, free, readings, optimum, with_prior, undeclared=undeclared)
 
 
-def least_squares_problem(
-    case: Case, data: Observations, free: Sequence[FreeParameter]
-) -> LeastSquaresProblem:
-    """The problem with noise as declared, and errors that all rows share as parameters."""
-    reading, declared = stacked_readings(data)
-    case, unknown = with_modelled_errors(case, data, free)
-    shared = sensor_columns(data, reading[None, :])
-    return LeastSquaresProblem(
-        case=case,
-        data=data,
-        free=unknown,
-        errors=len(unknown) - len(free),
-        reading=reading,
-        std=np.where(np.isfinite(declared), declared, _initial_noise(data)),
-        columns=stacked_columns(discrepancy_columns(case, data)),
-        shared=np.zeros((reading.size, 0)) if shared is None else shared[0],
-    )
+@dataclass(frozen=True)
+class WeightedRows:
+    """Readings whose noise depends on what is expected of them, and the case that is fitted.
+
+    Attributes
+    ----------
+    case
+        With the errors that the model is solved with, where there are any.
+    readings
+        With the standard deviations (m,) that the fit gives them.
+    declared
+        The readings as they were declared.
+    unknown
+        The p free parameters, and behind them these errors.
+    shared
+        Columns (m, e) of errors that all rows share and that act on the readings alone.
+    """
+
+    case: Case
+    readings: Readings
+    declared: Readings
+    unknown: Sequence[Coordinate]
+    shared: Floats
+
+    @staticmethod
+    def of(case: Case, readings: Readings, free: Sequence[Coordinate]) -> WeightedRows:
+        """With noise as declared, and errors that all rows share as parameters."""
+        changed, unknown = with_modelled_errors(
+            case, readings.shared_errors, readings.row_load, free
+        )
+        std = np.where(np.isfinite(readings.std), readings.std, _initial_noise(readings))
+        shared = sensor_columns(readings, readings.reading[None, :])
+        return WeightedRows(
+            case=changed,
+            readings=replace(readings, std=std),
+            declared=readings,
+            unknown=unknown,
+            shared=np.zeros((len(readings), 0)) if shared is None else shared[0],
+        )
+
+    @cached_property
+    def problem(self) -> LeastSquaresProblem:
+        """The problem, weighted by noise, model discrepancy and shared errors."""
+        process = discrepancy_process(
+            self.readings, self.case.discrepancy, Discrepancy(), LEAST_EIGENVALUE
+        )
+        columns = np.hstack([process.columns, self.shared])
+        whiten = Whitening.of(self.readings.std, columns)
+        return LeastSquaresProblem(self.case, self.unknown, self.readings, whiten)
+
+    def of_few_rows(self) -> WeightedRows:
+        """A few of the rows, from the lightest to the heaviest of each channel."""
+        selected, few = self.readings.of_rows(_few_rows(self.readings))
+        return replace(self, readings=few, shared=self.shared[selected])
+
+    def with_noise_at(self, optimum: Solution) -> WeightedRows:
+        """The same with noise at the optimum's predictions, or from its residuals.
+
+        Errors of sensors that all rows share are in proportion to the same predictions.
+        """
+        prediction, readings = optimum.prediction, self.declared
+        total = np.hypot(
+            readings.noise_at(prediction),
+            noise_of_operation(self.case, readings, self.unknown, optimum.x),
+        )
+        free = sum(c.normal_std is None for c in self.unknown)
+        estimated = _residual_noise(readings, optimum.problem.residual(prediction), free)
+        shared = sensor_columns(readings, prediction[None, :])
+        return replace(
+            self,
+            readings=replace(readings, std=np.where(np.isfinite(total), total, estimated)),
+            shared=self.shared if shared is None else shared[0],
+        )
 
 
 def _fit(
     case: Case,
-    free: Sequence[FreeParameter],
-    problem: LeastSquaresProblem,
-    optimum: Optimum,
-    with_prior: Optimum,
+    free: Sequence[Coordinate],
+    readings: Readings,
+    optimum: Solution,
+    with_prior: Solution,
     *,
     undeclared: bool,
 ) -> Fit:
     """The result at an optimum; `with_prior` is the one that a Gaussian prior is included in."""
-    data = problem.data
-    p, k = len(free), data.reading_count
-    freedom, squares = k - p, optimum.cost + data.squares_within
-    if problem.errors:
-        squares += float(np.sum(errors_at(problem.free, optimum.u[None, :]) ** 2))
+    unknown, x = optimum.coordinates, optimum.x
+    p, k = len(free), readings.reading_count
+    freedom, squares = k - p, optimum.cost + readings.squares_within
+    if len(unknown) > p:
+        squares += float(np.sum(errors_at(unknown, x[None, :]) ** 2))
     misfit = squares / freedom if freedom > 0 else float("nan")
     per_reading = misfit if freedom > 0 else squares / k
     # mean plus two standard deviations of chi-squared over its degrees of freedom
     limit = 1.0 + 2.0 * np.sqrt(2.0 / freedom) if freedom > 0 else SIGNIFICANT_COST / k
     excess = bool(not undeclared and per_reading > limit)
-    precision = np.diag(problem.prior_precision)
-    for_tests = problem.of_soil_tests(optimum.u)[1]
+    of_prior = np.asarray([c.fraction_precision for c in unknown])
+    precision = np.diag(of_prior)
+    for_tests = optimum.soil_tests.rates(x)
     precision += for_tests.T @ for_tests
     noise_variance = per_reading if excess else 1.0
     covariance, linear_std = _covariance(
@@ -140,10 +206,10 @@ def _fit(
         with_prior,
         noise_variance,
         precision,
-        np.where(np.isinf(problem.normal_std), problem.prior_precision, 0.0),
+        np.where(np.isinf(normal_stds(optimum.problem)), of_prior, 0.0),
     )
     covariance = covariance[:p, :p]
-    values, rate = values_at(free, optimum.u[:p])
+    values, rate = values_at(free, x[:p]), rates_at(free, x[:p])
     fit = Fit(
         method="nonlinear",
         names=tuple(f.path for f in free),
@@ -151,54 +217,85 @@ def _fit(
         values=values,
         covariance=covariance * np.outer(rate, rate),
         warnings=(),
-        rows_used=data.row_count,
+        rows_used=readings.row_count,
         remaining_fraction={
             f.path: float(np.sqrt(f.prior.fraction_precision) * linear_std[i])
             for i, f in enumerate(free)
         },
         misfit=per_reading if excess else misfit,
-        channels=tuple(column(c.name) for c in data.channels),
+        channels=tuple(column(name) for name in readings.channels),
     )
     return with_warnings(
         fit,
         case,
-        data,
+        readings,
         free,
-        optimum.u[:p],
+        x[:p],
         excess_residuals=excess,
         undeclared=undeclared,
     )
 
 
 def _covariance(
-    optimum: Optimum,
-    with_prior: Optimum,
+    optimum: Solution,
+    with_prior: Solution,
     noise_variance: float,
     precision: Floats,
     uniform_precision: Floats,
 ) -> tuple[Floats, Floats]:
-    """Covariance (p, p) of the error of `optimum.u`, and the std (p,) of the linearised problem."""
+    """Covariance (p, p) of the error of `optimum.x`, and the std (p,) of the linearised problem."""
     linearised = _posterior_covariance(optimum, noise_variance, precision)
     std = np.sqrt(np.diag(linearised))
-    to_posterior_mean = linearised @ (uniform_precision * (0.5 - optimum.u))
+    to_posterior_mean = linearised @ (uniform_precision * (0.5 - optimum.x))
     along_valley = np.sqrt(np.diag(_posterior_covariance(with_prior, noise_variance, precision)))
     total = np.maximum(
-        np.hypot(std, to_posterior_mean), np.hypot(along_valley, with_prior.u - optimum.u)
+        np.hypot(std, to_posterior_mean), np.hypot(along_valley, with_prior.x - optimum.x)
     )
     return linearised * np.outer(total / std, total / std), std
 
 
-def _posterior_covariance(at: Optimum, noise_variance: float, precision: Floats) -> Floats:
+def _posterior_covariance(at: Solution, noise_variance: float, precision: Floats) -> Floats:
     """Inverse of the Gauss-Newton Hessian, with the precision (p, p) of priors and soil tests."""
     information = at.jacobian.T @ at.jacobian / noise_variance
     return np.asarray(np.linalg.inv(information + precision))
 
 
-def _initial_noise(data: Observations) -> Floats:
-    """A fraction of each channel's RMS reading, (k,)."""
-    parts = []
-    for channel in data.channels:
-        reading = channel.reading[np.isfinite(channel.reading)]
-        rms = float(np.sqrt(np.mean(reading**2)))
-        parts.append(np.full(reading.size, INITIAL_NOISE * rms + 1e-12))
-    return np.concatenate(parts)
+def _few_rows(readings: Readings) -> NDArray[np.int64]:
+    """Rows that stand for all: from the lightest to the heaviest with a reading of each channel."""
+    rows = []
+    for i in range(len(readings.channels)):
+        measured = readings.row[readings.channel == i]
+        slip, load = readings.row_slip[measured], readings.row_load[measured]
+        in_order = measured[np.lexsort((slip, load))]
+        few = np.linspace(0, len(in_order) - 1, min(FEW, len(in_order)))
+        rows.append(in_order[few.round().astype(int)])
+    return np.unique(np.concatenate(rows))
+
+
+def _initial_noise(readings: Readings) -> Floats:
+    """A fraction of each channel's RMS reading, (m,)."""
+    return _by_channel(readings, lambda own: INITIAL_NOISE * _rms(readings.reading[own]) + 1e-12)
+
+
+def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
+    """Noise of each channel (m,) from its residuals, p parameters shared among all readings."""
+
+    def noise(own: NDArray[np.bool_]) -> float:
+        size = int(own.sum())
+        freedom = max(size - p * size / len(readings), 1.0)
+        scatter = float(np.sqrt(residual[own] @ residual[own] / freedom))
+        return max(scatter, 1e-6 * _rms(readings.reading[own]) + 1e-15)
+
+    return _by_channel(readings, noise)
+
+
+def _by_channel(readings: Readings, noise: Callable[[NDArray[np.bool_]], float]) -> Floats:
+    std = np.empty(len(readings))
+    for i in range(len(readings.channels)):
+        own = readings.channel == i
+        std[own] = noise(own)
+    return std
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.fitting.descent import Optimum
-from soilml.fitting.free_parameters import FreeParameter
-from soilml.fitting.observations import Observations
-from soilml.identification.diagnostics import with_warnings
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.readings import Readings
+from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.joint_sample import joint_sample, most_probable
-from soilml.identification.nonlinear import least_squares_problem
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
@@ -63,7 +61,7 @@ class PosteriorSamples:
         return self.noise_scale > 1.0
 
 
-def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> Fit:
+def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     r"""Mean, covariance and 90 % interval of the exact posterior.
 
     .. math::
@@ -91,7 +89,7 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     ----------
     case
         Model, soil, priors and noise.
-    data
+    readings
         Rows; the noise of every channel must be declared.
     free
         The p free parameters.
@@ -112,7 +110,7 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
     Tarantola, Inverse Problem Theory, 2005, section 1.5. Cornuet et al., Scandinavian J. Statistics
     39(4), 2012, for the sampling.
     """
-    found = posterior_samples(case, data, free)
+    found = posterior_samples(case, readings, free)
     sample = found.sample
     values = np.stack([f.prior.at(sample.u[:, i]) for i, f in enumerate(free)], axis=1)
     mean = sample.mean(values)
@@ -127,40 +125,40 @@ def posterior(case: Case, data: Observations, free: Sequence[FreeParameter]) -> 
         values=mean,
         covariance=covariance,
         warnings=_sampling_warnings(sample),
-        rows_used=data.row_count,
+        rows_used=readings.row_count,
         remaining_fraction={
             f.path: float(np.sqrt(covariance[i, i]) / f.prior.std) for i, f in enumerate(free)
         },
         misfit=found.misfit,
-        channels=tuple(column(c.name) for c in data.channels),
+        channels=tuple(column(name) for name in readings.channels),
         low=low,
         high=high,
         samples=found,
     )
     return with_warnings(
-        fit, case, data, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False
+        fit, case, readings, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False
     )
 
 
 def posterior_samples(
-    case: Case, data: Observations, free: Sequence[FreeParameter]
+    case: Case, readings: Readings, free: Sequence[Coordinate]
 ) -> PosteriorSamples:
     """Weighted samples of the posterior, with noise inflated where the residuals require it.
 
     Raises `FitError` as `posterior` does.
     """
-    density, start = PosteriorDensity(case, data, free), None
-    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    density, start = PosteriorDensity(case, readings, free), None
+    optimum = most_probable(case, readings, free) if density.errors else None
     # no sample of so many parameters fits much better than the optimum
-    misfit = 0.0 if optimum is None else _misfit(density, optimum.u, len(free))
-    limit = misfit_limit(data.reading_count - len(free))
+    misfit = 0.0 if optimum is None else _misfit(density, optimum.x, len(free))
+    limit = misfit_limit(readings.reading_count - len(free))
     if misfit <= limit:
         sample, misfit = _with_misfit(density, optimum, len(free))
         if misfit <= limit:
             return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
         start = sample if misfit < SIMILAR_NOISE**2 else None
     noise_scale = float(np.sqrt(misfit))
-    sample = _sampled(PosteriorDensity(case, data, free, noise_scale), start, optimum)
+    sample = _sampled(PosteriorDensity(case, readings, free, noise_scale), start, optimum)
     return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
 
 
@@ -170,25 +168,25 @@ def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
 
 
 def sample_posterior(
-    case: Case, data: Observations, free: Sequence[FreeParameter]
+    case: Case, readings: Readings, free: Sequence[Coordinate]
 ) -> tuple[ImportanceSample, float]:
     """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
 
     The noise is as declared, whatever the misfit, which is that at the sample of largest weight, or
     with shared errors at the optimum if it is less there. Raises `FitError` as `posterior` does.
     """
-    density = PosteriorDensity(case, data, free)
-    optimum = most_probable(least_squares_problem(case, data, free)) if density.errors else None
+    density = PosteriorDensity(case, readings, free)
+    optimum = most_probable(case, readings, free) if density.errors else None
     return _with_misfit(density, optimum, len(free))
 
 
 def _with_misfit(
-    density: PosteriorDensity, optimum: Optimum | None, parameters: int
+    density: PosteriorDensity, optimum: Solution | None, parameters: int
 ) -> tuple[ImportanceSample, float]:
     sample = _sampled(density, None, optimum)
     misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
     if optimum is not None:  # samples have nearly one more squared residual for each error
-        misfit = min(misfit, _misfit(density, optimum.u, parameters))
+        misfit = min(misfit, _misfit(density, optimum.x, parameters))
     return sample, misfit
 
 
@@ -197,12 +195,12 @@ def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:
 
     With a discrepancy, or errors that all rows share, weighted by the inverse covariance.
     """
-    cost = density.squared_residuals(u[None, :]) + density.data.squares_within
-    return cost / max(density.data.reading_count - parameters, 1)
+    cost = density.squared_residuals(u[None, :]) + density.readings.squares_within
+    return cost / max(density.readings.reading_count - parameters, 1)
 
 
 def _sampled(
-    density: PosteriorDensity, start: ImportanceSample | None, optimum: Optimum | None
+    density: PosteriorDensity, start: ImportanceSample | None, optimum: Solution | None
 ) -> ImportanceSample:
     """Weighted fractions of the priors, with those of shared errors behind.
 
@@ -235,11 +233,11 @@ def _from_surface(
 
     Of many rows, a part shows the region in which all are evaluated.
     """
-    data, p = density.data, len(density.free)
-    if data.reading_count < FEWEST_READINGS:
+    readings, p = density.readings, len(density.free)
+    if readings.reading_count < FEWEST_READINGS:
         return None
-    if start is None and len(data.slip) > MANY_ROWS:
-        part = np.random.default_rng(0).permutation(len(data.slip))[:FIRST_ROWS]
+    if start is None and len(readings.row_slip) > MANY_ROWS:
+        part = np.random.default_rng(0).permutation(len(readings.row_slip))[:FIRST_ROWS]
         start = _from_surface(density.of_rows(np.sort(part)))
     sample = surface_sample(density, p, start)
     if sample is None and start is not None:  # it may have shown the wrong region

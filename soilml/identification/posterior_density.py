@@ -9,22 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError
-from soilml.fitting.channel_predictions import (
-    noise_at_prediction,
-    predict_channels,
-    propagated_input_noise,
-    stack_channels,
-    stacked_readings,
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import (
+    discrepancy_process,
+    noise_of_operation,
+    sensor_columns,
+    squared_residuals_and_log_determinant,
 )
-from soilml.fitting.declared_discrepancy import discrepancy_columns, stacked_columns
-from soilml.fitting.free_parameters import FreeParameter, soil_test_deviations
-from soilml.fitting.noise_and_process import squared_residuals_and_log_determinant
-from soilml.fitting.observations import Observations
-from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
-from soilml.fitting.shared_errors_sensor_columns import sensor_columns
+from soilml.fitting.predictions import predict
+from soilml.fitting.readings import Readings
+from soilml.fitting.shared_errors import errors_at, with_modelled_errors
+from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.numerics.importance_sampling import ImportanceSample
-from soilml.quantities import column
+from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 
 Floats = NDArray[np.float64]
 
@@ -44,32 +43,33 @@ class PosteriorDensity:
     def __init__(
         self,
         case: Case,
-        data: Observations,
-        free: Sequence[FreeParameter],
+        readings: Readings,
+        free: Sequence[Coordinate],
         noise_scale: float = 1.0,
     ) -> None:
-        undeclared = [column(c.name) for c in data.channels if not c.declared]
-        if undeclared:
+        if undeclared := readings.undeclared:
             lines = ", ".join(f"{name} = '3 %'" for name in undeclared)
             raise FitError(
                 f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
                 f"[noise] of the model file, such as {lines}"
             )
-        self.case, self.free = with_modelled_errors(case, data, free)
-        self.data, self.noise_scale = data, noise_scale
+        self.case, self.free = with_modelled_errors(
+            case, readings.shared_errors, readings.row_load, free
+        )
+        self.readings, self.noise_scale = readings, noise_scale
         #: how many of the parameters are errors
         self.errors = len(self.free) - len(free)
         #: how many predictions stand behind those of the readings: errors, and tests of the soil
         self.others = self.errors + len(case.soil_tests)
-        self.reading = np.append(stacked_readings(data)[0], np.zeros(self.others))
-        self.columns = discrepancy_columns(case, data)
-        self.noisy_input = bool(np.any(data.slip_std > 0.0) or np.any(data.load_std > 0.0))
-        #: noise that slip and load cause, (k,); linearised at the best of the first samples
+        self.reading = np.append(readings.reading, np.zeros(self.others))
+        self.columns = _by_channel(case, readings)
+        self.noisy_input = bool(np.any(readings.slip_std) or np.any(readings.load_std))
+        #: noise that slip and load cause, (m,); linearised at the best of the first samples
         self.input_std: Floats | None = None
 
     def __call__(self, u: Floats) -> Floats:
         """Log density (sets,) of parameter sets `u` (sets, p)."""
-        size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
+        size = max(MOST_EVALUATIONS // len(self.readings.row_slip), 1)
         blocks = [
             self.of_predictions(self.predict(u[i : i + size])) for i in range(0, len(u), size)
         ]
@@ -78,9 +78,9 @@ class PosteriorDensity:
     def of_rows(self, rows: NDArray[np.int64]) -> PosteriorDensity:
         """The density of some of the rows alone."""
         part = copy(self)
-        part.data = self.data.of_rows(rows)
-        part.reading = np.append(stacked_readings(part.data)[0], np.zeros(self.others))
-        part.columns = discrepancy_columns(self.case, part.data)
+        part.readings = self.readings.of_rows(rows)[1]
+        part.reading = np.append(part.readings.reading, np.zeros(self.others))
+        part.columns = _by_channel(self.case, part.readings)
         part.input_std = None
         return part
 
@@ -91,7 +91,7 @@ class PosteriorDensity:
 
     def predict(self, u: Floats) -> Floats:
         """Readings (sets, k) that parameter sets `u` (sets, p) predict, and the others."""
-        size = max(MOST_EVALUATIONS // len(self.data.slip), 1)
+        size = max(MOST_EVALUATIONS // len(self.readings.row_slip), 1)
         y = np.concatenate([self._predict(u[i : i + size]) for i in range(0, len(u), size)])
         if self.noisy_input and self.input_std is None:
             squares = self._squares_and_log_determinant(y, self._std(y))[0]
@@ -119,9 +119,10 @@ class PosteriorDensity:
 
     def _squares_and_log_determinant(self, y: Floats, std: Floats) -> tuple[Floats, Floats]:
         """Squared whitened residuals, and half the log determinant of the covariance, (sets,)."""
-        groups, shared = self.columns, sensor_columns(self.data, y)
+        m = len(self.readings)
+        groups, shared = self.columns, sensor_columns(self.readings, y[:, :m])
         if shared is not None:  # they act on several channels
-            process = stacked_columns(self.columns)
+            process = _stacked(self.columns)
             process = np.broadcast_to(process, (len(shared), *process.shape))
             groups = (np.concatenate([process, shared], axis=-1),)
         if self.errors:
@@ -138,21 +139,37 @@ class PosteriorDensity:
 
     def _std(self, y: Floats) -> Floats:
         """Standard deviations (sets, k) of the readings where these are predicted."""
-        std = noise_at_prediction(self.case, self.data, y)
+        std = self.readings.noise_at(y[:, : len(self.readings)])
         if self.input_std is not None:
             std = np.asarray(np.hypot(std, self.input_std))
         return np.hstack([std, np.ones((len(y), self.others))]) if self.others else std
 
     def _predict(self, u: Floats) -> Floats:
-        channels = predict_channels(self.case, self.free, u, self.data.at)
-        y = stack_channels(self.data, channels)
+        y = predict(self.case, self.free, u, self.readings)
         y = np.hstack([y, errors_at(self.free, u)]) if self.errors else y
         if not self.case.soil_tests:
             return y
-        return np.hstack([y, soil_test_deviations(self.case, self.free, u)])
+        return np.hstack([y, SoilTestTerms(self.case, self.free).deviation(u)])
 
     def _linearise(self, u: Floats) -> None:
         """Take changes of the readings with slip and load at fractions (p,)."""
-        case, free, data = self.case, self.free, self.data
-        noise = propagated_input_noise(case, free, u, data.at, data.slip_std, data.load_std)
-        self.input_std = np.asarray(stack_channels(data, noise)[0])
+        self.input_std = noise_of_operation(self.case, self.readings, self.free, u)
+
+
+def _by_channel(case: Case, readings: Readings) -> tuple[Floats, ...]:
+    """For each channel, columns (m_c, q_c) of its discrepancy at its m_c readings."""
+    process = discrepancy_process(readings, case.discrepancy, Discrepancy(), LEAST_EIGENVALUE)
+    return tuple(
+        process.columns[np.ix_(readings.channel == i, process.channel == i)]
+        for i in range(len(readings.channels))
+    )
+
+
+def _stacked(parts: Sequence[Floats]) -> Floats:
+    """Columns (m, q) for all readings, one channel after another; zero outside their channel."""
+    stacked = np.zeros((sum(len(p) for p in parts), sum(p.shape[1] for p in parts)))
+    row = first = 0
+    for part in parts:
+        stacked[row : row + len(part), first : first + part.shape[1]] = part
+        row, first = row + len(part), first + part.shape[1]
+    return stacked

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.identification.fit_result import Fit
+from soilml.identification.fit import Fit
 from soilml.identification.typical_errors import TypicalErrorFit
 from soilml.io.text_tables import format_table
 from soilml.remarks import Remark, about, texts

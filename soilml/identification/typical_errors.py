@@ -9,7 +9,7 @@ from typing import Any
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify
-from soilml.identification.fit_result import Fit
+from soilml.identification.fit import Fit
 from soilml.io.table import Table
 from soilml.remarks import Remark
 

@@ -20,7 +20,7 @@ from soilml.config.compatibility import (
     soil_value_differences,
 )
 from soilml.errors import InputError, TableError
-from soilml.fitting.soil_test_remarks import ignored_soil_tests
+from soilml.fitting.soil_tests import ignored_soil_tests
 from soilml.identification.trained_estimator import (
     condition_on_case,
     narrower_priors,

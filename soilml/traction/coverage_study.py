@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
@@ -75,8 +75,8 @@ def coverage(
         if estimator is not None:
             draws = onboard_draws(estimator, case, table)[1]
         else:
-            data = read_observations(case, table)
-            draws = posterior_draws(case, data, select_free(case, None), count, seed).draws
+            readings = usable_readings(case, table)
+            draws = posterior_draws(case, readings, select_free(case, None), count, seed).draws
         for load, pairs in found.items():
             made = (
                 predict_traction(case, draws, load, SLIPS),

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
-from soilml.fitting.free_parameters import FreeParameter, select_free
-from soilml.fitting.observations import read_observations
-from soilml.fitting.shared_errors_sizes import usual_errors
-from soilml.identification.diagnostics import excess_residuals_remark
+from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.shared_errors import usual_errors
+from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.fit import excess_residuals_remark
 from soilml.io.table import Table
 from soilml.onboard.estimator import Estimator
 from soilml.remarks import Remark
@@ -26,7 +26,7 @@ class MeasuredSoil:
     """
 
     draws: SoilDraws
-    unknown: Sequence[FreeParameter]
+    unknown: Sequence[Coordinate]
     warnings: tuple[Remark, ...]
     noise_scale: float | None
 
@@ -47,13 +47,13 @@ def measured_soil(
         unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
         return MeasuredSoil(draws, unknown, tuple(notes), None)
     unknown = select_free(case, free)
-    data = read_observations(case, table)
+    readings = usable_readings(case, table)
     if as_usual:
-        errors = usual_errors(case, data.load, [f.path for f in unknown])
-        data = replace(data, shared_errors=errors)
-    posterior = posterior_draws(case, data, unknown)
-    warnings = list(data.notes)
-    if [c.name for c in data.channels] == ["torque"]:
+        errors = usual_errors(case, readings.row_load, [f.path for f in unknown])
+        readings = replace(readings, shared_errors=errors)
+    posterior = posterior_draws(case, readings, unknown)
+    warnings = list(readings.notes)
+    if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
     if posterior.samples.noise_inflated:

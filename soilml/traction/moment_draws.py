@@ -8,17 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.fitting.free_parameters import FreeParameter
-from soilml.numerics.importance_sampling import importance_sample
+from soilml.fitting.coordinates import Coordinate
 from soilml.numerics.maximum_entropy import moment_matched_weights
 from soilml.numerics.resampling import systematic_resampling
+from soilml.numerics.importance_sampling import importance_sample
 from soilml.traction.soil_draws import DRAWS, SoilDraws
 
 Floats = NDArray[np.float64]
 
 
 def estimated_draws(
-    free: Sequence[FreeParameter],
+    free: Sequence[Coordinate],
     mean: Floats,
     covariance: Floats,
     count: int = DRAWS,

@@ -12,9 +12,9 @@ from soilml.config.compatibility import (
     value_differences,
 )
 from soilml.errors import FitError, InputError
-from soilml.fitting.declared_discrepancy import ignored_discrepancy
-from soilml.fitting.free_parameters import FreeParameter
-from soilml.fitting.soil_test_remarks import ignored_soil_tests
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import ignored_discrepancy
+from soilml.fitting.soil_tests import ignored_soil_tests
 from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -27,7 +27,7 @@ from soilml.traction.soil_draws import SoilDraws
 
 def onboard_draws(
     estimator: Estimator, case: Case, table: Table
-) -> tuple[list[FreeParameter], SoilDraws, list[Remark]]:
+) -> tuple[list[Coordinate], SoilDraws, list[Remark]]:
     """Parameters that the file estimates with their priors, draws of its estimate, and warnings.
 
     Raises `InputError` where the file is for another gear or estimates a parameter that the case
@@ -39,9 +39,7 @@ def onboard_draws(
         if name not in known:
             raise InputError(f"{estimator.path} estimates {name}; the model has {', '.join(known)}")
     free = [
-        FreeParameter(
-            name, unit, Prior(float(low), float(high)), float(known[name][1]), assumed=False
-        )
+        Coordinate(name, unit, Prior(float(low), float(high)), float(known[name][1]), assumed=False)
         for name, unit, low, high in zip(
             estimator.names, estimator.units, prior.lower, prior.upper, strict=True
         )

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import range_with_zero
-from soilml.fitting.observations import declared_std
 from soilml.fitting.operating_points import operating_points
+from soilml.fitting.readings import declared_std
 from soilml.io.table import Table
 from soilml.numerics.smooth_process import process_columns, slip_load_points
 from soilml.quantities import column

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.free_parameters import FreeParameter
-from soilml.fitting.observations import Observations
-from soilml.identification.condensed_rows import condensed
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.readings import Readings
+from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples
 from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.resampling import systematic_resampling
@@ -45,22 +45,22 @@ class PosteriorDraws:
 
 
 def posterior_draws(
-    case: Case, data: Observations, free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0
+    case: Case, readings: Readings, free: Sequence[Coordinate], count: int = DRAWS, seed: int = 0
 ) -> PosteriorDraws:
     """Draws of the posterior of the rows; raises `FitError` as the posterior method does."""
-    found = posterior_samples(case, condensed(case, data, free), free)
+    found = posterior_samples(case, condensed(case, readings, free), free)
     offset = np.random.default_rng(seed).random()
     rows = systematic_resampling(found.sample.weights, count, offset)
     return PosteriorDraws(_soil_draws(free, found.sample.u[rows]), found)
 
 
 def prior_draws(
-    free: Sequence[FreeParameter], count: int = DRAWS, seed: int = 0, case: Case | None = None
+    free: Sequence[Coordinate], count: int = DRAWS, seed: int = 0, case: Case | None = None
 ) -> SoilDraws:
     """Draws of the priors by Latin hypercube; tests of the case's soil take part."""
     return _soil_draws(free, prior_fractions(free, count, np.random.default_rng(seed), case))
 
 
-def _soil_draws(free: Sequence[FreeParameter], u: Floats) -> SoilDraws:
+def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:
     values = np.stack([f.prior.at(u[:, i]) for i, f in enumerate(free)], axis=1)
     return SoilDraws(tuple(f.path for f in free), values)

@@ -14,9 +14,10 @@ from datagen.processes import process_map
 from datagen.recipe import Recipe
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.fitting.channel_predictions import predict_channels, stacked_readings
-from soilml.fitting.free_parameters import FreeParameter, select_free
-from soilml.fitting.observations import Observations, read_observations
+from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.predictions import predict_channels
+from soilml.fitting.readings import Readings
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior import misfit_limit
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
@@ -58,7 +59,7 @@ class ChebyshevSurrogate:
 
 
 def fit_chebyshev_surrogate(
-    case: Case, data: Observations, free: Sequence[FreeParameter]
+    case: Case, readings: Readings, free: Sequence[Coordinate]
 ) -> ChebyshevSurrogate:
     """Interpolate the model's torques at the Chebyshev nodes of the prior box.
 
@@ -73,14 +74,14 @@ def fit_chebyshev_surrogate(
     node = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
     fraction = 0.5 * (1.0 + node)
     grid = np.stack(np.meshgrid(*[fraction] * p, indexing="ij"), axis=-1).reshape(-1, p)
-    values = predict_channels(case, free, grid, data.at)["torque"]
+    values = predict_channels(case, free, grid, readings.at)["torque"]
     inverse = np.linalg.inv(chebvander(node, NODES - 1))
     cube = values.reshape(*[NODES] * p, -1)
     for axis in range(p):
         cube = np.moveaxis(np.tensordot(inverse, cube, axes=(1, axis)), 0, axis)
     surrogate = ChebyshevSurrogate(cube.reshape(NODES**p, -1))
     u = np.random.default_rng(0).random((CHECK_POINTS, p))
-    true = predict_channels(case, free, u, data.at)["torque"]
+    true = predict_channels(case, free, u, readings.at)["torque"]
     error = float(np.max(np.abs(surrogate.torque(u) / true - 1.0)))
     if not error < TOLERANCE:
         raise FitError(
@@ -123,12 +124,12 @@ def exact_posterior(
     The model's torque is replaced by `ChebyshevSurrogate`, whose error is below a hundredth of the
     noise.
     """
-    data, free = (
-        read_observations(case, select_channels(table, ["torque"])),
+    readings, free = (
+        usable_readings(case, select_channels(table, ["torque"])),
         select_free(case, names),
     )
-    surrogate = fit_chebyshev_surrogate(case, data, free)
-    reading, noise = stacked_readings(data)[0], case.noise[TORQUE]
+    surrogate = fit_chebyshev_surrogate(case, readings, free)
+    reading, noise = (readings.reading, readings.std)[0], case.noise[TORQUE]
 
     def misfit_terms(u: Floats, noise_factor: float) -> tuple[Floats, Floats]:
         """Chi-square (n,), and the sum (n,) over rows of the logarithm of the noise."""

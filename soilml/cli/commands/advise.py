@@ -20,7 +20,7 @@ from soilml.errors import InputError
 if TYPE_CHECKING:
     from soilml.config.case import Case
     from soilml.experiment_design import Advice, RatedRow
-    from soilml.fitting.observations import Observations
+    from soilml.fitting.readings import Readings
 
 HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
@@ -76,7 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _with_noise_of_rows(case: Case, data: Observations) -> Case:
+def _with_noise_of_rows(case: Case, readings: Readings) -> Case:
     """The case with the noise of the rows' columns where it declares none: their median."""
     from dataclasses import replace
 
@@ -86,10 +86,10 @@ def _with_noise_of_rows(case: Case, data: Observations) -> Case:
     from soilml.quantities import column
 
     noise = dict(case.noise)
-    for channel in data.channels:
-        key = column(channel.name)
-        if key not in noise and channel.declared:
-            std = float(np.nanmedian(channel.std[np.isfinite(channel.reading)]))
+    for i, name in enumerate(readings.channels):
+        key, own = column(name), readings.channel == i
+        if key not in noise and key not in readings.undeclared:
+            std = float(np.median(readings.std[own]))
             noise[key] = Noise(constant=std)
             print(f"the noise of further {key} is taken from {key}_std: {std:.3g}", file=sys.stderr)
     return replace(case, noise=noise)
@@ -105,8 +105,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design import advise, candidate_grid, samples_of_prior, samples_of_rows
     from soilml.experiment_design.advice_after_results import mean_covariates
     from soilml.experiment_design.messages import next_row_remarks
-    from soilml.fitting.free_parameters import select_free
-    from soilml.fitting.observations import read_observations
+    from soilml.fitting.coordinates import select_free
+    from soilml.fitting.usable_readings import usable_readings
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
     from soilml.remarks import Remark, texts
@@ -126,9 +126,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         table = read_rows(args, RUNS)
         print_table_hints(table, case)
-        data = read_observations(case, table)
-        case = _with_noise_of_rows(case, data)
-        ranges, at = candidate_grid(slips, loads, data.load), data.at
+        readings = usable_readings(case, table)
+        case = _with_noise_of_rows(case, readings)
+        ranges, at = candidate_grid(slips, loads, readings.row_load), readings.at
     if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
         raise InputError(
             f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> int:
         if at is None:
             samples = samples_of_prior(free, case=case)
         else:
-            samples = samples_of_rows(case, data, free)
+            samples = samples_of_rows(case, readings, free)
         known = {} if at is None else mean_covariates(at)
         advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:
@@ -150,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
         write_columns(_columns(advice, [("candidate", c) for c in ranked]), args.out)
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
-    remarks = [] if at is None else [*next_row_remarks(advice), *data.notes]
+    remarks = [] if at is None else [*next_row_remarks(advice), *readings.notes]
     if case.discrepancy:
         text = "the [discrepancy] of a next row counts as independent of that of other rows: "
         remarks.append(Remark("independent-discrepancy", f"{text}repetitions are overrated"))

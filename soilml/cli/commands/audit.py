@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.fitting.declared_discrepancy import ignored_discrepancy
+    from soilml.fitting.covariance import ignored_discrepancy
     from soilml.gap import audit
     from soilml.gap.presentation import audit_text
     from soilml.report.result_files import json_text

@@ -72,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import MAX_ROWS, available_effects, parse_numbers
     from soilml.cli.output import write_columns
     from soilml.config.case import read_case_of_one_gear
-    from soilml.fitting.declared_discrepancy import ignored_discrepancy
+    from soilml.fitting.covariance import ignored_discrepancy
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import COVARIATES
     from soilml.row_status import Status

@@ -10,13 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import (
-    PredictionRequest,
-    linearise_many,
-    predict_many,
-)
+from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
 from soilml.fitting.readings import Readings
 from soilml.gap.candidate_effects import effect_names
 from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
@@ -104,7 +100,8 @@ def _with_gear(fit: Solution, option: RunOption) -> Solution:
     known = case.parameters()
     kept = [i for i, c in enumerate(fit.coordinates) if c.path in known]
     coordinates = tuple(fit.coordinates[i] for i in kept)
-    return replace(fit, case=case, coordinates=coordinates, x=fit.x[kept])
+    problem = replace(fit.problem, case=case, coordinates=coordinates)
+    return replace(fit, problem=problem, x=fit.x[kept])
 
 
 def _all_columns(fit: Solution, difference: Difference, changed: Solution) -> Difference:
@@ -190,12 +187,13 @@ def _soil_difference(
     """Whitened difference of two explanations in the soil parameters that a test determines."""
     own, others = first.values(), rival.values()
     difference, jacobian = np.zeros(len(after)), np.zeros((len(after), len(rival.x)))
+    rates = rates_at(rival.coordinates, rival.x)
     for i, (name, (std, is_relative)) in enumerate(after.items()):
         std = std * abs(own[name]) if is_relative else std
         difference[i] = (own[name] - others[name]) / std
         for j, c in enumerate(rival.coordinates):
             if c.path == name:
-                jacobian[i, j] = c.rate(float(rival.x[j])) / std
+                jacobian[i, j] = rates[j] / std
     return difference, jacobian
 
 
@@ -242,7 +240,7 @@ def _check_discrimination(first: Solution, rival: Solution, std_after: dict[str,
     largest = 0.0
     for fit in (first, rival):
         for c, value in zip(fit.coordinates, fit.values().values(), strict=True):
-            if isinstance(c, EffectCoordinate) and not c.is_shape and c.effect in std_after:
+            if c.effect and not c.is_shape and c.effect in std_after:
                 largest = max(largest, abs(value) / std_after[c.effect])
     return largest
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.fitting.coordinates import SoilCoordinate, linearise, soil_coordinate
-from soilml.fitting.free_parameters import select_free
+from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
-from soilml.fitting.soil_test_terms import SoilTestTerms
+from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.gap.candidate_effects import candidate_effects
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_kinds import check_costs
@@ -160,9 +160,9 @@ def audit(
     readings = planned_readings(case, design.rows(design.answered))
     selected = select_free(case, free if free is not None or case.prior else SHEAR)
     soil = [f for f in selected if "." not in f.path]
-    coordinates = [soil_coordinate(f) for f in soil]
+    coordinates = list(soil)
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in soil])
-    jacobian = linearise(case, coordinates, nominal, readings)[1] / readings.std[:, None]
+    jacobian = linearise(case, coordinates, nominal, readings).jacobian / readings.std[:, None]
     of_tests = SoilTestTerms(case, coordinates).rates(nominal)
     jacobian = np.vstack([jacobian, of_tests])
     signatures, untestable = effect_signatures(case, readings, effects)
@@ -194,7 +194,7 @@ def _with_added_run(
     case: Case,
     readings: Readings,
     option: RunOption,
-    coordinates: Sequence[SoilCoordinate],
+    coordinates: Sequence[Coordinate],
     x: Floats,
     effects: Mapping[str, type[Effect]],
 ) -> list[EffectIdentifiability]:
@@ -210,7 +210,8 @@ def _with_added_run(
         signatures, _ = effect_signatures(changed, part, known)
         by_part.append({s.name: s for s in signatures})
         stds.append(part.std)
-        jacobians.append(linearise(changed, coordinates, x, part)[1] / part.std[:, None])
+        found = linearise(changed, coordinates, x, part)
+        jacobians.append(found.jacobian / part.std[:, None])
     if option.plain is not None:
         plain = joined_readings(readings, expected_readings(option.plain, readings, case))
         usual = {s.name: s.column for s in effect_signatures(case, plain, effects)[0]}

@@ -11,10 +11,9 @@ from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.errors import InputError
-from soilml.fitting.channel_predictions import forces
-from soilml.fitting.operating_points import operating_points
+from soilml.fitting.operating_points import operating_points, with_rover_columns
+from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, positive_std
-from soilml.fitting.rover_rows import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
@@ -46,49 +45,38 @@ def planned_readings(case: Case, design: Table) -> Readings:
             stds.append(std)
     if not names:
         raise InputError("no channel has declared noise: give [noise] in the model file")
-    rows, channels = len(design), len(names)
     runs, number = np.unique(design["run"], return_inverse=True)
-    return Readings(
-        at=at,
-        run=number.astype(np.int64),
-        runs=tuple(str(r) for r in runs),
-        order=np.arange(rows),
-        channels=tuple(names),
-        row=np.tile(np.arange(rows), channels),
-        channel=np.repeat(np.arange(channels), rows),
+    return Readings.of_every_row(
+        at,
+        names,
         reading=np.concatenate(readings),
         std=np.concatenate(stds),
-        noise=tuple(case.noise.get(column(n)) for n in names),
+        noise=[case.noise.get(column(n)) for n in names],
+        run=number.astype(np.int64),
+        runs=[str(r) for r in runs],
     )
 
 
 def expected_readings(at: Operating, like: Readings, case: Case, run: str = "next") -> Readings:
     """The readings that a case expects of rows, in the channels and with the noise of `like`."""
-    rows, channels = np.asarray(at.slip).size, len(like.channels)
-    row = np.tile(np.arange(rows), channels)
-    channel = np.repeat(np.arange(channels), rows)
     at = with_default_covariates(at, case)
     force = forces(case, at)
-    expected = np.stack([getattr(force, name) for name in like.channels], axis=-1)
-    reading = expected[row, channel]
-    std = np.empty(row.size)
+    readings, stds = [], []
     for i, name in enumerate(like.channels):
-        in_channel = channel == i
+        expected = np.asarray(getattr(force, name))
         noise = like.noise[i] or case.noise.get(column(name))
         present = like.std[like.channel == i]
         typical = float(np.median(present)) if present.size else np.nan
-        std[in_channel] = typical if noise is None else noise.std(reading[in_channel])
-    return Readings(
-        at=at,
-        run=np.zeros(rows, dtype=np.int64),
-        runs=(run,),
-        order=np.arange(rows),
-        channels=like.channels,
-        row=row,
-        channel=channel,
-        reading=reading,
-        std=np.maximum(std, 1e-12),
+        std = np.full(expected.shape, typical) if noise is None else noise.std(expected)
+        readings.append(expected)
+        stds.append(np.maximum(std, 1e-12))
+    return Readings.of_every_row(
+        at,
+        like.channels,
+        reading=np.concatenate(readings),
+        std=np.concatenate(stds),
         noise=like.noise,
+        runs=(run,),
     )
 
 
@@ -115,6 +103,9 @@ def joined_readings(first: Readings, second: Readings) -> Readings:
         channel=np.concatenate([first.channel, second.channel]),
         reading=np.concatenate([first.reading, second.reading]),
         std=np.concatenate([first.std, second.std]),
+        from_case=np.concatenate([first.from_case, second.from_case]),
+        slip_std=np.concatenate([first.slip_std, second.slip_std]),
+        load_std=np.concatenate([first.load_std, second.load_std]),
         sensor_std=None,
     )
 

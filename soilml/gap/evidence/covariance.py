@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.coordinates import SoilCoordinate, linearise
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
 from soilml.numerics.subspaces import column_space
@@ -104,16 +105,16 @@ def run_effect_columns(case: Case, readings: Readings) -> Floats:
         for name, value in moduli.items()
         if value != 0.0
     ]
-    jacobian = linearise(case, coordinates, np.zeros(len(coordinates)), readings)[1]
+    jacobian = linearise(case, coordinates, np.zeros(len(coordinates)), readings).jacobian
     by_angle, by_bearing = jacobian[:, 0], jacobian[:, 1:].sum(axis=1)
     return np.asarray(np.nan_to_num(np.stack([by_angle, by_bearing], axis=1)))
 
 
-def _unit_coordinate(name: str, value: float, unit: float) -> SoilCoordinate:
+def _unit_coordinate(name: str, value: float, unit: float) -> Coordinate:
     """The coordinate of a soil parameter: its distance from a value, in a unit."""
     bounds = declared(Soil)[name]
     lower, upper = sorted(((bounds.lower - value) / unit, (bounds.upper - value) / unit))
-    return SoilCoordinate(name, bounds.unit, lower, upper, Prior(value, value + unit))
+    return Coordinate(name, bounds.unit, Prior(value, value + unit), lower=lower, upper=upper)
 
 
 def assemble_covariance(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.fitting.coordinates import EffectCoordinate, size_coordinate
+from soilml.fitting.coordinates import Coordinate, size_coordinate
 from soilml.fitting.levels import Levels, covariate_levels
 from soilml.fitting.predictions import (
     PredictionRequest,
@@ -63,7 +63,7 @@ def effect_signatures(
     sinkage = base.sinkage_at(np.zeros((1, 0)))
     requests = []
     reasons: dict[str, Remark] = {}
-    changes: dict[str, tuple[EffectCoordinate, float, float]] = {}
+    changes: dict[str, tuple[Coordinate, float, float]] = {}
     for name, effect in effects.items():
         if reason := _missing_covariate(case, effect, readings):
             reasons[name] = reason

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import predict_readings
-from soilml.fitting.least_squares import FitRequest, Solution, descend_together
+from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import (
     Covariance,
@@ -139,20 +140,21 @@ def _predict_folds(
     fit, and those of other folds, are NaN.
     """
     readings = problem.readings
-    requests, where = [], []
+    problems, starts, where = [], [], []
     for i, (marginal, folds) in enumerate(wanted):
         fit, amplitude = marginal.fit, marginal.evidence.amplitude
         for number in folds.predicted:
             rest = folds.fold != number
             known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
             kept, whiten = readings.subset(rest), known.whiten(amplitude)
-            requests.append(FitRequest(fit.case, fit.coordinates, kept, whiten, fit.x))
+            problems.append(LeastSquaresProblem(fit.case, fit.coordinates, kept, whiten))
+            starts.append(fit.x)
             where.append((i, ~rest))
     predicted = [np.full(len(readings), np.nan) for _ in wanted]
-    for (i, out), again in zip(where, descend_together(requests), strict=True):
+    for (i, out), again in zip(where, descend_together(problems, starts), strict=True):
         if isinstance(again, InputError):
             continue
-        y = predict_readings(again.case, again.coordinates, again.x[None, :], readings)[0]
+        y = predict(again.case, again.coordinates, again.x[None, :], readings)[0]
         predicted[i][out] = y[out]
     return predicted
 
@@ -165,8 +167,8 @@ def predict_held_out(
     description: str,
 ) -> GapReduction:
     """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
-    old = predict_readings(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
-    new = predict_readings(after.case, after.coordinates, after.x[None, :], readings)[0]
+    old = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
+    new = predict(after.case, after.coordinates, after.x[None, :], readings)[0]
     std = covariance_at(problem, after, readings).std
     return gap_reduction(readings, std, old, new, description)
 

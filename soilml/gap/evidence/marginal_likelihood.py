@@ -10,10 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.coordinates import Coordinate, EffectCoordinate, SoilCoordinate
-from soilml.fitting.discrepancy_process import DiscrepancyProcess
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import DiscrepancyProcess, Whitening
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.whitening import DiscrepancyWhitening
 from soilml.gap.evidence.covariance import Covariance
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, LinearisedFit, ProcessDivisions
 from soilml.numerics.prior import UNIFORM_PRECISION
@@ -86,7 +85,7 @@ class DiscrepancyModel:
     def _divisions(self) -> ProcessDivisions:
         return ProcessDivisions(np.asarray(self.columns.T @ self.columns), self.process.channel)
 
-    def whiten(self, amplitude: Floats) -> DiscrepancyWhitening:
+    def whiten(self, amplitude: Floats) -> Whitening:
         r"""What whitens noise, scatter and a discrepancy of these amplitudes.
 
         .. math:: W = [I - Q (I - (I + R T^2 R^T)^{-1/2}) Q^T] W_0
@@ -96,7 +95,7 @@ class DiscrepancyModel:
         value, vector = np.linalg.eigh(scaled @ scaled.T)
         present = value > 0.0
         shrinkage = 1.0 - 1.0 / np.sqrt(1.0 + value[present])
-        return DiscrepancyWhitening(self.noise_whitening, q @ vector[:, present], shrinkage)
+        return Whitening(self.noise_whitening, q @ vector[:, present], shrinkage)
 
     def matrix(self, amplitude: Floats) -> Floats:
         """Covariance (m, m) of the readings from noise, scatter and discrepancy."""
@@ -190,7 +189,7 @@ def _prior(coordinate: Coordinate, x: float) -> tuple[float, float, float]:
     logarithm is nearly uniform, because effects of a hundredth and of several times their
     reference size occur.
     """
-    if not isinstance(coordinate, EffectCoordinate):
+    if not coordinate.effect:
         return UNIFORM_PRECISION, 0.0, 0.0
     if np.isfinite(coordinate.std):
         precision = coordinate.std**-2
@@ -244,7 +243,7 @@ def outside_bounds(fit: Solution, gradient: Floats, curvature: Floats) -> float:
     movable = np.concatenate([~held, np.ones(len(gradient) - len(held), dtype=np.bool_)])
     value = 0.0
     for i, c in enumerate(fit.coordinates):
-        if not isinstance(c, SoilCoordinate):
+        if c.effect:
             continue
         free = movable.copy()
         free[i] = True

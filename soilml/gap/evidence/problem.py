@@ -11,17 +11,11 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.fitting.coordinates import (
-    Coordinate,
-    EffectCoordinate,
-    SoilCoordinate,
-    shape_coordinates,
-    size_coordinate,
-)
-from soilml.fitting.discrepancy_process import discrepancy_process
-from soilml.fitting.least_squares import FitRequest, Solution, descend_together
+from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coordinate
+from soilml.fitting.covariance import Whitening, discrepancy_process
+from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
-from soilml.fitting.whitening import Whitening
 from soilml.gap.candidate_effects import with_effect
 from soilml.gap.evidence.covariance import Covariance
 from soilml.gap.evidence.directions import current_size
@@ -51,7 +45,7 @@ class FitProblem:
     """
 
     case: Case
-    soil: tuple[SoilCoordinate, ...]
+    soil: tuple[Coordinate, ...]
     readings: Readings
     covariance: Covariance
     effects: Mapping[str, type[Effect]]
@@ -75,7 +69,7 @@ class FitProblem:
 
         An effect that all gears share and the same effect of one gear exclude each other.
         """
-        fitted = {c.effect for c in fit.coordinates if isinstance(c, EffectCoordinate)}
+        fitted = {c.effect for c in fit.coordinates if c.effect}
         excluded = {
             other for name in fitted for other in self.effects if exclude_each_other(name, other)
         }
@@ -88,7 +82,7 @@ class FitProblem:
             case = with_effect(case, self.effects[name])
         return case
 
-    def size_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
+    def size_coordinates(self, names: Sequence[str]) -> list[Coordinate]:
         """The coordinates of the effects' sizes; sensor and rig errors have a Gaussian prior."""
         coordinates = []
         for name in names:
@@ -98,7 +92,7 @@ class FitProblem:
             coordinates.append(size_coordinate(self.effects[name], std))
         return coordinates
 
-    def shape_coordinates(self, names: Sequence[str]) -> list[EffectCoordinate]:
+    def shape_coordinates(self, names: Sequence[str]) -> list[Coordinate]:
         """The coordinates of the effects' shapes that the range of slip and load can determine."""
         slips_vary = np.ptp(self.readings.slip) > MIN_SLIP_RANGE
         varies = {
@@ -112,9 +106,8 @@ class FitProblem:
     def fit_soil(self, starts: Sequence[Floats]) -> Solution:
         """The best of the fits of the soil alone, one from each start."""
         whiten = self.covariance.whiten
-        fits = descend_together(
-            [FitRequest(self.case, self.soil, self.readings, whiten, start) for start in starts]
-        )
+        problem = LeastSquaresProblem(self.case, self.soil, self.readings, whiten)
+        fits = descend_together([problem] * len(starts), starts)
         return min((_raised(fit) for fit in fits), key=lambda fit: fit.objective)
 
     def fit(
@@ -131,7 +124,7 @@ class FitProblem:
 
     def _default_start(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
-        if isinstance(coordinate, EffectCoordinate) and coordinate.is_shape:
+        if coordinate.is_shape:
             return 0.0
         if coordinate.path in self.case.parameters():
             return current_size(self.case, coordinate.path, coordinate.prior.upper)
@@ -159,16 +152,22 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
     `InputError` takes the place of the fit.
     """
 
-    def request(fit: StartedFit, first: Floats) -> FitRequest:
-        whiten = problem.covariance.whiten if fit.whiten is None else fit.whiten
-        return FitRequest(fit.case, fit.coordinates, problem.readings, whiten, first)
-
+    problems = [
+        LeastSquaresProblem(
+            fit.case,
+            fit.coordinates,
+            problem.readings,
+            problem.covariance.whiten if fit.whiten is None else fit.whiten,
+        )
+        for fit in fits
+    ]
     found = descend_together(
-        [request(fit, problem.first_coordinates(fit.coordinates, fit.start)) for fit in fits]
+        problems, [problem.first_coordinates(fit.coordinates, fit.start) for fit in fits]
     )
     refused = [i for i, result in enumerate(found) if isinstance(result, InputError)]
     again = descend_together(
-        [request(fits[i], _without_effects(fits[i].coordinates, fits[i].start)) for i in refused]
+        [problems[i] for i in refused],
+        [_without_effects(fits[i].coordinates, fits[i].start) for i in refused],
     )
     for i, result in zip(refused, again, strict=True):
         found[i] = result
@@ -177,9 +176,7 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
 
 def _without_effects(coordinates: Sequence[Coordinate], start: Mapping[str, float]) -> Floats:
     """The coordinates of the soil at their start, those of effects at zero."""
-    return np.asarray(
-        [start.get(c.path, 0.0) if isinstance(c, SoilCoordinate) else 0.0 for c in coordinates]
-    )
+    return np.asarray([start.get(c.path, 0.0) if not c.effect else 0.0 for c in coordinates])
 
 
 def _raised(fit: Solution | InputError) -> Solution:

@@ -82,7 +82,7 @@ def repeat_disagreement(
     """
     matrix = np.diag(readings.std**2) if covariance is None else covariance
     value = readings.reading if expected is None else readings.reading - expected
-    alike = readings.driven_alike
+    alike = readings.replicates
     found = []
     for channel in range(len(readings.channels)):
         contrasts = _contrasts(alike, readings.channel == channel)

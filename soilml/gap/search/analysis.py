@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.coordinates import soil_coordinate
-from soilml.fitting.free_parameters import FreeParameter
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.operating_noise import noise_of_operation
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
@@ -61,7 +60,7 @@ class Analysis:
 
 def analyse(
     case: Case,
-    free: Sequence[FreeParameter],
+    free: Sequence[Coordinate],
     readings: Readings,
     effects: Mapping[str, type[Effect]],
     calibration: Mapping[str, float],
@@ -73,7 +72,7 @@ def analyse(
 
     `place` gives the file and line of a row, for messages; `progress` is told the share done.
     """
-    coordinates = tuple(soil_coordinate(f) for f in free)
+    coordinates = tuple(free)
     problem = FitProblem(
         case, coordinates, readings, _declared_covariance(readings), effects, calibration
     )
@@ -163,7 +162,7 @@ def _reestimate_covariance(
     readings = readings.with_noise_of_operation(noise_of_operation(case, readings))
 
     covariance = assemble_covariance(readings, columns, typical)
-    alike = readings.driven_alike * len(readings.channels) + readings.channel
+    alike = readings.replicates * len(readings.channels) + readings.channel
     is_outlier = outliers(covariance, residual, space, alike, readings.run[readings.row])
     excluded = [
         (column(readings.channels[readings.channel[i]]), int(readings.row[i]))

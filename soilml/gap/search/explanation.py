@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.coordinates import EffectCoordinate, shape_coordinates
+from soilml.fitting.coordinates import shape_coordinates
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
@@ -63,11 +63,7 @@ class Explanation:
     def shape_deviation(self) -> float:
         """Squared distance of the shapes from the catalogue's law, in prior variances."""
         x, precision = self.fit.x, self.fit.precision
-        shapes = [
-            i
-            for i, c in enumerate(self.fit.coordinates)
-            if isinstance(c, EffectCoordinate) and c.is_shape
-        ]
+        shapes = [i for i, c in enumerate(self.fit.coordinates) if c.effect and c.is_shape]
         return float(np.sum(x[shapes] ** 2 * precision[shapes]))
 
 
@@ -156,9 +152,7 @@ def shape_directions(problem: FitProblem, fit: Solution) -> list[Floats]:
     signatures = [
         fit.derivatives[:, i]
         for i, c in enumerate(fit.coordinates)
-        if isinstance(c, EffectCoordinate)
-        and shape_coordinates(problem.effects[c.effect])
-        and not c.is_shape
+        if c.effect and shape_coordinates(problem.effects[c.effect]) and not c.is_shape
     ]
     if not signatures:
         return []

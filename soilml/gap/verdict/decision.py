@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from soilml.fitting.coordinates import EffectCoordinate
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.sentences import NOT_DECISIVE
@@ -176,7 +175,7 @@ def _far_from_catalogue(best: Explanation) -> bool:
 
 def _implausible(fit: Solution) -> bool:
     """Whether a fault of a sensor or the rig is far larger than its prior allows."""
-    sizes = [isinstance(c, EffectCoordinate) and not c.is_shape for c in fit.coordinates]
+    sizes = [c.effect and not c.is_shape for c in fit.coordinates]
     deviation = np.abs(fit.x) * np.sqrt(fit.precision)
     return bool(np.any(deviation[np.asarray(sizes, dtype=np.bool_)] > MAX_SIZE_DEVIATION))
 

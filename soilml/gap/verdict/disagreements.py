@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import linearise
-from soilml.fitting.least_squares import Solution, levenberg_marquardt
-from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
+from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.predictions import linearise
+from soilml.fitting.soil_tests import disagreeing_soil_tests
 from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,
@@ -101,13 +102,14 @@ def _region(problem: FitProblem, soil: Solution) -> list[Remark]:
     whiten = np.linalg.inv(np.linalg.cholesky(covariance[np.ix_(rest, rest)]))
     try:
         part = problem.readings.subset(rest)
-        fit = levenberg_marquardt(soil.case, soil.coordinates, part, whiten, soil.x)
-        y, derivatives = linearise(fit.case, fit.coordinates, fit.x, problem.readings)
+        to_fit = LeastSquaresProblem(soil.case, soil.coordinates, part, whiten)
+        fit = levenberg_marquardt(to_fit, soil.x)
+        found = linearise(fit.case, fit.coordinates, fit.x, problem.readings)
     except InputError:
         text = f"the region {name} cannot be predicted: no fit to the other rows carries its loads"
         return [Remark("region-not-predicted", text)]
-    jacobian = derivatives[out]
-    residual = (problem.readings.reading - y)[out]
+    jacobian = found.jacobian[out]
+    residual = (problem.readings.reading - found.prediction)[out]
     if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):
         text = f"a fit to the rows outside {name} has no equilibrium inside it"
         return [Remark("region-not-predicted", text)]

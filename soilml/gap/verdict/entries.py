@@ -8,14 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.coordinates import (
-    Coordinate,
-    EffectCoordinate,
-    SoilCoordinate,
-    predict_readings,
-)
+from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.soil_test_remarks import disagreeing_soil_tests
+from soilml.fitting.predictions import predict
+from soilml.fitting.soil_tests import disagreeing_soil_tests
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.covariance import FEW_RUNS
 from soilml.gap.evidence.directions import effect_signatures
@@ -219,7 +215,7 @@ def analysis_notes(
 def _bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
     notes = []
     for c, value in zip(coordinates, x, strict=True):
-        if isinstance(c, SoilCoordinate):
+        if not c.effect:
             if min(value, 1.0 - value) < AT_BOUND:
                 notes.append(Remark("at-bound", f"{c.path} is at a bound of its prior", (c.path,)))
         elif value > c.upper - AT_BOUND * (c.upper - c.lower):
@@ -231,7 +227,7 @@ def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Re
     """Notes on effects that would have to be far larger than they usually are."""
     notes = []
     for c, size in zip(coordinates, x, strict=True):
-        if isinstance(c, EffectCoordinate) and not c.is_shape and abs(size) > LARGEST_SIZE:
+        if c.effect and not c.is_shape and abs(size) > LARGEST_SIZE:
             value, usual = c.prior.at(np.asarray([size, 1.0]))
             text = (
                 f"{c.name} of {c.effect} would have to be {format_quantity(value, c.unit)}, "
@@ -262,7 +258,7 @@ def readings_and_predictions(analysis: Analysis, after: Solution) -> ReadingsAnd
     problem, readings = analysis.problem, analysis.problem.readings
     jacobian = after.derivatives
     variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
-    prediction = predict_readings(after.case, after.coordinates, after.x[None, :], readings)[0]
+    prediction = predict(after.case, after.coordinates, after.x[None, :], readings)[0]
     return ReadingsAndPredictions(
         channels=tuple(column(n) for n in readings.channels),
         channel=readings.channel,
@@ -309,7 +305,7 @@ def named_effects(
 def _size(fit: Solution, effect: str) -> float:
     """Size of an effect in reference sizes; its coordinate precedes those of its shape."""
     for c, x in zip(fit.coordinates, fit.x, strict=True):
-        if isinstance(c, EffectCoordinate) and c.effect == effect:
+        if c.effect and c.effect == effect:
             return float(x)
     return 0.0
 
@@ -323,7 +319,7 @@ def signature_similarity(
     """
     whiten = problem.discrepancy.whiten(amplitude)
     values = fit.values()
-    soil = {c.path: values[c.path] for c in fit.coordinates if isinstance(c, SoilCoordinate)}
+    soil = {c.path: values[c.path] for c in fit.coordinates if (not c.effect)}
     case = problem.case.with_values(soil)
     signatures, _ = effect_signatures(case, problem.readings, problem.effects)
     columns = whiten @ np.stack([s.column for s in signatures], axis=1)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy
-from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, SMALLEST_SIZE, TEMPERING
@@ -88,7 +88,7 @@ def by_undetected_effects(
         logs.append(log)
         offsets.append(size[:, None] * moved)
     log, offset = np.concatenate(logs), np.concatenate(offsets)
-    rate = [c.rate(float(x)) for c, x in zip(fit.coordinates, fit.x, strict=True)]
+    rate = rates_at(fit.coordinates, fit.x)
     by_path = {c.path: offset[:, i] * rate[i] for i, c in enumerate(fit.coordinates)}
     return EstimateSpread(by_path, np.exp(log - log.max()))
 
@@ -165,7 +165,7 @@ def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> 
     prior = dict(fit.case.prior)
     bounds = {path: parameter for path, (parameter, _) in case.parameters().items()}
     for c in fit.coordinates:
-        if not isinstance(c, EffectCoordinate) or c.is_shape:
+        if not c.effect or c.is_shape:
             continue
         value, reach = values[c.path], PRIOR_HALF_WIDTH * stds[c.path]
         lower = max(bounds[c.path].lower, significant(value - reach))
@@ -196,7 +196,7 @@ def soil_estimates(
     return {
         c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
         for c in fit.coordinates
-        if isinstance(c, SoilCoordinate)
+        if (not c.effect)
     }
 
 
@@ -206,5 +206,5 @@ def effect_estimates(fit: Solution, effect: str) -> dict[str, EstimatedValue]:
     return {
         c.name: EstimatedValue(values[c.path], stds[c.path], c.unit)
         for c in fit.coordinates
-        if isinstance(c, EffectCoordinate) and c.effect == effect
+        if c.effect and c.effect == effect
     }

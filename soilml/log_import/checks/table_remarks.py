@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.rover_rows import with_rover_columns
+from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_hints
 

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError, InputError
-from soilml.identification.diagnostics import STRONG_CORRELATION
-from soilml.identification.fit_result import Fit
+from soilml.identification.fit import STRONG_CORRELATION, Fit
 from soilml.numerics.prior import Prior
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, SHEAR, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.fitting.rover_rows import wheel_passes
+from soilml.fitting.operating_points import wheel_passes
 from soilml.numerics.root_finding import rising_root
 from soilml.traction.rover.wheel_curves import WheelCurves, wheel_curves
 from soilml.traction.soil_draws import SoilDraws

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
-from soilml.fitting.rover_rows import with_rover_columns
+from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column

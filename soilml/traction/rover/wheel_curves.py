@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.rover_rows import wheel_gears, wheel_passes
+from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.traction.pull_and_slope import EXCLUDED_KINDS

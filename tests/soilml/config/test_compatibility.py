@@ -10,9 +10,9 @@ from soilml import EFFECTS, Estimator, LinearWheel, Model, Track, read_case
 from soilml.config import compatibility as comparing
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, TableError
-from soilml.fitting.channel_predictions import forces
-from soilml.fitting.observations import read_observations
 from soilml.fitting.operating_points import gear_numbers, operating_points, rows_by_gear
+from soilml.fitting.predictions import forces
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import trained_estimator as trained
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -164,14 +164,14 @@ def test_priors_differ_by_ends_and_kind(case, other, said):
 
 def test_grousers_that_the_model_lacks_and_several_runs_are_noted(case):
     table = rows(run=np.asarray(["a", "b"]), grouser_height_m=np.asarray([0.01, np.nan]))
-    assert texts(read_observations(case, table).notes) == [
+    assert texts(usable_readings(case, table).notes) == [
         "2 runs are fitted as one soil",
         "grouser_height_m is 0.01, but the model has no effect grousers",
     ]
     lugged = replace(case, model=case.model + EFFECTS["grousers"](height=0.01))
-    assert texts(read_observations(lugged, table).notes) == ["2 runs are fitted as one soil"]
+    assert texts(usable_readings(lugged, table).notes) == ["2 runs are fitted as one soil"]
     none = rows(run=np.asarray(["a", "a"]), grouser_height_m=0.0)
-    assert read_observations(case, none).notes == ()
+    assert usable_readings(case, none).notes == ()
 
 
 @pytest.fixture(scope="module")

@@ -17,8 +17,8 @@ from soilml.experiment_design import (
     samples_of_rows,
 )
 from soilml.experiment_design.messages import advice_as_json, next_row_remarks
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.remarks import texts
@@ -39,7 +39,7 @@ def after(case, slip, load, **options):
     torque = true.model(true.soil, at).torque
     run = np.full(len(slip), "a")
     table = Table({"run": run, "slip": at.slip, "load_N": at.load, "torque_Nm": torque})
-    data = read_observations(case, table)
+    data = usable_readings(case, table)
     samples = samples_of_rows(case, data, select_free(case, None), 1024)
     return advise(case, samples, GRID, measured=data.at, outcome_count=200, **options)
 
@@ -99,7 +99,7 @@ def test_the_realised_width_after_a_plan_is_the_expected_one(case):
         torque = torque * (1.0 + 0.02 * rng.standard_normal(2))
         run = np.asarray(["a", "a"])
         table = Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
-        left.append(samples_of_rows(case, read_observations(case, table), free).remaining_fraction)
+        left.append(samples_of_rows(case, usable_readings(case, table), free).remaining_fraction)
     realised = np.sqrt(np.mean(np.square(left), axis=0))
     np.testing.assert_allclose(
         planned[-1].remaining_fraction, realised, atol=0.15

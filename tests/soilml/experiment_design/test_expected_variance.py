@@ -10,13 +10,13 @@ from soilml.config.measurement_noise import Noise
 from soilml.experiment_design.expected_variance import expected_variance
 from soilml.experiment_design.parameter_samples import ParameterSamples, samples_of_prior
 from soilml.experiment_design.predicted_readings import PredictedReadings, predicted_readings
-from soilml.fitting.free_parameters import FreeParameter, select_free
+from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.numerics.prior import Prior
 
 
 def line(count, seed=0):
     """Samples of one parameter, uniform from 0 to 1."""
-    return samples_of_prior([FreeParameter("a", "1", Prior(0.0, 1.0), 0.5, False)], count, seed)
+    return samples_of_prior([Coordinate("a", "1", Prior(0.0, 1.0), 0.5, False)], count, seed)
 
 
 def read(samples, y, std):
@@ -82,7 +82,7 @@ def test_a_gaussian_is_left_as_its_precisions_add():
     u = np.clip(0.5 + 0.05 * rng.standard_normal(4000), 0.0, 1.0)[:, None]
     weights = rng.random(4000)
     samples = ParameterSamples(
-        (FreeParameter("a", "1", prior, 0.5, False),), u, weights / weights.sum()
+        (Coordinate("a", "1", prior, 0.5, False),), u, weights / weights.sum()
     )
     expected = samples.remaining_fraction[0] / np.sqrt(2.0)  # a reading as sharp as the samples
     sharp = samples.remaining_fraction[0] * prior.std

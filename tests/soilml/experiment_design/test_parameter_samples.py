@@ -5,8 +5,8 @@ import pytest
 
 from soilml import Operating, identify, read_case
 from soilml.experiment_design import samples_of_moments, samples_of_prior, samples_of_rows
-from soilml.fitting.free_parameters import FreeParameter, select_free
-from soilml.fitting.observations import read_observations
+from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.prior import Prior
@@ -57,7 +57,7 @@ def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(model_fi
     table = rows(case, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
     free = select_free(case, None)
     fit = identify(case, table, None, "posterior")
-    posterior = samples_of_rows(case, read_observations(case, table), free)
+    posterior = samples_of_rows(case, usable_readings(case, table), free)
     from_moments = samples_of_moments(free, fit.names, fit.values, fit.covariance)
     for found in (posterior, from_moments):
         np.testing.assert_allclose(
@@ -74,14 +74,14 @@ def test_excess_residuals_scale_the_noise(model_file):
     table = rows(case, np.full(4, 0.3), np.full(4, 60.0))
     shaken = dict(table.columns) | {"torque_Nm": table["torque_Nm"] * np.tile([0.9, 1.1], 2)}
     free = select_free(case, None)
-    assert samples_of_rows(case, read_observations(case, table), free).noise_scale == 1.0
-    assert samples_of_rows(case, read_observations(case, Table(shaken)), free).noise_scale > 3.0
+    assert samples_of_rows(case, usable_readings(case, table), free).noise_scale == 1.0
+    assert samples_of_rows(case, usable_readings(case, Table(shaken)), free).noise_scale > 3.0
 
 
 def test_a_parameter_that_an_estimate_does_not_name_stays_as_its_prior(model_file):
     free = [
         *select_free(read_case(model_file), None),
-        FreeParameter("kphi", "N/m^(n+2)", Prior(1e5, 1e7, log=True), 1e6, False),
+        Coordinate("kphi", "N/m^(n+2)", Prior(1e5, 1e7, log=True), 1e6, False),
     ]
     from_moments = samples_of_moments(
         free, ("cohesion",), np.asarray([600.0]), np.asarray([[100.0**2]])

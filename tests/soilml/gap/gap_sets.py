@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -11,8 +12,7 @@ from conftest import THREE_CHANNEL_MODEL
 
 from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
-from soilml.fitting.coordinates import soil_coordinate
-from soilml.fitting.free_parameters import select_free
+from soilml.fitting.coordinates import select_free
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
 from soilml.gap.evidence.covariance import (
@@ -79,11 +79,17 @@ def fit_problem(case, table, run_effects=(0.0, 0.0)) -> FitProblem:
         0.0,
         1e6,
     )
-    coordinates = tuple(soil_coordinate(f) for f in select_free(case, None))
+    coordinates = tuple(select_free(case, None))
     effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
     return FitProblem(
         case, coordinates, readings, assemble_covariance(readings, columns, known), effects, {}
     )
+
+
+def with_readings(fit, reading):
+    """The same point of a fit beside other readings; its residuals stay as they are."""
+    readings = replace(fit.problem.readings, reading=reading)
+    return replace(fit, problem=replace(fit.problem, readings=readings))
 
 
 def candidate(problem, names, start):

@@ -5,11 +5,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from gap_sets import candidate, case_of, driven, fit_problem
+from gap_sets import candidate, case_of, driven, fit_problem, with_readings
 from scipy.integrate import quad
 
 from soilml.config.model_settings import UNNAMED_GEAR
-from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.design.planned_readings import joined_readings
 from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
 from soilml.gap.evidence.directions import SECANT_STEP, Signature, effect_signatures
@@ -75,7 +75,7 @@ def test_similarity_is_that_of_what_the_soil_leaves_of_signatures(problem, found
     none = np.zeros(len(problem.readings.channels))
     similar = signature_similarity(problem, fit, none)
     case = problem.case.with_values(
-        {c.path: fit.values()[c.path] for c in fit.coordinates if isinstance(c, SoilCoordinate)}
+        {c.path: fit.values()[c.path] for c in fit.coordinates if (not c.effect)}
     )
     signatures, _ = effect_signatures(case, problem.readings, problem.effects)
     assert similar.names == tuple(s.name for s in signatures)
@@ -109,7 +109,7 @@ def test_named_effects_carry_their_estimates_and_rivals(problem, found):
     both = replace(found, names=("slip-sinkage", "rate"))
     (effect,) = named_effects([found, both, other], found.fit, similar, Half())
     size = found.fit.x[3]
-    assert isinstance(found.fit.coordinates[3], EffectCoordinate) and size > 0.0
+    assert isinstance(found.fit.coordinates[3], Coordinate) and size > 0.0
     assert (effect.name, effect.alternatives) == ("slip-sinkage", ("exit-angle", "rate"))
     assert effect.separating_snr == pytest.approx(size * 4.0 * 0.6)
     assert (effect.nearest_rival, effect.probability, effect.log_odds) == ("exit-angle", 0.45, 0.0)
@@ -260,12 +260,12 @@ def test_a_trend_of_residuals_is_stated_in_sigma_by_channel(problem):
     readings, std = problem.readings, problem.covariance.std
     smooth = np.sin(12.0 * readings.slip) * np.log(readings.load / 75.0)
     off = np.where(readings.channel == readings.channels.index("sinkage"), smooth * std, 0.0)
-    trend = residual_trend(problem, replace(soil, reading=soil.prediction + 8.0 * off))
+    trend = residual_trend(problem, with_readings(soil, soil.prediction + 8.0 * off))
     rms = 8.0 * np.sqrt(np.mean(smooth[off != 0.0] ** 2))
     assert trend["sinkage_m"] == pytest.approx(rms, rel=0.35) and trend["sinkage_m"] < rms
     assert trend["torque_Nm"] == trend["drawbar_pull_N"] == 0.0
     rng = np.random.default_rng(0)
     noise = residual_trend(
-        problem, replace(soil, reading=soil.prediction + std * rng.standard_normal(len(std)))
+        problem, with_readings(soil, soil.prediction + std * rng.standard_normal(len(std)))
     )
     assert max(noise.values()) < 0.5

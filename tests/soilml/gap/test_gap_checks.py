@@ -59,7 +59,7 @@ def test_a_reading_that_a_repeat_confirms_is_no_outlier(both):
     space = np.linalg.solve(problem.covariance.whiten, soil.jacobian)
     struck = np.isin(np.arange(len(residual)), (3, 11) if both else (3,))  # runs 0 and 1
     far = residual + np.where(struck, 9.0, 0.0) * problem.covariance.std
-    alike = problem.readings.driven_alike * 3 + problem.readings.channel
+    alike = problem.readings.replicates * 3 + problem.readings.channel
     run = problem.readings.run[problem.readings.row]
     found = outliers(problem.covariance, far, space, alike, run)
     np.testing.assert_array_equal(found, struck & (not both))
@@ -74,7 +74,7 @@ def test_a_repeat_that_strays_to_the_other_side_confirms_nothing():
     far[3] += 9.0 * problem.covariance.std[3]
     far[11] -= 9.0 * problem.covariance.std[11]
     space = np.linalg.solve(problem.covariance.whiten, soil.jacobian)
-    alike = problem.readings.driven_alike * 3 + problem.readings.channel
+    alike = problem.readings.replicates * 3 + problem.readings.channel
     found = outliers(problem.covariance, far, space, alike)
     np.testing.assert_array_equal(np.flatnonzero(found), [3, 11])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.fitting.coordinates import linearise
+from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap.evidence.covariance import (
     LOG_NOISE_SCALE_PRIOR_STD,
@@ -30,7 +30,7 @@ def rig():
     case = case_of()
     readings = stack_readings(case, driven(case, loads=LOADS, slips=4, noise=0.0))
     problem = fit_problem(case, driven(case, loads=LOADS, slips=4, noise=0.0))
-    soil = linearise(case, problem.soil, np.full(3, 0.4), readings)[1]
+    soil = linearise(case, problem.soil, np.full(3, 0.4), readings).jacobian
     columns = run_effect_columns(case, readings)
     return readings, columns, np.column_stack([soil, smooth_basis(readings)])
 
@@ -122,8 +122,8 @@ def test_run_effect_columns_agree_with_the_model(rig):
     readings, columns, _ = rig
     case = case_of()
     phi = float(case.soil.friction_angle) + RUN_EFFECT_UNITS["friction_angle"]
-    more = linearise(case.with_values({"friction_angle": phi}), [], np.zeros(0), readings)[0]
-    off = more - linearise(case, [], np.zeros(0), readings)[0]
+    more = predict(case.with_values({"friction_angle": phi}), [], np.zeros((1, 0)), readings)[0]
+    off = more - predict(case, [], np.zeros((1, 0)), readings)[0]
     np.testing.assert_allclose(columns[:, 0], off, rtol=0.1, atol=0.05 * np.abs(off).max())
 
 
@@ -209,8 +209,8 @@ def test_bearing_varies_by_the_moduli_that_the_soil_has(rig):
         found = run_effect_columns(case, readings)[:, 1]
         kphi = 1.05 * float(case.soil.kphi)
         more = case.with_values({"kc": 1.05 * kc, "kphi": kphi})
-        off = linearise(more, [], np.zeros(0), readings)[0]
-        off = off - linearise(case, [], np.zeros(0), readings)[0]
+        off = predict(more, [], np.zeros((1, 0)), readings)[0]
+        off = off - predict(case, [], np.zeros((1, 0)), readings)[0]
         np.testing.assert_allclose(found, off, rtol=0.1, atol=0.05 * np.abs(off).max())
 
 

@@ -6,19 +6,28 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
-from soilml.fitting.coordinates import SoilCoordinate
-from soilml.fitting.damped_steps import MOST_LOG_STEP, DampedSteps
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.damped_descents import MOST_LOG_STEP, DampedSteps
+from soilml.fitting.least_squares import LeastSquaresProblem
+from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
+from soilml.physics.operating_point import Operating
 
 
-def coordinate(lower: float, upper: float, *, log: bool = False) -> SoilCoordinate:
+def coordinate(lower: float, upper: float, *, log: bool = False) -> Coordinate:
     """A soil parameter with this uniform prior."""
-    return SoilCoordinate("kphi", "", 0.0, 1.0, Prior(lower, upper, log=log))
+    return Coordinate("kphi", "", Prior(lower, upper, log=log))
 
 
-def one_step(of: SoilCoordinate, x: float, residual: float) -> float:
+def problem_of(coordinate: Coordinate) -> LeastSquaresProblem:
+    """The steps of a problem with one coordinate do not depend on its readings."""
+    readings = Readings.of_every_row(Operating(slip=np.zeros(0), load=np.zeros(0)))
+    return LeastSquaresProblem(case_of(), [coordinate], readings, np.zeros((0, 0)))
+
+
+def one_step(of: Coordinate, x: float, residual: float) -> float:
     """Where an undamped step leads whose length in the coordinate is the residual."""
-    steps = DampedSteps.of([of])
+    steps = DampedSteps.of(problem_of(of))
     here, left = np.asarray([[x]]), np.asarray([[residual]])
     return float(steps.from_points(here, left, np.eye(1), np.zeros(1))[0, 0])
 
@@ -49,7 +58,7 @@ def test_steps_end_at_bounds_and_do_not_leave_them():
     of = coordinate(0.0, 1.0)
     assert one_step(of, 0.4, 9.0) == 1.0
     assert one_step(of, 1.0, 0.5) == 1.0
-    steps, jacobian = DampedSteps.of([of]), np.eye(1)
+    steps, jacobian = DampedSteps.of(problem_of(of)), np.eye(1)
     assert steps.are_held(np.ones(1), np.ones(1), jacobian)
     assert not steps.are_held(np.ones(1), -np.ones(1), jacobian)
     assert steps.are_held(np.zeros(1), -np.ones(1), jacobian)
@@ -57,26 +66,38 @@ def test_steps_end_at_bounds_and_do_not_leave_them():
     assert one_step(of, 0.0, -0.5) == 0.0
 
 
-def test_a_step_counts_the_prior():
-    """The optimum of (r - x)^2 + (3 x)^2, from r = 1 at x = 0, is at 0.1."""
-    steps = DampedSteps(np.full(1, -5.0), np.full(1, 5.0), np.full(1, 3.0), np.full(1, np.inf))
+@pytest.mark.parametrize(
+    ("prior", "std", "optimum", "objective"),
+    [
+        (Prior(0.0, 1.0), 1.0 / 3.0, 0.1, 0.81 + 0.09),  # (1 - x)^2 + (3 x)^2
+        (Prior(-1.0, 1.0), 2.0 / 3.0, 0.55, 0.45**2 + 0.15**2),  # (1 - x)^2 + (3 (x - 1/2))^2
+    ],
+)
+def test_a_step_counts_the_prior(prior, std, optimum, objective):
+    """A normal density about the parameter's zero; the readings alone have their optimum at 1."""
+    of = Coordinate("kphi", "", prior, normal_std=std, lower=-5.0, upper=5.0)
+    problem = problem_of(of)
+    steps = DampedSteps.of(problem)
     moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
-    assert moved[0, 0] == pytest.approx(0.1)
-    assert steps.objective(np.asarray([1.0 - 0.1]), moved[0]) == pytest.approx(0.9)
+    assert moved[0, 0] == pytest.approx(optimum)
+    assert problem.objective(1.0 - moved[0], moved[0]) == pytest.approx(objective)
 
 
 def test_the_objective_counts_tests_of_the_soil():
     """A deviation of 2 x - 1: the optimum of (r - x)^2 + (2 x - 1)^2, from r = 1, is at 0.6."""
-    tests = SimpleNamespace(
-        deviation=lambda x: 2.0 * np.asarray(x) - 1.0, rates=lambda x: np.asarray([[2.0]])
-    )
-    steps = DampedSteps(
-        np.full(1, -5.0), np.full(1, 5.0), np.zeros(1), np.full(1, np.inf), tests
-    )  # fmt: skip
+
+    class Tested(LeastSquaresProblem):
+        soil_tests = SimpleNamespace(
+            deviation=lambda x: 2.0 * np.asarray(x) - 1.0, rates=lambda x: np.asarray([[2.0]])
+        )
+
+    of = Coordinate("kphi", "", Prior(0.0, 1.0), lower=-5.0, upper=5.0)
+    problem = Tested(**vars(problem_of(of)))
+    steps = DampedSteps.of(problem)
     moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
     assert moved[0, 0] == pytest.approx(0.6)
-    assert steps.objective(np.asarray([0.4]), moved[0]) == pytest.approx(0.16 + 0.04)
-    assert steps.objective(np.asarray([2.0]), np.asarray([-1.0])) == pytest.approx(4.0 + 9.0)
+    assert problem.objective(np.asarray([0.4]), moved[0]) == pytest.approx(0.16 + 0.04)
+    assert problem.objective(np.asarray([2.0]), np.asarray([-1.0])) == pytest.approx(4.0 + 9.0)
 
 
 def test_a_fit_follows_the_valley_of_bearing_modulus_and_exponent():

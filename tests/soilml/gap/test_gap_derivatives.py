@@ -7,17 +7,15 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import (
-    linearise,
-    predict_readings,
-    shape_coordinates,
-    size_coordinate,
-)
+from soilml.fitting.coordinates import shape_coordinates, size_coordinate
+from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.joined_cases import CaseSets, joined_load_case
-from soilml.fitting.least_squares import FitRequest, descend_together
+from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.predictions import (
     PredictionRequest,
+    linearise,
     linearise_many,
+    predict,
     predict_many,
 )
 from soilml.gap.candidate_effects import with_effect
@@ -71,14 +69,13 @@ def with_coordinates(problem, name):
 def test_derivatives_agree_with_central_differences(problem, name, braking):
     readings = braked(problem.readings) if braking else problem.readings
     case, coordinates, x = with_coordinates(problem, name)
-    y, jacobian = linearise(case, coordinates, x, readings)
-    np.testing.assert_allclose(
-        y, predict_readings(case, coordinates, x[None, :], readings)[0], rtol=1e-7
-    )
+    found = linearise(case, coordinates, x, readings)
+    y, jacobian = found.prediction, found.jacobian
+    np.testing.assert_allclose(y, predict(case, coordinates, x[None, :], readings)[0], rtol=1e-7)
     for i in range(len(coordinates)):
         sides = np.tile(x, (2, 1))
         sides[:, i] += (STEP, -STEP)
-        high, low = predict_readings(case, coordinates, sides, readings)
+        high, low = predict(case, coordinates, sides, readings)
         central = (high - low) / (2.0 * STEP)
         largest = np.abs(central).max()
         np.testing.assert_allclose(jacobian[:, i], central, rtol=1e-3, atol=1e-5 * largest)
@@ -89,8 +86,8 @@ def test_derivatives_point_inwards_at_an_upper_bound(problem):
     top = replace(problem.soil[0], upper=0.4)
     coordinates = [top, *problem.soil[1:]]
     x = np.asarray([0.4, 0.5, 0.4])
-    jacobian = linearise(problem.case, coordinates, x, problem.readings)[1]
-    inside = linearise(problem.case, problem.soil, x, problem.readings)[1]
+    jacobian = linearise(problem.case, coordinates, x, problem.readings).jacobian
+    inside = linearise(problem.case, problem.soil, x, problem.readings).jacobian
     np.testing.assert_allclose(jacobian, inside, rtol=1e-3, atol=1e-6)
     assert np.any(jacobian[:, 0] != inside[:, 0])
 
@@ -98,7 +95,8 @@ def test_derivatives_point_inwards_at_an_upper_bound(problem):
 def test_rows_without_equilibrium_have_no_derivatives(problem):
     load = np.where(np.arange(32) == 5, 1e6, np.asarray(problem.readings.at.load))
     readings = replace(problem.readings, at=replace(problem.readings.at, load=load))
-    y, jacobian = linearise(problem.case, problem.soil, np.full(3, 0.5), readings)
+    found = linearise(problem.case, problem.soil, np.full(3, 0.5), readings)
+    y, jacobian = found.prediction, found.jacobian
     unsolved = readings.row == 5
     assert np.isnan(y[unsolved]).all() and np.isnan(jacobian[unsolved]).all()
     assert np.isfinite(y[~unsolved]).all() and np.isfinite(jacobian[~unsolved]).all()
@@ -200,8 +198,9 @@ def test_an_error_takes_the_place_of_its_fit_alone(problem):
     start = np.full(3, 0.5)
     fit, error = descend_together(
         [
-            FitRequest(problem.case, problem.soil, readings, whiten, start),
-            FitRequest(case, [*problem.soil, grousers], readings, whiten, np.append(start, -0.5)),
-        ]
+            LeastSquaresProblem(problem.case, problem.soil, readings, whiten),
+            LeastSquaresProblem(case, [*problem.soil, grousers], readings, whiten),
+        ],
+        [start, np.append(start, -0.5)],
     )
     assert fit.converged and isinstance(error, InputError)

@@ -1,5 +1,6 @@
 """How well runs and checks discriminate between explanations, evaluated by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.design import discriminating_runs as design
 from soilml.gap.design.identifiability import _are_equal, identifiability, indistinguishable_classes
 from soilml.gap.design.planned_readings import expected_readings, planned_readings
@@ -25,7 +26,8 @@ def soil_tests(rates, deviation=()):
 
 
 def coordinate(std=np.inf, path="soil", rate=1.0):
-    return SimpleNamespace(std=std, path=path, rate=lambda x: rate * x)
+    """A parameter of the soil."""
+    return SimpleNamespace(std=std, path=path, rate=lambda x: rate * x, effect="", is_shape=False)
 
 
 def rival(coordinates, x, tests=None, values=None):
@@ -78,7 +80,7 @@ def test_discriminations_are_capped_at_ten_sigma_before_their_mean():
 
 def size(effect, path, is_shape=False):
     prior = Prior(0.0, 1.0)
-    return EffectCoordinate(path, "1", -9.0, 9.0, prior, effect=effect, is_shape=is_shape)
+    return Coordinate(f"{effect}.{path}", "1", prior, lower=-9.0, upper=9.0, is_shape=is_shape)
 
 
 def test_a_check_of_the_sensors_rejects_an_error_by_its_size_after_the_check():
@@ -199,7 +201,7 @@ def test_expected_readings_have_the_noise_of_the_channel_or_its_typical_one():
     readings = problem.readings
     noise = (readings.noise[0], None, readings.noise[2])
     plain = case.noise.pop("drawbar_pull_N")
-    like = readings.__class__(**{**vars(readings), "noise": noise})
+    like = replace(readings, noise=noise)
     at = Operating(slip=np.asarray([0.1, 0.3]), load=np.asarray([50.0, 80.0]))
     found = expected_readings(at, like, case)
     case.noise["drawbar_pull_N"] = plain

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, remark
 
-from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import Evidence
@@ -154,8 +154,8 @@ def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
 
 
 def test_estimates_at_a_bound():
-    soil = SoilCoordinate("cohesion", "Pa", 0.0, 1.0, Prior(0.0, 1000.0))
-    size = EffectCoordinate("n1", "1", 0.0, 4.0, Prior(0.0, 1.0), effect="slip-sinkage")
+    soil = Coordinate("cohesion", "Pa", Prior(0.0, 1000.0))
+    size = Coordinate("slip-sinkage.n1", "1", Prior(0.0, 1.0), upper=4.0)
     at = [f"{soil.path} is at a bound of its prior"]
     assert texts(_bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
     assert _bound_notes([soil, soil], [0.0011, 0.9989]) == []

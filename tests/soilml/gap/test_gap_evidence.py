@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.config.model_discrepancy import Discrepancy
-from soilml.fitting.discrepancy_process import discrepancy_process
+from soilml.fitting.covariance import discrepancy_process
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, _size_prior, outside_bounds
 from soilml.gap.evidence.problem import StartedFit, fit_many
@@ -37,7 +37,7 @@ def test_the_process_has_the_stated_covariance(problem):
     other = process.columns[~own][:, process.channel == readings.channels.index("torque")]
     assert np.all(other == 0.0)
     span = readings.reading[own].max()  # positive, so that the range from zero is the largest
-    assert discrepancy_process(readings).usual[0] == pytest.approx(0.02 * span)
+    assert discrepancy_process(readings, {}).usual[0] == pytest.approx(0.02 * span)
 
 
 @pytest.mark.parametrize("amplitude", [(0.0, 0.0, 0.0), (1.0, 0.0, 4.0), (25.0, 10.0, 0.4)])

@@ -7,8 +7,10 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import linearise, predict_readings, size_coordinate
-from soilml.fitting.least_squares import levenberg_marquardt
+from soilml.fitting.coordinates import size_coordinate
+from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.least_squares import LeastSquaresProblem
+from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap.candidate_effects import with_effect
 from soilml.gap.evidence import problem as problem_module
@@ -39,9 +41,8 @@ def test_a_fit_stops_at_the_bounds_of_the_prior(clean):
         replace(a, upper=a.prior.fraction(phi - 0.05)) if a.path == "friction_angle" else a
         for a in clean.soil
     ]
-    found = levenberg_marquardt(
-        clean.case, coordinates, clean.readings, clean.covariance.whiten, np.full(3, 0.2)
-    )
+    bounded = LeastSquaresProblem(clean.case, coordinates, clean.readings, clean.covariance.whiten)
+    found = levenberg_marquardt(bounded, np.full(3, 0.2))
     assert found.values()["friction_angle"] == pytest.approx(phi - 0.05)
     assert np.all(found.x >= [a.lower for a in coordinates]) and np.all(
         found.x <= [a.upper for a in coordinates]
@@ -51,7 +52,7 @@ def test_a_fit_stops_at_the_bounds_of_the_prior(clean):
 def test_a_prior_on_a_size_shrinks_it_towards_zero(clean):
     case = clean.with_effects(["torque-gain"])
     offset = size_coordinate(EFFECTS["torque-gain"], None)
-    loose, tight = (replace(offset, std=std) for std in (10.0, 1e-3))
+    loose, tight = (replace(offset, normal_std=std * offset.prior.upper) for std in (10.0, 1e-3))
     readings = replace(
         clean.readings,
         reading=clean.readings.reading * np.where(clean.readings.channel == 0, 1.03, 1.0),
@@ -59,20 +60,18 @@ def test_a_prior_on_a_size_shrinks_it_towards_zero(clean):
     sizes = []
     for coordinate in (loose, tight):
         coordinates = [*clean.soil, coordinate]
-        start = np.full(4, 0.4)
-        sizes.append(
-            levenberg_marquardt(case, coordinates, readings, clean.covariance.whiten, start).x[3]
-        )
+        problem = LeastSquaresProblem(case, coordinates, readings, clean.covariance.whiten)
+        sizes.append(levenberg_marquardt(problem, np.full(4, 0.4)).x[3])
     assert sizes[0] > 20.0 * abs(sizes[1])
 
 
 def test_derivatives_of_a_fit_are_those_of_the_model(clean):
     x, step = np.asarray([0.3, 0.5, 0.4]), 1e-4
-    jacobian = linearise(clean.case, clean.soil, x, clean.readings)[1]
+    jacobian = linearise(clean.case, clean.soil, x, clean.readings).jacobian
     for i in range(3):
         sides = np.tile(x, (2, 1))
         sides[:, i] += (step, -step)
-        high, low = predict_readings(clean.case, clean.soil, sides, clean.readings)
+        high, low = predict(clean.case, clean.soil, sides, clean.readings)
         central = (high - low) / (2.0 * step)
         np.testing.assert_allclose(
             jacobian[:, i], central, rtol=2e-3, atol=1e-4 * np.abs(central).max()
@@ -103,7 +102,7 @@ def test_a_signature_agrees_with_the_derivative_of_a_linear_effect(clean):
     )
     coordinate = size_coordinate(EFFECTS["torque-gain"], None)
     case = with_effect(clean.case, EFFECTS["torque-gain"])
-    jacobian = linearise(case, [coordinate], np.zeros(1), clean.readings)[1][:, 0]
+    jacobian = linearise(case, [coordinate], np.zeros(1), clean.readings).jacobian[:, 0]
     np.testing.assert_allclose(known[0].column, jacobian, rtol=1e-4, atol=1e-9)
     assert known[0].sign == 0
 
@@ -197,8 +196,9 @@ def test_a_refused_fit_starts_again_without_effects_and_is_refused_once_more(cle
     refusals = [InputError("first"), InputError("second")]
     asked = []
 
-    def descend_together(requests):
-        asked.append([r.start for r in requests])
+    def descend_together(problems, starts):
+        asked.append(starts)
+        assert all(p.coordinates is coordinates for p in problems) and len(problems) == len(starts)
         return ["a fit", refusals[0], refusals[0]] if len(asked) == 1 else ["later", refusals[1]]
 
     monkeypatch.setattr(problem_module, "descend_together", descend_together)

@@ -10,17 +10,15 @@ from test_gap_several_gears import LUGS, REST, WHEELS, rows
 from soilml import identify
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import InputError
-from soilml.fitting.coordinates import size_coordinate, soil_coordinate
-from soilml.fitting.declared_discrepancy import discrepancy_columns
-from soilml.fitting.discrepancy_process import discrepancy_process
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
+from soilml.fitting.coordinates import select_free, size_coordinate
+from soilml.fitting.covariance import discrepancy_process
 from soilml.fitting.predictions import (
     PredictionRequest,
     linearise_many,
     predict_many,
 )
 from soilml.fitting.readings import stack_readings
+from soilml.fitting.usable_readings import usable_readings
 from soilml.gap.candidate_effects import candidate_effects, with_effect
 from soilml.gap.design.planned_readings import expected_readings, joined_readings
 from soilml.gap.design.run_options import run_options
@@ -38,7 +36,7 @@ def request_of(text=WIDTHS + REST):
     effects = [offered["grousers@lugged"], offered["slip-sinkage"]]
     for effect in effects:
         case = with_effect(case, effect)
-    soil = [soil_coordinate(f) for f in select_free(case, ["friction_angle", "shear_modulus"])]
+    soil = select_free(case, ["friction_angle", "shear_modulus"])
     coordinates = [*soil, *(size_coordinate(effect, None) for effect in effects)]
     return PredictionRequest(case, coordinates, np.asarray([[0.6, 0.4, 0.5, 0.3]]), readings)
 
@@ -51,7 +49,7 @@ def of_one_gear(request, name):
     selected, readings = request.readings.of_rows(mine, own)
     acts = [i for i, c in enumerate(request.coordinates) if "@" not in c.path or name in c.path]
     coordinates = [
-        replace(c, effect=c.effect.partition("@")[0]) if "@" in c.path else c
+        replace(c, path=c.path.replace(f"@{name}", ""))
         for c in (request.coordinates[i] for i in acts)
     ]
     return PredictionRequest(case, coordinates, request.x[:, acts], readings), mine, selected, acts
@@ -103,10 +101,10 @@ def test_a_value_that_the_model_refuses_for_one_gear_refuses_the_request():
 
 def test_rows_of_different_gears_are_not_driven_alike():
     request = request_of()
-    at, alike = request.readings.at, request.readings.driven_alike
+    at, alike = request.readings.at, request.readings.replicates
     gear = np.asarray(at.gear)[request.readings.row]
     assert all(np.unique(gear[alike == group]).size == 1 for group in np.unique(alike))
-    nameless = replace(request.readings, at=replace(at, gear=None)).driven_alike
+    nameless = replace(request.readings, at=replace(at, gear=None)).replicates
     assert np.unique(nameless).size == np.unique(alike).size // 2
     # the loads and slips that were set are levels of all gears
     assert request.readings.load_levels.count == 3
@@ -115,10 +113,10 @@ def test_rows_of_different_gears_are_not_driven_alike():
 def test_each_gear_has_a_discrepancy_of_its_own_with_one_amplitude():
     readings = request_of().readings
     smooth = np.asarray(readings.at.gear)[readings.row] == "smooth"
-    process = discrepancy_process(readings)
+    process = discrepancy_process(readings, {})
     covariance = process.columns @ process.columns.T
     assert np.all(covariance[np.ix_(smooth, ~smooth)] == 0.0)
-    shared = discrepancy_process(replace(readings, at=replace(readings.at, gear=None)))
+    shared = discrepancy_process(replace(readings, at=replace(readings.at, gear=None)), {})
     np.testing.assert_allclose(np.diag(covariance), np.diag(shared.columns @ shared.columns.T))
     np.testing.assert_array_equal(process.usual, shared.usual)
     assert set(process.channel.tolist()) == {0, 1, 2}
@@ -128,9 +126,12 @@ def test_identification_beside_a_discrepancy_of_each_gear():
     case = case_of(WIDTHS + REST)
     case = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.05)})
     table = rows(case)
-    (torque, *_) = discrepancy_columns(case, read_observations(case, table))
-    smooth = table["gear"] == "smooth"
-    assert np.all((torque @ torque.T)[np.ix_(smooth, ~smooth)] == 0.0)
+    readings = usable_readings(case, table)
+    process = discrepancy_process(readings, case.discrepancy, Discrepancy())
+    assert set(process.channel.tolist()) == {readings.channels.index("torque")}
+    smooth = (table["gear"] == "smooth")[readings.row]
+    covariance = process.columns @ process.columns.T
+    assert np.any(covariance != 0.0) and np.all(covariance[np.ix_(smooth, ~smooth)] == 0.0)
     plain = identify(replace(case, discrepancy={}), table)
     assert np.all(identify(case, table).std > plain.std)
 
@@ -162,5 +163,5 @@ def test_runs_to_add_name_the_gear_to_drive():
         ("grousers@lugged", "sidewall-shear@lugged", False),
     ],
 )
-def test_a_shared_effectexclude_each_others_that_of_one_gear(name, other, excluded):
+def test_a_shared_effect_excludes_that_of_one_gear(name, other, excluded):
     assert exclude_each_other(name, other) is exclude_each_other(other, name) is excluded

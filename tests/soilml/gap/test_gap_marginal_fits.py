@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError
-from soilml.fitting.coordinates import EffectCoordinate, SoilCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.evidence import problem as problem_module
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import (
@@ -108,13 +108,13 @@ def test_amplitudes_are_root_mean_squares_over_their_tempered_probability():
         assert found[i] ** 2 == pytest.approx(np.average(AMPLITUDES**2, weights=weight))
 
 
-def size(lower, std=np.inf):
-    return EffectCoordinate("n1", "1", lower, 9.0, Prior(0.0, 1.0), effect="dig", std=std)
+def size(lower, std=None):
+    return Coordinate("dig.n1", "1", Prior(0.0, 1.0), normal_std=std, lower=lower, upper=9.0)
 
 
 def test_priors_of_coordinates_as_precision_slope_and_value():
     """Of a uniform prior, the variance 1/12; of a Gaussian one, -2 ln p less ln 2 pi."""
-    assert _prior(SoilCoordinate("c", "Pa", 0.0, 1.0, Prior(0.0, 1.0)), 0.3) == (12.0, 0.0, 0.0)
+    assert _prior(Coordinate("c", "Pa", Prior(0.0, 1.0)), 0.3) == (12.0, 0.0, 0.0)
     precision, pull, value = _prior(size(-9.0, std=0.5), 0.7)
     assert (precision, pull) == (pytest.approx(4.0), pytest.approx(4.0 * 0.7))
     assert value == pytest.approx((0.7 / 0.5) ** 2 + 2.0 * np.log(0.5))

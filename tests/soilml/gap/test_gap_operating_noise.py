@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
-from soilml.fitting.operating_noise import noise_of_operation
+from soilml.fitting.covariance import noise_of_operation
 from soilml.gap import gap
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating

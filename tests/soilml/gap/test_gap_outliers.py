@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.evidence.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, _is_confirmed, outliers
 from soilml.gap.evidence.repeats import _worst_pair
 from soilml.gap.verdict.entries import _size
@@ -97,9 +97,7 @@ def test_the_worst_pair_is_the_one_that_differs_most_in_sigma():
 
 def test_the_size_of_an_effect_is_its_first_coordinate_or_nothing():
     def coordinate(effect, is_shape=False):
-        return EffectCoordinate(
-            "n1", "1", 0.0, 9.0, Prior(0.0, 1.0), effect=effect, is_shape=is_shape
-        )
+        return Coordinate(f"{effect}.n1", "1", Prior(0.0, 1.0), upper=9.0, is_shape=is_shape)
 
     fit = SimpleNamespace(
         coordinates=[coordinate("dig"), coordinate("plough"), coordinate("dig", is_shape=True)],

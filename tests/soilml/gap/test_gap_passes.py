@@ -7,14 +7,16 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.fitting.coordinates import SoilCoordinate
-from soilml.fitting.free_soil import free_soil_parameters
-from soilml.fitting.least_squares import Solution
+from soilml.fitting.coordinates import Coordinate, free_soil_parameters
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.predictions import Linearisation
+from soilml.fitting.readings import Readings
 from soilml.gap import gap
 from soilml.gap.evidence.covariance import VarianceComponents
 from soilml.gap.search import analysis
 from soilml.gap.search.stepwise import SearchResult
 from soilml.numerics.prior import Prior
+from soilml.physics.operating_point import Operating
 from soilml.remarks import texts
 
 CASE = case_of()
@@ -167,11 +169,16 @@ def test_the_covariance_is_estimated_from_what_a_fit_leaves():
 def test_a_fit_states_precision_and_covariance_of_its_parameters():
     rng = np.random.default_rng(0)
     jacobian = rng.standard_normal((9, 2))
-    angle = SoilCoordinate("friction_angle", "rad", 0.0, 1.0, Prior(0.4, 0.8))
-    other = replace(angle, name="cohesion", unit="Pa", prior=Prior(0.0, 2000.0), std=0.25)
+    angle = Coordinate("friction_angle", "rad", Prior(0.4, 0.8))
+    other = Coordinate("cohesion", "Pa", Prior(0.0, 2000.0), normal_std=500.0)
+    x, none = np.asarray([0.25, 0.5]), np.zeros(9)
+    at = Operating(slip=np.full(9, 0.2), load=np.full(9, 60.0))
+    readings = Readings.of_every_row(at, ["torque"], reading=np.ones(9))
     fit = Solution(
-        *(CASE, (angle, other), np.asarray([0.25, 0.5]), np.zeros(9), np.zeros(9), jacobian),
-        *(0.0, True, np.ones(9), jacobian),
+        LeastSquaresProblem(CASE, (angle, other), readings, np.eye(9)),
+        x,
+        Linearisation(x, none, jacobian, none, np.zeros((2, 9)), none),
+        *(none, jacobian, 0.0, True),
     )
     assert fit.precision.tolist() == [0.0, 16.0]
     covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag([12.0, 16.0]))

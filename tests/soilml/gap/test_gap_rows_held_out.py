@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of
 
 from soilml.errors import InputError
-from soilml.fitting.free_soil import fixed_parameters, free_soil_parameters
+from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.gap.design.run_options import LUG_EFFECTS, gear_changes
 from soilml.gap.evidence.held_out import split_holdout
 from soilml.io.table import Table

@@ -8,15 +8,9 @@ from soilml import Operating, identify
 from soilml.cli.tables import print_table_hints
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
-from soilml.fitting.channel_predictions import forces
-from soilml.fitting.coordinates import (
-    linearise,
-    predict_readings,
-    size_coordinate,
-    soil_coordinate,
-)
-from soilml.fitting.free_parameters import select_free
+from soilml.fitting.coordinates import select_free, size_coordinate
 from soilml.fitting.operating_points import operating_points
+from soilml.fitting.predictions import forces, linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
 from soilml.gap.candidate_effects import candidate_effects, with_effect
@@ -80,7 +74,7 @@ def test_rows_of_each_gear_are_predicted_by_its_own_model():
         at = Operating(slip=table["slip"][mine], load=table["load_N"][mine])
         np.testing.assert_array_equal(force.torque[mine], own.model(own.soil, at).torque)
         readings = stack_readings(case, table)
-        y = predict_readings(case, [], np.zeros((1, 0)), readings)[0]
+        y = predict(case, [], np.zeros((1, 0)), readings)[0]
         torque = y[readings.channel == readings.channels.index("torque")]
         np.testing.assert_array_equal(torque[mine], own.model(own.soil, at).torque)
 
@@ -91,12 +85,12 @@ def test_an_effect_of_one_gear_changes_the_rows_of_that_gear_alone():
     own = candidate_effects(case, EFFECTS)["grousers@lugged"]
     shared = candidate_effects(case, EFFECTS)["grousers"]
     on_lugged = np.asarray(readings.at.gear)[readings.row] == "lugged"
-    soil = [soil_coordinate(f) for f in select_free(case, None)]
+    soil = select_free(case, None)
     columns = []
     for effect in (own, shared):
         changed = with_effect(case, effect)
         coordinates = [*soil, size_coordinate(effect, None)]
-        columns.append(linearise(changed, coordinates, np.full(4, 0.5), readings)[1])
+        columns.append(linearise(changed, coordinates, np.full(4, 0.5), readings).jacobian)
     np.testing.assert_array_equal(columns[0][~on_lugged, 3], 0.0)
     np.testing.assert_array_equal(columns[0][on_lugged, 3], columns[1][on_lugged, 3])
     assert np.any(columns[1][~on_lugged, 3] != 0.0)
@@ -108,7 +102,7 @@ def test_an_own_effect_starts_from_the_shared_one_that_it_replaces():
     changed = with_effect(case, own)
     assert changed.parameters()["grousers@lugged.height"][1] == 0.01
     readings = stack_readings(case, rows(case))
-    before, after = (predict_readings(c, [], np.zeros((1, 0)), readings) for c in (case, changed))
+    before, after = (predict(c, [], np.zeros((1, 0)), readings) for c in (case, changed))
     np.testing.assert_array_equal(before, after)
 
 

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gap_sets import candidate, case_of, driven, fit_problem
+from gap_sets import candidate, case_of, driven, fit_problem, with_readings
 
 from soilml.gap.evidence.directions import Signature
 from soilml.gap.evidence.marginal_likelihood import Evidence
@@ -64,7 +64,7 @@ def test_an_effect_of_a_small_size_in_its_direction_gains_by_its_own_law(dug):
     none = candidate(problem, [], {})
     rng = np.random.default_rng(1)
     column = rng.standard_normal(len(problem.readings)) * problem.readings.std
-    exact = replace(soil, reading=soil.prediction + 0.2 * column)
+    exact = with_readings(soil, soil.prediction + 0.2 * column)
     signatures = [
         Signature(name, "soil", sign * column, side)
         for name, sign, side in (("up", 1, 1), ("down", 1, -1), ("any", 1, 0), ("turned", -1, 1))

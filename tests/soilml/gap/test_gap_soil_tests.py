@@ -7,9 +7,8 @@ import pytest
 
 from soilml import Case, Model, Operating, Table, Wheel, soil
 from soilml.config.measurement_noise import Noise
-from soilml.fitting.coordinates import soil_coordinate
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.soil_test_terms import SoilTestTerms
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.gap import audit, gap
 from soilml.gap.report.page import page
 from soilml.identification.bevameter import bevameter
@@ -121,7 +120,7 @@ def test_audit_knows_that_tests_hold_the_soil():
 
 def test_terms_of_a_fit_are_derivatives_of_deviations():
     case = replace(CASE, soil_tests=sand_tests())
-    coordinates = [soil_coordinate(f) for f in select_free(case, None)]
+    coordinates = select_free(case, None)
     terms, x = SoilTestTerms(case, coordinates), np.asarray([0.4, 0.5, 0.3, 0.6])
     steps = 1e-6 * np.eye(4)
     expected = (terms.deviation(x + steps) - terms.deviation(x - steps)).T / 2e-6

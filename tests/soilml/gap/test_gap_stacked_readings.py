@@ -7,8 +7,9 @@ import pytest
 from gap_sets import MODEL, case_of, driven
 
 from soilml.errors import InputError
-from soilml.fitting.readings import MOST_READINGS, check_size, stack_readings
+from soilml.fitting.readings import stack_readings, typical_std
 from soilml.gap.evidence.problem import _changed
+from soilml.gap.workflow import MOST_READINGS, _check_size
 from soilml.io.table import Table
 from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 
@@ -61,7 +62,7 @@ def test_a_table_without_a_reading_has_none():
     found = stacked(table)
     assert (len(found), found.channels, found.noise) == (0, (), ())
     assert found.row.size == found.channel.size == found.std.size == 0
-    assert (found.slip_std, found.load_std) == (0.0, 0.0)
+    assert found.slip_std.tolist() == found.load_std.tolist() == [0.0] * 5
 
 
 def test_levels_are_those_of_each_reading():
@@ -79,9 +80,15 @@ def test_levels_are_those_of_each_reading():
 def test_noise_that_is_not_positive_is_not_declared():
     found = stacked()
     assert found.std[:4] == pytest.approx([0.1, np.nan, np.nan, 0.5], nan_ok=True)
-    assert found.noise[0] is None and found.noise[1] == case_of().noise["sinkage_m"]
-    assert found.slip_std == pytest.approx(0.025)  # the median of 0.01, 0.02, 0.03 and 0.05
-    assert found.load_std == 0.0
+    noise = case_of().noise
+    assert found.noise == (noise["torque_Nm"], noise["sinkage_m"])
+    assert found.from_case.tolist() == [False] * 4 + [True] * 4  # the table has that of torque
+    assert found.slip_std.tolist() == [0.01, 0.02, 0.0, 0.03, 0.05]
+    assert typical_std(found.slip_std) == pytest.approx(0.025)  # the median of those above zero
+    assert not found.load_std.any() and typical_std(found.load_std) == 0.0
+    elsewhere = found.noise_at(2.0 * found.reading)
+    assert elsewhere[:4] == pytest.approx(found.std[:4], nan_ok=True)
+    assert elsewhere[4:] == pytest.approx(noise["sinkage_m"].std(2.0 * found.reading[4:]))
     usual = found.with_default_std({"torque": 0.7})
     assert usual.std[:4] == pytest.approx([0.1, 0.7, 0.7, 0.5])
     assert usual.std[4:].tolist() == found.std[4:].tolist()
@@ -118,7 +125,8 @@ def test_a_channel_of_unknown_noise_is_left_out_with_a_note():
     assert kept.noise == (found.noise[0], found.noise[2])
     assert set(kept.channel[:32]) == {0} and set(kept.channel[32:]) == {1}
     assert kept.reading.tolist() == found.reading[found.channel != 1].tolist()
-    assert note.startswith("drawbar_pull_N is excluded: its noise is not declared")
+    assert note.code == "unused-channel"
+    assert note.text.startswith("drawbar_pull_N is excluded: its noise is not declared")
     nothing = replace(found, std=np.full(len(found), np.nan))
     assert nothing.with_known_noise() == (nothing, [])
 
@@ -131,7 +139,7 @@ def test_readings_of_some_rows_are_numbered_anew():
     assert np.flatnonzero(selected).tolist() == [1, 3, 5]
     assert part.reading.tolist() == [2.0, 5.0, 0.02] and part.row.tolist() == [1, 0, 1]
     assert part.load.tolist() == [50.0, 80.0, 50.0] and part.run.tolist() == [0, 0]
-    assert part.order.tolist() == [1, 2]
+    assert part.order.tolist() == [1, 2] and part.slip_std.tolist() == [0.05, 0.02]
 
 
 @pytest.mark.parametrize("more, every", [(0, None), (1, 2), (MOST_READINGS, 2)])
@@ -139,10 +147,10 @@ def test_more_readings_than_fit_are_refused_with_what_to_leave_out(more, every):
     n = MOST_READINGS + more
     table = Table({"torque_Nm": np.ones(n), "sinkage_m": np.full(n, np.nan)}, source="runs.csv")
     if every is None:
-        check_size(table)
+        _check_size(table)
         return
     with pytest.raises(InputError, match=f"^runs.csv: {n} readings in {n} rows.* of {every}$"):
-        check_size(table)
+        _check_size(table)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import remark
 
-from soilml.fitting.coordinates import EffectCoordinate
+from soilml.fitting.coordinates import Coordinate
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.report.sentences import NOT_DECISIVE
@@ -42,9 +42,8 @@ REJECTED, KEPT = SimpleNamespace(p_value=1e-9), SimpleNamespace(p_value=0.5)
 
 
 def size(effect, is_shape=False):
-    return EffectCoordinate(
-        "n1", "1", -99.0, 99.0, Prior(0.0, 1.0), effect=effect, is_shape=is_shape
-    )
+    prior = Prior(0.0, 1.0)
+    return Coordinate(f"{effect}.n1", "1", prior, lower=-99.0, upper=99.0, is_shape=is_shape)
 
 
 def marginal(value, amplitude=(0.0, 0.0), coordinates=(), x=()):

@@ -201,14 +201,14 @@ def test_repeats_give_the_noise_by_their_degrees_of_freedom():
     values = [9.0, 11.0, 9.0, 11.0, 18.0, 22.0, 18.0, 22.0]
     given = stub(
         channels=("torque",), channel=np.zeros(8, dtype=int), reading=np.asarray(values),
-        std=np.full(8, np.nan), driven_alike=np.repeat([3, 7], 4),
+        std=np.full(8, np.nan), replicates=np.repeat([3, 7], 4),
     )  # fmt: skip
     noise, notes = checks.estimate_repeat_noise(given)
     assert noise == {"torque": pytest.approx(np.sqrt(20.0 / 6.0))}
     assert texts(notes) == [
         "noise of torque_Nm is not declared: 1.83 was estimated from repeated rows"
     ]  # fmt: skip
-    few = stub(**vars(given) | {"driven_alike": np.asarray([3, 3, 3, 3, 7, 7, 7, 8])})
+    few = stub(**vars(given) | {"replicates": np.asarray([3, 3, 3, 3, 7, 7, 7, 8])})
     assert checks.estimate_repeat_noise(few) == ({}, [])
     equal = stub(**vars(given) | {"reading": np.repeat([9.0, 18.0], 4)})
     noise, notes = checks.estimate_repeat_noise(equal)

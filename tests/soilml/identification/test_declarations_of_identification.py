@@ -12,11 +12,11 @@ import pytest
 
 import soilml.identification
 from soilml.fitting import levels
-from soilml.fitting.shared_errors_effect import ModelledErrors
-from soilml.fitting.shared_errors_sizes import (
+from soilml.fitting.shared_errors import (
     PULL_OFFSET_SHARE,
     USUAL_MODEL_ERRORS,
     USUAL_SENSOR_ERRORS,
+    ModelledErrors,
 )
 from soilml.identification.fixed_parameter import SIDES
 from soilml.identification.posterior import INTERVAL

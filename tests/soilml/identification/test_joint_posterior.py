@@ -7,8 +7,8 @@ import pytest
 
 from datagen.recipe import read_recipe
 from soilml import Operating, Table, identify
-from soilml.fitting.shared_errors_sizes import usual_errors
-from soilml.identification import read_observations, select_free
+from soilml.fitting.shared_errors import usual_errors
+from soilml.identification import select_free, usable_readings
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.quantities import SHEAR
 
@@ -53,7 +53,7 @@ def test_soil_and_usual_errors_are_sampled_as_by_a_markov_chain(channels):
     table = Table(rows)
     fit = identify(case, table, SHEAR, "posterior", as_usual=True)
 
-    data, free = read_observations(case, table), select_free(case, SHEAR)
+    data, free = usable_readings(case, table), select_free(case, SHEAR)
     data = replace(data, shared_errors=usual_errors(case, data.load, [f.path for f in free]))
     density = PosteriorDensity(case, data, free)
 

@@ -7,7 +7,7 @@ from soilml.fitting.levels import (
     covariate_levels,
     is_one_load,
     load_levels,
-    rows_driven_alike,
+    replicate_rows,
     slip_levels,
 )
 from soilml.physics.operating_point import Operating
@@ -98,14 +98,14 @@ def test_rows_are_driven_alike_where_all_that_is_set_agrees():
         load=np.asarray([60.0, 61.0, 60.5, 90.0, 60.0]),
         speed=np.asarray([0.05, 0.05, -0.05, 0.05, 0.05]),
     )
-    group = rows_driven_alike(at)
+    group = replicate_rows(at)
     assert group[0] == group[1]
     assert len(set(group.tolist())) == 4
 
 
 def test_rows_of_a_range_are_alike_only_where_they_are_close():
     load = np.linspace(13.0, 30.0, 64)
-    group = rows_driven_alike(Operating(slip=np.full(64, 0.3), load=load))
+    group = replicate_rows(Operating(slip=np.full(64, 0.3), load=load))
     widths = [np.ptp(np.log(load[group == i])) for i in range(group.max() + 1)]
     assert max(widths) <= 0.0501 and group.max() > 10
 
@@ -117,6 +117,6 @@ def test_rows_of_different_gears_or_passes_are_no_repeats():
         gear=np.asarray(["wide", "lugged", "wide", "wide", "wide"]),
         pass_number=np.asarray([1.0, 1.0, 1.0, 2.0, 1.0]),
     )
-    found = rows_driven_alike(at, np.arange(5))
+    found = replicate_rows(at, np.arange(5))
     assert found.dtype == np.int64
     assert found[0] == found[2] and len(set(found.tolist())) == 4

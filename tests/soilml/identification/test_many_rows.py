@@ -1,4 +1,4 @@
-"""Tables of many rows: rows that were driven alike become one, with the same answer."""
+"""Tables of many rows: near replicates become one, with the same answer."""
 
 from dataclasses import replace
 
@@ -10,10 +10,10 @@ from soilml import identification, identify
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
 from soilml.experiment_design import samples_of_rows
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
-from soilml.identification import condensed_rows
-from soilml.identification.cells import cells_of
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.usable_readings import usable_readings
+from soilml.identification import condensing as condensing_rows
+from soilml.identification.condensing import cells_of
 from soilml.io.table import Table
 from soilml.remarks import texts
 from soilml.traction.soil_draws import posterior_draws
@@ -29,15 +29,15 @@ def case(tmp_path):
 @pytest.fixture
 def condensing(monkeypatch):
     """Tables are condensed from a thousand rows on, into few."""
-    monkeypatch.setattr(condensed_rows, "MOST_ROWS", 1000)
-    monkeypatch.setattr(condensed_rows, "CELLS", 400)
-    monkeypatch.setattr(condensed_rows, "FIRST_ROWS", 300)
+    monkeypatch.setattr(condensing_rows, "MOST_ROWS", 1000)
+    monkeypatch.setattr(condensing_rows, "CELLS", 400)
+    monkeypatch.setattr(condensing_rows, "FIRST_ROWS", 300)
 
 
 def both(monkeypatch, case, table, **options):
     """The fit of condensed rows, and that of all."""
     condensed = identify(case, table, **options)
-    monkeypatch.setattr(condensed_rows, "MOST_ROWS", len(table))
+    monkeypatch.setattr(condensing_rows, "MOST_ROWS", len(table))
     return condensed, identify(case, table, **options)
 
 
@@ -95,30 +95,36 @@ def test_residuals_within_the_cells_count_as_misfit(case, condensing):
 
 def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condensing):
     table = measured(case, np.random.default_rng(15), ROWS)
-    data = read_observations(case, table)
-    few = condensed_rows.condensed(case, data, select_free(case, None))
-    assert len(few.slip) == condensed_rows.CELLS
+    data = usable_readings(case, table)
+    few = condensing_rows.condensed(case, data, select_free(case, None))
+    assert len(few.row_slip) == condensing_rows.CELLS
     assert few.reading_count == data.reading_count == 3 * ROWS
-    for channel, own in zip(few.channels, data.channels, strict=True):
-        assert (channel.std**-2.0).sum() == pytest.approx((own.std**-2.0).sum(), rel=0.01)
+    assert few.channels == data.channels
+    for i in range(3):
+        all_std = data.noise_at(data.reading)
+        weights = [
+            (std[one.channel == i] ** -2.0).sum() for one, std in ((few, few.std), (data, all_std))
+        ]
+        assert weights[0] == pytest.approx(weights[1], rel=0.01)
 
 
 def test_rows_without_equilibrium_stay(case, condensing):
     table = measured(case, np.random.default_rng(16), ROWS)
     load = np.where(np.arange(ROWS) == 5, 1e6, table["load_N"])
     columns = {name: table[name] for name in table.columns} | {"load_N": load}
-    data = read_observations(case, Table(columns))
+    data = usable_readings(case, Table(columns))
     known = case.with_values({"cohesion": 500.0})
     cell = np.arange(ROWS) // 20
-    few = condensed_rows._condensed_at(known, data, condensed_rows._residuals(known, data), cell)
-    assert len(few.slip) == ROWS // 20 + 1
-    assert few.load[-1] == 1e6
-    assert few.channels[0].reading[-1] == data.channels[0].reading[5]
+    few = condensing_rows._condensed_at(known, data, *condensing_rows._residuals(known, data), cell)
+    assert len(few.row_slip) == ROWS // 20 + 1
+    assert few.row_load[-1] == 1e6
+    first = few.reading[few.channel == 0]
+    assert first[-1] == data.reading[data.channel == 0][5]
 
 
 def test_few_rows_are_left_as_they_are(case):
-    data = read_observations(case, measured(case, np.random.default_rng(17), 20))
-    assert condensed_rows.condensed(case, data, select_free(case, None)) is data
+    data = usable_readings(case, measured(case, np.random.default_rng(17), 20))
+    assert condensing_rows.condensed(case, data, select_free(case, None)) is data
 
 
 def test_closed_forms_refuse_more_rows_than_they_hold(case, monkeypatch):
@@ -147,13 +153,13 @@ def test_cells_are_divided_where_rows_scatter_and_groups_stay_apart():
 @pytest.mark.slow
 def test_advice_and_pull_rest_on_condensed_rows(case, condensing, monkeypatch):
     """Samples of soil of the same mean and spread as those of all rows."""
-    data = read_observations(case, measured(case, np.random.default_rng(4), ROWS))
+    data = usable_readings(case, measured(case, np.random.default_rng(4), ROWS))
     free, found = select_free(case, None), {}
     for name in ("condensed", "all"):
         samples = samples_of_rows(case, data, free)
         draws = posterior_draws(case, data, free).draws.values
         found[name] = samples.remaining_fraction, draws.mean(axis=0), draws.std(axis=0)
-        monkeypatch.setattr(condensed_rows, "MOST_ROWS", ROWS)
+        monkeypatch.setattr(condensing_rows, "MOST_ROWS", ROWS)
     (left, mean, std), (all_left, all_mean, all_std) = found.values()
     assert not np.array_equal(mean, all_mean)  # not the same computation
     np.testing.assert_allclose(left, all_left, rtol=0.2)

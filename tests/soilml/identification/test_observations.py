@@ -6,7 +6,7 @@ from conftest import MODEL
 
 from soilml import Operating, identify, read_case
 from soilml.errors import FitError, TableError
-from soilml.fitting.observations import read_observations
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.remarks import texts
@@ -38,7 +38,7 @@ def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
     std = np.full(12, 0.05)
     std[0] = np.nan
     shaky = changed(table, slip_std=std, load_N_std=0.2 * table["load_N"])
-    data = read_observations(case, shaky)
+    data = usable_readings(case, shaky)
     assert data.slip_std.tolist() == [0.0, *[0.05] * 11]
     assert (data.load_std > 0).all()
     assert (identify(case, shaky, SHEAR).std > 1.5 * plain.std).all()

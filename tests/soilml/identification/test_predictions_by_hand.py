@@ -4,27 +4,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from channel_readings import channel_readings
 from scipy.stats import multivariate_normal
 
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError
-from soilml.fitting.channel_predictions import (
-    _with_input_error,
-    linearise,
-    noise_at_prediction,
-    predict_channels,
-    propagated_input_noise,
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.covariance import discrepancy_process, noise_of_operation, sensor_columns
+from soilml.fitting.predictions import linearise, predict_channels
+from soilml.fitting.shared_errors import (
+    ModelledErrors,
+    errors_at,
+    usual_errors,
+    with_modelled_errors,
+    without_errors,
 )
-from soilml.fitting.declared_discrepancy import discrepancy_columns, stacked_columns
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import Channel, Observations, read_observations
-from soilml.fitting.shared_errors_effect import ModelledErrors
-from soilml.fitting.shared_errors_modelled import errors_at, with_modelled_errors
-from soilml.fitting.shared_errors_sensor_columns import sensor_columns
-from soilml.fitting.shared_errors_sizes import usual_errors, without_errors
-from soilml.identification.posterior_density import PosteriorDensity
+from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.posterior_density import PosteriorDensity, _stacked
 from soilml.io.table import Table
 from soilml.physics.gears import GEARS
 from soilml.physics.gears.rigid_wheel import WheelArc
@@ -38,15 +36,13 @@ def case(model_file):
     return read_case(model_file)
 
 
-def rows_of(case, **changes):
+def rows_of(case, torque_std=0.05, **changes):
     """Torque in all rows, sinkage in the last three."""
-    force = case.model(case.soil, Operating(slip=SLIP, load=LOAD))
-    torque = Channel("torque", np.asarray(force.torque), np.full(4, 0.05), True)
-    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
-    sinkage = Channel("sinkage", depth, np.full(4, 0.001), True)
     at = Operating(slip=SLIP, load=LOAD)
-    data = Observations(at, np.zeros(4), np.zeros(4), (torque, sinkage), ())
-    return replace(data, **changes)
+    force = case.model(case.soil, at)
+    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
+    channels = {"torque": (np.asarray(force.torque), torque_std), "sinkage": (depth, 0.001)}
+    return channel_readings(at, channels, **changes)
 
 
 def test_relative_noise_is_that_of_the_prediction_and_given_noise_stays(case):
@@ -54,10 +50,11 @@ def test_relative_noise_is_that_of_the_prediction_and_given_noise_stays(case):
     noise = Noise(constant=0.1, share=0.1)
     own = noise.std(torque)
     own[1] = 0.7  # as the table gives it
-    known = replace(case, noise={"torque_Nm": noise})
-    channels = (Channel("torque", torque, own, True), Channel("sinkage", *2 * (np.ones(4),), True))
+    channels = {"torque": (torque, own), "sinkage": (np.ones(4), np.ones(4))}
+    rows = channel_readings(Operating(slip=SLIP, load=LOAD), channels, noise=(noise, None))
+    rows = replace(rows, from_case=rows.std != 0.7)
     prediction = np.asarray([[2.0, 3.0, 5.0, *4 * (9.0,)], [np.nan, 3.0, 1.0, *4 * (8.0,)]])
-    found = noise_at_prediction(known, rows_of(case, channels=channels), prediction)
+    found = rows.noise_at(prediction)
     expected = [[*noise.std(np.asarray([2.0, 0, 5.0])), 1], [own[0], 0, float(noise.std(1.0)), 1]]
     expected[0][1] = expected[1][1] = 0.7
     np.testing.assert_allclose(found[0], [*expected[0][:3], 1, 1, 1, 1], rtol=1e-12)
@@ -68,7 +65,8 @@ def test_noise_of_slip_and_load_is_the_slope_times_its_size(case):
     at, free = Operating(slip=SLIP, load=LOAD), select_free(case, ["cohesion"])
     u, small = np.asarray([0.3]), 1e-4
     slip_std, load_std = np.asarray([0.01, 0.0, 0.02, 0.01]), np.asarray([0.5, 1.0, 0.0, 2.0])
-    found = propagated_input_noise(case, free, u, at, slip_std, load_std)
+    rows = channel_readings(at, {"torque": (np.ones(4), 1.0)}, slip_std=slip_std, load_std=load_std)
+    found = noise_of_operation(case, rows, free, u)
 
     def torque(slip, load):
         return predict_channels(case, free, u[None], replace(at, slip=slip, load=load))["torque"]
@@ -76,19 +74,21 @@ def test_noise_of_slip_and_load_is_the_slope_times_its_size(case):
     by_slip = (torque(SLIP + small, LOAD) - torque(SLIP - small, LOAD)) / (2 * small)
     by_load = (torque(SLIP, LOAD + small) - torque(SLIP, LOAD - small)) / (2 * small)
     expected = np.hypot(by_slip * slip_std, by_load * load_std)
-    np.testing.assert_allclose(found["torque"], expected, rtol=2e-3)
-    none = propagated_input_noise(case, free, u, at, np.zeros(4), np.zeros(4))
-    assert not any(values.any() for values in none.values())
-    kept = _with_input_error(at, "slip", np.asarray([2.0, -2.0, 0.1, 0.0]), SLIP, LOAD)
-    assert kept.slip.tolist() == pytest.approx([0.999, -0.999, 0.6, 0.2])
-    kept = _with_input_error(at, "load", np.asarray([-99.0, 99.0, 1.0, 0.0]), SLIP, LOAD)
-    assert kept.load.tolist() == pytest.approx([0.03, 120.0, 91.0, 120.0])
+    np.testing.assert_allclose(found, expected[0], rtol=2e-3)
+    none = replace(rows, slip_std=np.zeros(4), load_std=np.zeros(4))
+    assert not noise_of_operation(case, none, free, u).any()
+    # rows are moved only as far as the model reaches
+    wild = replace(rows, slip_std=np.full(4, 3.0), load_std=3.0 * LOAD)
+    by_slip = torque(np.full(4, 0.999), LOAD) - torque(np.full(4, -0.999), LOAD)
+    by_load = torque(SLIP, 2.0 * LOAD) - np.nan_to_num(torque(SLIP, 1e-3 * LOAD))
+    expected = np.hypot(by_slip, by_load)
+    np.testing.assert_allclose(noise_of_operation(case, wild, free, u), expected[0], rtol=1e-9)
 
 
 def test_a_jacobian_is_that_of_differences_and_points_away_from_a_bound(case):
     free, data = select_free(case, None), rows_of(case)
     for u in (np.asarray([0.3, 0.6, 0.5]), np.ones(3), np.zeros(3)):
-        found = linearise(case, data, free, u)
+        found = linearise(case, free, u, data)
         for i in range(3):
             h = 1e-4 * np.eye(3)[i] * (1.0 if u[i] < 1.0 else -1.0)
             ends = np.stack([u + h, u + 2.0 * h])
@@ -96,9 +96,9 @@ def test_a_jacobian_is_that_of_differences_and_points_away_from_a_bound(case):
             y = np.hstack([y["torque"], y["sinkage"][:, 1:]])
             slope = (4.0 * y[0] - y[1] - 3.0 * found.prediction) / (2.0 * h[i])
             np.testing.assert_allclose(found.jacobian[:, i], slope, rtol=2e-3, atol=1e-5)
-        moved = found.sinkage_at(u * 0.999 + 0.0005)
-        np.testing.assert_allclose(moved.log_sinkage, found.log_sinkage, atol=1e-2)
-    assert found.rate.shape == (3, 4) and found.slope.shape == (4,)
+        moved = found.sinkage_at((0.0005 - u * 0.001)[None, :])
+        np.testing.assert_allclose(moved.log_sinkage[0], found.log_sinkage, atol=1e-2)
+    assert found.log_sinkage_rate.shape == (3, 4) and found.slope.shape == (4,)
 
 
 def test_gains_and_offsets_change_the_readings_of_their_sensor_alone(case):
@@ -115,24 +115,25 @@ def test_gains_and_offsets_change_the_readings_of_their_sensor_alone(case):
     ]
     np.testing.assert_allclose(found, np.stack(expected, axis=-1))
     assert sensor_columns(rows_of(case, shared_errors={"slip_bias": 1.0}), y) is None
-    pull = Channel("drawbar_pull", np.asarray([1.0, np.nan, 2.0, 3.0]), np.ones(4), True)
+    pull = {"drawbar_pull": (np.asarray([1.0, np.nan, 2.0, 3.0]), 1.0)}
     errors = {"drawbar_pull": 0.02, "drawbar_pull_bias": 0.6}
-    found = sensor_columns(rows_of(case, channels=(pull,), shared_errors=errors), y[:1, :3])
+    rows = channel_readings(Operating(slip=SLIP, load=LOAD), pull, shared_errors=errors)
+    found = sensor_columns(rows, y[:1, :3])
     np.testing.assert_allclose(found[0, :, 0], 0.02 * LOAD[[0, 2, 3]])
     np.testing.assert_allclose(found[0, :, 1], 0.6)
 
 
 def test_errors_of_the_model_become_parameters_behind_those_of_the_soil(case):
-    data = rows_of(case, shared_errors={"slip_bias": 0.015, "torque_gain": 0.1, "bearing": 0.4})
+    errors = {"slip_bias": 0.015, "torque_gain": 0.1, "bearing": 0.4}
     free = select_free(case, None)
-    changed, every = with_modelled_errors(case, data, free)
+    changed, every = with_modelled_errors(case, errors, LOAD, free)
     assert [f.path for f in every[3:]] == ["modelled-errors.slip_bias", "modelled-errors.bearing"]
     assert every[4].prior.lower == -1.6 and every[4].prior.upper == 1.6
     assert every[4].nominal == 0.0 and not every[4].assumed and every[4].normal_std == 0.4
     assert changed.model.effects[-1].typical_load == 75.0
     u = np.asarray([[0.1, 0.2, 0.3, 0.5, 0.75], [0.1, 0.2, 0.3, 0.0, 1.0]])
     np.testing.assert_allclose(errors_at(every, u), [[0.0, 2.0], [-4.0, 4.0]], atol=1e-12)
-    assert with_modelled_errors(case, rows_of(case), free) == (case, free)
+    assert with_modelled_errors(case, {}, LOAD, free) == (case, free)
 
 
 def test_errors_of_slip_bearing_and_contact_are_as_written(case):
@@ -181,13 +182,9 @@ def test_the_log_density_is_that_of_a_normal_with_noise_and_shared_errors(case):
     wide = Discrepancy(constant=0.1, slip_length=0.2, log_load_length=0.5)
     known = replace(case, discrepancy={"torque_Nm": wide}, noise={"torque_Nm": Noise(0.01, 0.05)})
     data = rows_of(case, shared_errors={"torque_gain": 0.1, "slip_bias": 0.02})
-    data = replace(
-        data,
-        channels=(
-            replace(data.channels[0], std=known.noise["torque_Nm"].std(data.channels[0].reading)),
-            data.channels[1],
-        ),
-    )
+    noise = known.noise["torque_Nm"]
+    std = np.where(data.channel == 0, noise.std(data.reading), data.std)
+    data = replace(data, std=std, noise=(noise, None))
     density = PosteriorDensity(known, data, select_free(known, None), noise_scale=1.5)
     assert density.errors == 1
     u = np.asarray([[0.3, 0.5, 0.6, 0.5], [0.6, 0.4, 0.3, 0.6], [0.5, 0.5, 0.5, 0.3]])
@@ -200,8 +197,9 @@ def test_the_log_density_is_that_of_a_normal_with_noise_and_shared_errors(case):
         covariance[:4, :4] += 0.1**2 * np.exp(-0.5 * far)
         gain = np.where(np.arange(7) < 4, 0.1 * prediction, 0.0)
         covariance += np.outer(gain, gain)
-        reading = np.hstack([data.channels[0].reading, data.channels[1].reading[1:]])
-        log = multivariate_normal(np.zeros(7), 1.5**2 * covariance).logpdf(prediction - reading)
+        log = multivariate_normal(np.zeros(7), 1.5**2 * covariance).logpdf(
+            prediction - data.reading
+        )
         error = 8.0 * (one[3] - 0.5)
         expected.append(log - 0.5 * error**2 / 1.5**2)
     found = density(u)
@@ -210,21 +208,23 @@ def test_the_log_density_is_that_of_a_normal_with_noise_and_shared_errors(case):
     assert len(part.reading) == 2 + 2 + 1 and part.columns[0].shape[0] == 2
     assert density(np.zeros((0, 4))).shape == (0,)
     with pytest.raises(FitError, match=r"needs the noise of sinkage_m: .*sinkage_m = '3 %'"):
-        undeclared = replace(data.channels[1], declared=False)
-        PosteriorDensity(case, replace(data, channels=(undeclared,)), select_free(case, None))
+        undeclared = replace(data, std=np.where(data.channel == 1, np.nan, data.std))
+        PosteriorDensity(case, undeclared, select_free(case, None))
 
 
 def test_columns_of_a_discrepancy_have_its_covariance_by_channel_and_gear(case):
     own = Discrepancy(constant=0.3, slip_length=0.2, log_load_length=0.5)
     at = Operating(slip=SLIP, load=LOAD, gear=np.asarray(["a", "b", "a", "a"]))
     data = rows_of(case, at=at)
-    torque, sinkage = discrepancy_columns(replace(case, discrepancy={"torque_Nm": own}), data)
-    assert sinkage.shape == (3, 0)
+    process = discrepancy_process(data, {"torque_Nm": own}, Discrepancy(), 1e-6)
+    assert not process.columns[data.channel == 1].any() and (process.channel == 0).all()
+    torque = process.columns[data.channel == 0]
+    assert process.usual.tolist() == [0.3, 0.0]
     points = np.stack([SLIP / 0.2, np.log(LOAD) / 0.5])
     far = ((points[:, :, None] - points[:, None, :]) ** 2).sum(axis=0)
     same = at.gear[:, None] == at.gear
     np.testing.assert_allclose(torque @ torque.T, 0.09 * np.exp(-0.5 * far) * same, atol=2e-4)
-    joined = stacked_columns([torque, np.ones((3, 2))])
+    joined = _stacked([torque, np.ones((3, 2))])
     assert joined.shape == (7, torque.shape[1] + 2)
     np.testing.assert_array_equal(joined[:4, :-2], torque)
     assert not joined[:4, -2:].any() and not joined[4:, :-2].any() and joined[4:, -2:].all()
@@ -233,12 +233,13 @@ def test_columns_of_a_discrepancy_have_its_covariance_by_channel_and_gear(case):
 def test_standard_deviations_of_a_table_stand_before_those_of_the_case(case):
     columns = {"slip": SLIP, "load_N": LOAD, "torque_Nm": np.asarray([1.0, 2.0, 3.0, 4.0])}
     given = Table(columns | {"torque_Nm_std": np.asarray([0.5, np.nan, 0.0, 0.7])})
-    data = read_observations(replace(case, noise={"torque_Nm": Noise(share=0.1)}), given)
-    np.testing.assert_allclose(data.channels[0].std, [0.5, 0.2, 0.5, 0.7])  # 0 by the median
+    data = usable_readings(replace(case, noise={"torque_Nm": Noise(share=0.1)}), given)
+    np.testing.assert_allclose(data.std, [0.5, 0.2, 0.5, 0.7])  # 0 by the median
     assert data.notes[0].text.endswith("standard deviation 0 replaced by the column's median 0.5")
     assert data.row_count == data.reading_count == 4 and data.squares_within == 0.0
-    part = data.of_rows(np.asarray([2, 0]))
-    assert part.slip.tolist() == [0.5, 0.1] and part.channels[0].reading.tolist() == [3.0, 1.0]
+    assert data.from_case.tolist() == [False, True, False, False]
+    part = data.of_rows(np.asarray([0, 2]))[1]
+    assert part.row_slip.tolist() == [0.1, 0.5] and part.reading.tolist() == [1.0, 3.0]
     zeros = Table(columns | {"torque_Nm_std": np.zeros(4)})
     with pytest.raises(FitError, match="row 1, column torque_Nm: standard deviation 0"):
-        read_observations(replace(case, noise={}), zeros)
+        usable_readings(replace(case, noise={}), zeros)

@@ -5,10 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from channel_readings import channel_readings
 
 from soilml import Operating
-from soilml.fitting import soil_test_remarks
-from soilml.identification import condensed_rows, joint_sample
+from soilml.fitting import soil_tests
+from soilml.identification import condensing, joint_sample
 from soilml.identification.bevameter import reduced_tests
 from soilml.identification.bevameter.reduced_tests import pressure_test, strength_test
 from soilml.numerics.importance_sampling import ImportanceSample
@@ -77,14 +78,15 @@ def test_a_strength_is_that_under_the_mean_stress_and_no_two_places_are_alike():
 
 
 def test_a_test_of_the_soil_is_remarked_on_from_two_and_a_half_sigma():
-    assert soil_test_remarks.NOTABLE == 2.5
+    assert soil_tests.NOTABLE == 2.5
 
 
 def test_rows_are_alike_by_slip_and_log_load_over_their_spreads_and_by_their_noise():
     slip, load = np.asarray([0.1, 0.3, 0.5, 0.2]), np.asarray([30.0, 60.0, 90.0, 120.0])
-    residual = SimpleNamespace(std=np.asarray([0.1, np.nan, 0.3, 0.1]))
+    std = np.asarray([0.1, np.nan, 0.3, 0.1])
     at = Operating(slip=slip, load=load, speed=np.full(4, 0.1))
-    found = condensed_rows._coordinates(at, [residual])
+    readings = channel_readings(at, {"torque": (np.where(np.isnan(std), np.nan, 1.0), std)})
+    found = condensing._coordinates(readings, readings.std)
     logs = np.log([0.1, 0.3, 0.1])
     expected = [
         slip / slip.std(),

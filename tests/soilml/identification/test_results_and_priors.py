@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from channel_readings import channel_readings
 
 from soilml import identify, read_case
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError, InputError
-from soilml.fitting.free_parameters import FreeParameter, select_free, values_at
-from soilml.fitting.observations import Channel, Observations
-from soilml.identification.diagnostics import at_prior_bound, with_warnings
-from soilml.identification.fit_result import Fit
+from soilml.fitting.coordinates import Coordinate, rates_at, select_free, values_at
+from soilml.identification.fit import Fit, at_prior_bound, with_warnings
 from soilml.identification.fixed_parameter import with_fixed_parameter
 from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
 from soilml.io.table import Table
@@ -42,8 +41,7 @@ def fit_of(**changes):
 def rows_of(load=(30.0, 60.0, 120.0), **changes):
     n = len(load)
     at = Operating(slip=np.linspace(0.1, 0.5, n), load=np.asarray(load))
-    channel = Channel("torque", np.ones(n), np.full(n, 0.1), True)
-    return replace(Observations(at, np.zeros(n), np.zeros(n), (channel,), ()), **changes)
+    return channel_readings(at, {"torque": (np.ones(n), 0.1)}, **changes)
 
 
 @pytest.fixture
@@ -138,12 +136,12 @@ def test_unknown_or_no_parameters_are_refused(case):
 
 def test_values_and_rates_at_fractions_are_those_of_the_priors():
     priors = [Prior(1.0, 3.0), Prior(0.01, 1.0, log=True)]
-    free = [FreeParameter(str(i), "1", p, 1.0, False) for i, p in enumerate(priors)]
-    values, rates = values_at(free, np.asarray([0.25, 0.5]))
-    np.testing.assert_allclose(values, [1.5, 0.1])
-    np.testing.assert_allclose(rates, [2.0, 0.1 * np.log(100.0)])
+    free = [Coordinate(str(i), "1", p, 1.0, False) for i, p in enumerate(priors)]
+    x = np.asarray([0.25, 0.5])
+    np.testing.assert_allclose(values_at(free, x), [1.5, 0.1])
+    np.testing.assert_allclose(rates_at(free, x), [2.0, 0.1 * np.log(100.0)])
     assert free[0].fraction_precision == 12.0
-    error = FreeParameter("e", "1", Prior(-4.0, 4.0), 0.0, False, normal_std=0.5)
+    error = Coordinate("e", "1", Prior(-4.0, 4.0), 0.0, False, normal_std=0.5)
     assert error.fraction_precision == pytest.approx((8.0 / 0.5) ** 2)
 
 
@@ -209,8 +207,7 @@ def test_few_readings_trade_offs_and_excess_are_said(case):
     unsure = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.1)})
     said = warned(unsure, fit_of(misfit=9.0), rows_of(), excess=True)
     assert said[0].startswith("residuals are 3.0 times the declared noise and discrepancy: ")
-    undeclared = replace(rows_of().channels[0], declared=False)
-    rows = rows_of(channels=(undeclared,), excluded_channels=("sinkage_m",))
+    rows = rows_of(std=np.full(3, np.nan), excluded_channels=("sinkage_m",))
     said = warned(case, fit_of(), rows, undeclared=True)
     assert said[0].startswith("noise of torque_Nm is not declared: estimated from the residuals")
     assert said[1] == "sinkage_m is not used: its noise is not declared in [noise]"
@@ -283,7 +280,7 @@ def test_a_small_effective_sample_size_is_said():
 
 def test_the_misfit_counts_squares_within_condensed_rows():
     class Density:
-        class data:  # noqa: N801
+        class readings:  # noqa: N801
             squares_within, reading_count = 3.0, 8
 
         @staticmethod

@@ -7,7 +7,7 @@ import pytest
 
 from soilml import read_case
 from soilml.errors import TableError
-from soilml.fitting.rover_rows import with_rover_columns
+from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 
 # the first rear wheel overlaps the rut of the front wheel, 0.11 m beside it; the second is narrower

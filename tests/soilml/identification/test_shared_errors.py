@@ -10,11 +10,10 @@ from soilml import Operating, identify, read_case
 from soilml.cli import main
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import read_observations
-from soilml.fitting.shared_errors_effect import ModelledErrors
-from soilml.fitting.shared_errors_sensor_columns import sensor_columns
-from soilml.fitting.shared_errors_sizes import usual_errors
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.covariance import sensor_columns
+from soilml.fitting.shared_errors import ModelledErrors, usual_errors
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import joint_sample
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
@@ -98,7 +97,7 @@ def test_errors_far_from_zero_leave_what_integration_of_the_model_gives(case, me
     true = predicted(np.asarray([3000.0]), np.asarray([error]))
     rows = {key: y[0] + std[key] * rng.standard_normal(y.shape[1]) for key, y in true.items()}
     table = Table({"slip": SLIPS, "load_N": LOADS, **rows})
-    data = replace(read_observations(case, table), shared_errors={"bearing": 0.4})
+    data = replace(usable_readings(case, table), shared_errors={"bearing": 0.4})
     fit = method(case, data, select_free(case, None))
     grid = np.meshgrid(np.linspace(2010.0, 3990.0, 100), np.linspace(-1.6, 1.6, 80), indexing="ij")
     cohesion, e = (axis.ravel() for axis in grid)
@@ -137,7 +136,7 @@ def test_gains_offsets_and_errors_that_grow_with_slip_are_columns(case):
     slip, load, reading = [0.1, -0.4, 0.5], [40.0, 70.0, 110.0], [2.0, np.nan, 3.0]
     columns = {"slip": slip, "load_N": load, "torque_Nm": reading, "drawbar_pull_N": reading}
     table = Table({name: np.asarray(values) for name, values in columns.items()})
-    data = read_observations(case, table)
+    data = usable_readings(case, table)
     prediction = np.asarray([[1.0, 2.0, 8.0, 9.0]])  # two torques, two pulls
     errors = {"torque_by_slip": 0.1, "torque_bias": 0.2, "drawbar_pull": 0.02}
     errors |= {"drawbar_pull_by_slip": 0.3, "sinkage_by_slip": 9.0, "bearing": 0.4}
@@ -243,7 +242,7 @@ def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, mon
     solved, predict = [], PosteriorDensity.predict
 
     def counted(density, u):
-        solved.append(len(u) * len(density.data.slip))
+        solved.append(len(u) * len(density.readings.row_slip))
         return predict(density, u)
 
     monkeypatch.setattr(PosteriorDensity, "predict", counted)

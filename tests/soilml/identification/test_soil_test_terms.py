@@ -10,12 +10,9 @@ from soilml.config.measurement_noise import Noise
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.experiment_design import samples_of_prior
-from soilml.fitting.free_parameters import (
-    select_free,
-    soil_test_deviations,
-    soil_test_rates,
-)
-from soilml.fitting.observations import read_observations
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.soil_tests import SoilTestTerms
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.prior import Prior
@@ -67,10 +64,11 @@ def test_derivatives_of_deviations_are_those_of_differences():
     case = a_case(prior=priors, soil_tests=(PLATE, SHEAR))
     free, u = select_free(case, None), np.linspace(0.3, 0.7, 6)
     steps = 1e-6 * np.eye(6)
-    ends = [soil_test_deviations(case, free, u + side * steps) for side in (1.0, -1.0)]
+    terms = SoilTestTerms(case, free)
+    ends = [terms.deviation(u + side * steps) for side in (1.0, -1.0)]
     expected = ((ends[0] - ends[1]) / 2e-6).T
-    np.testing.assert_allclose(soil_test_rates(case, free, u), expected, rtol=1e-5, atol=1e-7)
-    assert not soil_test_rates(case, free, u)[:, 5].any()  # K takes no part in either test
+    np.testing.assert_allclose(terms.rates(u), expected, rtol=1e-5, atol=1e-7)
+    assert not terms.rates(u)[:, 5].any()  # K takes no part in either test
 
 
 def test_model_file_keeps_tests_and_takes_units(tmp_path):
@@ -110,7 +108,7 @@ def test_wrong_tests_are_refused(tmp_path, lines, message):
 def test_posterior_with_a_test_is_that_of_a_grid():
     case = a_case(soil_tests=(SHEAR,))
     table = some_rows(case)
-    data, free = read_observations(case, table), select_free(case, None)
+    data, free = usable_readings(case, table), select_free(case, None)
     middle = (np.arange(120) + 0.5) / 120
     u = np.stack(np.meshgrid(middle, middle, indexing="ij"), axis=-1).reshape(-1, 2)
     values = np.stack([f.prior.at(u[:, i]) for i, f in enumerate(free)], axis=1)
@@ -161,9 +159,9 @@ def test_draws_of_the_prior_follow_tests():
     case = a_case(soil_tests=(SHEAR,))
     free = select_free(case, None)
     u = prior_fractions(free, 400, np.random.default_rng(0), case)
-    z = soil_test_deviations(case, free, u)[:, 0]
+    z = SoilTestTerms(case, free).deviation(u)[:, 0]
     loose = prior_fractions(free, 20000, np.random.default_rng(1))
-    every = soil_test_deviations(case, free, loose)[:, 0]
+    every = SoilTestTerms(case, free).deviation(loose)[:, 0]
     weights = np.exp(-0.5 * every**2)
     mean = np.average(every, weights=weights)
     std = np.sqrt(np.average((every - mean) ** 2, weights=weights))

@@ -6,13 +6,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from channel_readings import channel_readings
 
 from soilml import Operating, read_case
 from soilml.errors import FitError
-from soilml.fitting import descent
-from soilml.fitting.free_parameters import select_free
-from soilml.fitting.observations import Channel, Observations
-from soilml.identification import condensed_rows
+from soilml.fitting import starts
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.identification import condensing
 from soilml.identification.joint_sample import normal_start
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.remarks import texts
@@ -29,20 +30,23 @@ def case(model_file):
     return read_case(model_file)
 
 
-def rows_of(case, **changes):
+def rows_of(case, torque_std=0.05, **changes):
     """Torque in all rows, sinkage in the last three."""
-    force = case.model(case.soil, Operating(slip=SLIP, load=LOAD))
-    torque = Channel("torque", np.asarray(force.torque), np.full(4, 0.05), True)
-    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
-    sinkage = Channel("sinkage", depth, np.full(4, 0.001), True)
     at = Operating(slip=SLIP, load=LOAD)
-    data = Observations(at, np.zeros(4), np.zeros(4), (torque, sinkage), ())
-    return replace(data, **changes)
+    force = case.model(case.soil, at)
+    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
+    channels = {"torque": (np.asarray(force.torque), torque_std), "sinkage": (depth, 0.001)}
+    return channel_readings(at, channels, **changes)
 
 
-def optimum(u, jacobian, residual=(0.0, 0.0), prior_cost=0.0):
-    arrays = (np.asarray(v, dtype=float) for v in (u, residual, jacobian))
-    return descent.Optimum(*arrays, prior_cost, None)
+def optimum(x, jacobian, residual=(0.0, 0.0), of_tests=0.0):
+    """A solution; tests of the soil add `of_tests` to its cost."""
+    x, residual, jacobian = (np.asarray(v, dtype=float) for v in (x, residual, jacobian))
+    tests = SimpleNamespace(
+        deviation=lambda x: np.sqrt([of_tests]), rates=lambda x: np.zeros((1, len(x)))
+    )
+    problem = SimpleNamespace(soil_tests=tests, coordinates=())
+    return Solution(problem, x, None, residual, jacobian, 0.0, True)
 
 
 def test_covariance_of_least_squares_includes_prior_and_distance_to_its_mean():
@@ -60,26 +64,24 @@ def test_covariance_of_least_squares_includes_prior_and_distance_to_its_mean():
 
 
 def test_noise_before_and_after_a_fit_is_that_of_each_channel(case):
-    data = rows_of(case)
     reading = np.asarray([3.0, 4.0, 3.0, 4.0, 1.0, 1.0, 1.0])
     residual = np.asarray([1.0, -1.0, 1.0, -1.0, 0.1, 0.1, -0.2])
-    found = descent._residual_noise(data, reading, residual, 3)
+    data = rows_of(case, reading=reading)
+    found = nonlinear._residual_noise(data, residual, 3)
     # three parameters, shared among four and three readings
     torque, sinkage = np.sqrt(4.0 / (4.0 - 12.0 / 7.0)), np.sqrt(0.06 / (3.0 - 9.0 / 7.0))
     np.testing.assert_allclose(found, [torque] * 4 + [sinkage] * 3)
-    exact = descent._residual_noise(data, reading, 0.0 * residual, 3)
+    exact = nonlinear._residual_noise(data, 0.0 * residual, 3)
     np.testing.assert_allclose(exact, [1e-6 * np.sqrt(12.5)] * 4 + [1e-6] * 3, rtol=1e-6)
-    many = descent._residual_noise(data, reading, residual, 7)
+    many = nonlinear._residual_noise(data, residual, 7)
     np.testing.assert_allclose(many[0], 2.0)  # at least one degree of freedom
     first = nonlinear._initial_noise(data)
-    rms = np.sqrt(np.mean(data.channels[0].reading ** 2))
-    np.testing.assert_allclose(first[:4], 0.05 * rms)
-    assert first[4:] == pytest.approx(0.05 * np.sqrt(np.mean(data.channels[1].reading[1:] ** 2)))
+    np.testing.assert_allclose(first, [0.05 * np.sqrt(12.5)] * 4 + [0.05] * 3)
 
 
 def test_a_trial_leads_to_a_known_optimum_where_the_cost_is_its_quadratic():
-    known = optimum([0.5, 0.5], np.eye(2), residual=[1.0, 0.0], prior_cost=0.2)
-    leads = descent._leads_to
+    known = optimum([0.5, 0.5], np.eye(2), residual=[1.0, 0.0], of_tests=0.2)
+    leads = starts._leads_to
 
     def trial(distance, excess, prior=0.2, count=2):
         residual = np.zeros(count)
@@ -126,7 +128,7 @@ def test_limits_of_the_linear_method_are_said(case):
     said = texts(linear._limits(case, [], np.zeros(2), np.full(2, 60.0)))
     assert said == ["one load only: cohesion is not identified"]
     with pytest.raises(FitError, match="needs drawbar_pull"):
-        linear._channel(rows_of(case), "drawbar_pull")
+        linear._of_rows(rows_of(case), "drawbar_pull")
 
 
 def test_the_linear_method_takes_the_larger_of_declared_and_seen_noise(case):
@@ -134,12 +136,10 @@ def test_the_linear_method_takes_the_larger_of_declared_and_seen_noise(case):
 
     def std(factor, scatter=0.0, count=4):
         seen = np.asarray([0.0, 1.0, -1.0, 1.0]) * scatter
-        torque, sinkage = data.channels
-        torque = Channel("torque", torque.reading * (1.0 + seen), factor * torque.std, True)
-        sinkage = Channel("sinkage", sinkage.reading, factor * sinkage.std, True)
-        kept = np.where(np.arange(4) < count, torque.reading, np.nan)
-        torque = Channel("torque", kept, torque.std, True)
-        given = replace(data, channels=(torque, sinkage))
+        torque = data.channel == 0
+        reading = data.reading * (1.0 + np.where(torque, seen[data.row], 0.0))
+        given = replace(data, reading=reading, std=factor * data.std)
+        given = given.subset(~torque | (data.row < count))
         return np.sqrt(np.diag(linear._solve(case, given, free).covariance))
 
     fine = std(1.0)
@@ -171,40 +171,35 @@ def test_rows_of_other_gears_passes_and_directions_are_never_one():
         pass_number=np.asarray([1.0, 1.0, 2.0, 1.0, 1.0, 1.0]),
         gear=np.asarray(["a", "a", "a", "b", "a", "a"]),
     )
-    groups = condensed_rows._groups(at)
+    groups = condensing._groups(at)
     assert groups[0] == groups[4] == groups[5] and len(np.unique(groups)) == 4
     solved = np.asarray([True, True, False, True, True, True])
     number, first = np.asarray([0, 1, 2, 0, 0]), np.asarray([0, 1, 3])
-    means = condensed_rows._means(at, solved, number, first)
+    means = condensing._means(at, solved, number, first)
     np.testing.assert_allclose(means.slip, [0.1, -0.1, 0.1])
     assert means.gear.tolist() == ["a", "a", "b"] and means.pass_number.tolist() == [1.0, 1.0, 1.0]
-    joined = condensed_rows._joined(means, replace(at, slip=at.slip + 1.0))
+    joined = condensing._joined(means, replace(at, slip=at.slip + 1.0))
     np.testing.assert_allclose(joined.slip, [0.1, -0.1, 0.1, *(at.slip + 1.0)])
     assert joined.load.shape == joined.gear.shape == (9,) and joined.speed is None
-    blocks = [b.tolist() for b in condensed_rows._blocks(50_002)]
+    blocks = [b.tolist() for b in condensing._blocks(50_002)]
     assert len(blocks) == 2 and blocks[1] == [50_000, 50_001] and blocks[0][0] == 0
 
 
 def test_methods_in_closed_form_say_what_rows_they_need(case):
-    data = rows_of(case)
-    (torque, _) = data.channels
+    data = rows_of(case).of_channels([0])
 
-    def first(count, channels):
-        kept = tuple(replace(c, reading=c.reading[:count], std=c.std[:count]) for c in channels)
-        at = Operating(slip=SLIP[:count], load=LOAD[:count])
-        return replace(
-            data, at=at, slip_std=np.zeros(count), load_std=np.zeros(count), channels=kept
-        )
+    def first(count):
+        return data.of_rows(np.arange(count))[1]
 
     with pytest.raises(FitError, match="2 readings: the Newton-Raphson method needs three or more"):
-        newton.newton(case, first(2, [torque]), select_free(case, None))
+        newton.newton(case, first(2), select_free(case, None))
     try:
-        newton.newton(case, first(3, [torque]), select_free(case, None))
+        newton.newton(case, first(3), select_free(case, None))
     except FitError as error:  # three readings may not determine three unknowns
         assert "needs three or more" not in str(error)
 
 
 def test_a_row_without_equilibrium_has_a_residual_of_a_thousand_standard_deviations():
-    problem = SimpleNamespace(reading=np.asarray([1.0, 2.0]), std=np.asarray([0.1, 0.5]))
-    found = descent.LeastSquaresProblem.residual(problem, np.asarray([[1.5, np.nan]]))
-    np.testing.assert_allclose(found, [[0.5, 500.0]])
+    readings = SimpleNamespace(reading=np.asarray([1.0, 2.0]), std=np.asarray([0.1, 0.5]))
+    problem = LeastSquaresProblem(None, (), readings, np.eye(2))
+    np.testing.assert_allclose(problem.residual(np.asarray([[1.5, np.nan]])), [[-0.5, 500.0]])

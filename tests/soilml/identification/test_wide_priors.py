@@ -2,7 +2,7 @@
 
 import pytest
 
-from soilml.fitting.free_parameters import _wide_prior
+from soilml.fitting.coordinates import _wide_prior
 from soilml.parameters import Parameter
 
 

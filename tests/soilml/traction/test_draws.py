@@ -5,7 +5,7 @@ import pytest
 
 from soilml import read_case
 from soilml.errors import InputError
-from soilml.fitting.free_parameters import select_free
+from soilml.fitting.coordinates import select_free
 from soilml.traction import estimated_draws, prior_draws
 
 

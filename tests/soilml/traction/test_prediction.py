@@ -102,7 +102,7 @@ def test_draws_of_the_prior_are_reported_as_not_identified(case):
 
 
 def free_of(case, name):
-    from soilml.fitting.free_parameters import select_free
+    from soilml.fitting.coordinates import select_free
 
     return select_free(case, [name])[0]
 

@@ -117,12 +117,12 @@ def test_the_packaged_limit_is_the_exact_posterior(recipe):
 
 def test_the_log_density_at_the_truth_agrees_with_a_grid(recipe):
     """One row: likelihood at the truth over its mean on a grid over the prior."""
-    from soilml.fitting.channel_predictions import predict_channels
-    from soilml.fitting.free_parameters import select_free
-    from soilml.fitting.observations import read_observations
+    from soilml.fitting.coordinates import select_free
+    from soilml.fitting.predictions import predict_channels
+    from soilml.fitting.usable_readings import usable_readings
 
     one = benchmark_sets(recipe, SHEAR, 1)[0]
-    data = read_observations(recipe.case, select_channels(one.table, ["torque"]))
+    data = usable_readings(recipe.case, select_channels(one.table, ["torque"]))
     free = select_free(recipe.case, SHEAR)
     side = (np.arange(24) + 0.5) / 24
     u = np.stack(np.meshgrid(side, side, side), axis=-1).reshape(-1, 3)

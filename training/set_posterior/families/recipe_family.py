@@ -14,7 +14,7 @@ from scipy.stats import qmc
 from datagen.recipe import Recipe
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.fitting.shared_errors_sizes import PULL_OFFSET_SHARE
+from soilml.fitting.shared_errors import PULL_OFFSET_SHARE
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.shared_errors_sizes import (
+from soilml.fitting.shared_errors import (
     USUAL_MODEL_ERRORS,
     USUAL_SENSOR_ERRORS,
     without_errors,

@@ -8,7 +8,7 @@ import pytest
 from soilml import Operating, Wheel, identify, read_case
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.errors import InputError, TableError
-from soilml.fitting.rover_rows import with_rover_columns
+from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.model import Model

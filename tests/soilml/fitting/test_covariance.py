@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.fitting.noise_and_process import Whitener, squared_residuals_and_log_determinant
+from soilml.fitting.covariance import Whitening, squared_residuals_and_log_determinant
 
 RNG = np.random.default_rng(3)
 COLUMNS = RNG.standard_normal((12, 5))
@@ -13,12 +13,14 @@ RESIDUAL = RNG.standard_normal((4, 12))
 
 def test_whitened_values_have_the_inverse_covariance_as_product():
     covariance = np.diag(STD[0] ** 2) + COLUMNS @ COLUMNS.T
-    root = Whitener.of(STD[0], COLUMNS)(np.eye(12))
-    assert root @ root.T == pytest.approx(np.linalg.inv(covariance))
+    root = Whitening.of(STD[0], COLUMNS) @ np.eye(12)
+    assert root.T @ root == pytest.approx(np.linalg.inv(covariance))
 
 
 def test_without_columns_values_are_divided_by_their_noise():
-    assert Whitener.of(STD[0], np.zeros((12, 0)))(RESIDUAL) == pytest.approx(RESIDUAL / STD[0])
+    whitening, expected = Whitening.of(STD[0], np.zeros((12, 0))), RESIDUAL / STD[0]
+    assert whitening @ RESIDUAL.T == pytest.approx(expected.T)
+    assert whitening @ RESIDUAL[0] == pytest.approx(expected[0])
 
 
 @pytest.mark.parametrize("std", [STD, np.tile(STD[0], (4, 1))])

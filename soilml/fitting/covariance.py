@@ -1,0 +1,269 @@
+"""Covariance of readings: noise, errors that rows share, a smooth discrepancy; what whitens it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.config.model_discrepancy import Discrepancy, range_with_zero
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.operating_points import gear_numbers
+from soilml.fitting.predictions import predict
+from soilml.fitting.readings import Readings
+from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
+from soilml.quantities import QUANTITIES, column
+from soilml.remarks import Remark
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Usual model error of a channel in an analysis of gaps, where the case does not state another.
+USUAL = Discrepancy(share=0.02)
+#: Eigenfunctions with a smaller fraction of the largest eigenvalue are dropped: at ten times the
+#: usual amplitude they still change the readings by less than a five-hundredth of their range.
+LEAST_EIGENVALUE = 1e-4
+#: Largest slip of a row that is moved, and smallest and largest load as multiples of its load.
+MOST_SLIP, LEAST_LOAD, MOST_LOAD = 0.999, 1e-3, 2.0
+
+
+@dataclass(frozen=True)
+class Whitening:
+    r"""What makes the covariance of m readings one: of noise, and of a process beside it.
+
+    .. math:: W = (I - Q S Q^T) W_0, \quad S = \operatorname{diag}(s)
+
+    `noise` is :math:`W_0`: a matrix (m, m), dense or sparse, or the inverse standard deviations
+    (m,) of independent noise. Many of these share it, so that each takes m q numbers of memory in
+    place of m^2. `whitening @ x` multiplies arrays (m,) and (m, k).
+    """
+
+    noise: Any
+    basis: Floats  # (m, q), with orthonormal columns
+    shrinkage: Floats  # (q,)
+
+    @staticmethod
+    def of(std: Floats, columns: Floats) -> Whitening:
+        r"""From standard deviations (m,) of the noise and columns C (m, q) of the process.
+
+        .. math::
+            (I + B B^T)^{-1/2} D^{-1}
+            = \left[I - U \left(1 - (1 + s^2)^{-1/2}\right) U^T\right] D^{-1}, \quad
+            D = \operatorname{diag}(\sigma), \quad B = D^{-1} C = U s V^T
+
+        For residuals r the squared length of the result is r^T (D D + C C^T)^{-1} r.
+        """
+        basis, size, _ = np.linalg.svd(columns / std[:, None], full_matrices=False)
+        return Whitening(1.0 / std, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
+
+    def __matmul__(self, values: Floats) -> Floats:
+        independent = np.ndim(self.noise) == 1
+        white = (self.noise * values.T).T if independent else self.noise @ values
+        if not self.basis.shape[1]:
+            return np.asarray(white)
+        return np.asarray(white - (self.basis * self.shrinkage) @ (self.basis.T @ white))
+
+
+def squared_residuals_and_log_determinant(
+    residual: Floats, std: Floats, columns: Floats
+) -> tuple[Floats, Floats]:
+    r"""r^T S^-1 r and half of ln det S, (n,) each, for S = diag(std^2) + C C^T.
+
+    .. math::
+        r^T S^{-1} r = |D^{-1} r - B w|^2 + |w|^2, \quad w = (I + B^T B)^{-1} B^T D^{-1} r, \quad
+        \det S = \det(D)^2 \det(I + B^T B)
+
+    The first form has no cancellation, however small the noise is beside the process.
+
+    Parameters
+    ----------
+    residual, std : array (n, k)
+        Residuals, and standard deviations of the noise; each of the n sets has its own.
+    columns : array (k, q) or (n, k, q)
+        C, the columns of the process.
+
+    References
+    ----------
+    Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. A.9 and A.10 (the
+    lemmas of matrix inversion and of determinants).
+    """
+    if (std == std[0]).all():  # one factorisation for all sets
+        std = std[:1]
+    scaled = residual / std
+    log_determinant = np.broadcast_to(np.log(std).sum(axis=1), len(residual))
+    if columns.shape[-1] == 0:
+        return (scaled**2).sum(axis=1), log_determinant
+    basis = columns / std[..., None]
+    transposed = np.swapaxes(basis, 1, 2)
+    inner = transposed @ basis + np.eye(columns.shape[-1])
+    weights = np.linalg.solve(inner, transposed @ scaled[..., None])
+    left = scaled - (basis @ weights)[..., 0]
+    squared = (left**2).sum(axis=1) + (weights[..., 0] ** 2).sum(axis=1)
+    return squared, log_determinant + 0.5 * np.linalg.slogdet(inner)[1]
+
+
+@dataclass(frozen=True)
+class DiscrepancyProcess:
+    r"""A zero-mean Gaussian process for each channel and gear, in a basis of its eigenfunctions.
+
+    .. math::
+        \delta_c(s, W) = \tau_c u_c \sum_k w_k \psi_k(s, \ln W), \quad w_k \sim N(0, 1), \quad
+        \sum_k \psi_k \psi_k' = e^{-(s - s')^2 / (2 l_s^2) - (\ln W - \ln W')^2 / (2 l_W^2)}
+
+    Attributes
+    ----------
+    columns : array (m, q)
+        The functions u_c psi_k at the readings; each is zero outside its channel and gear.
+    channel : array (q,)
+        Channel of each column.
+    usual : array (channels,)
+        u_c, the standard deviation of a usual discrepancy in the unit of the channel. Amplitudes
+        tau_c are in this unit; all gears share them.
+
+    References
+    ----------
+    Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2;
+    Brynjarsdottir and O'Hagan, Inverse Problems 30, 2014.
+    """
+
+    columns: Floats
+    channel: Integers
+    usual: Floats
+
+
+def discrepancy_process(
+    readings: Readings,
+    declared: Mapping[str, Discrepancy],
+    default: Discrepancy = USUAL,
+    least_eigenvalue: float = LEAST_EIGENVALUE,
+) -> DiscrepancyProcess:
+    """The process of these readings.
+
+    Parameters
+    ----------
+    declared
+        Model error by column.
+    default
+        That of other columns; a channel whose amplitude is zero has no columns.
+    least_eigenvalue
+        Fraction of the largest eigenvalue below which eigenfunctions are dropped.
+    """
+    gear = gear_numbers(readings.at)
+    known: dict[tuple[float, float], Floats] = {}
+    columns, channel, usual = [np.zeros((len(readings), 0))], [np.zeros(0, np.int64)], []
+    for i, name in enumerate(readings.channels):
+        own, in_channel = declared.get(column(name), default), readings.channel == i
+        usual.append(own.amplitude(range_with_zero(readings.reading[in_channel])))
+        if usual[-1] == 0.0:
+            continue
+        lengths = own.slip_length, own.log_load_length
+        if lengths not in known:
+            points = slip_load_points(readings.row_slip, readings.row_load, *lengths)
+            known[lengths] = independent_process_columns(
+                points, gear, least_eigenvalue=least_eigenvalue
+            )
+        functions = known[lengths]
+        columns.append(usual[-1] * np.where(in_channel[:, None], functions[readings.row], 0.0))
+        channel.append(np.full(functions.shape[1], i))
+    return DiscrepancyProcess(
+        np.concatenate(columns, axis=1), np.concatenate(channel), np.asarray(usual)
+    )
+
+
+def included_discrepancy(case: Case, readings: Readings) -> list[Remark]:
+    """A remark with the standard deviation of each channel's discrepancy; none without one."""
+    texts = []
+    for i, name in enumerate(readings.channels):
+        own = case.discrepancy.get(column(name), Discrepancy())
+        amplitude = own.amplitude(range_with_zero(readings.reading[readings.channel == i]))
+        if amplitude > 0.0:
+            texts.append(f"{name} {amplitude:.3g} {QUANTITIES[name].unit}")
+    text = f"errors of the model are included in std: {', '.join(texts)}"
+    return [Remark("discrepancy-included", text, severity="note")] if texts else []
+
+
+def ignored_discrepancy(
+    case: Case, what: str, consequence: str = "its intervals are too narrow"
+) -> list[Remark]:
+    """A remark that `what` ignores [discrepancy]; none for a case without one."""
+    names = [key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0]
+    if not names:
+        return []
+    text = f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"
+    return [Remark("discrepancy-ignored", text, tuple(names))]
+
+
+def noise_of_operation(
+    case: Case,
+    readings: Readings,
+    coordinates: Sequence[Coordinate] = (),
+    x: Floats | None = None,
+) -> Floats:
+    r"""Standard deviation (m,) of readings by the declared noise of slip s and load W.
+
+    .. math:: \sigma^2 = \left(\frac{\partial y}{\partial s} \sigma_s\right)^2
+        + \left(\frac{\partial y}{\partial W} \sigma_W\right)^2
+
+    First order: the change over one standard deviation, centred, at coordinates x (p,) of the
+    case. Rows that have no equilibrium beside them count as exact. That the readings of one row share their slip and load
+    is left out, so that the noise of sets of several channels is overstated rather than
+    understated.
+    """
+    slip, load = readings.row_slip, readings.row_load
+    x = np.zeros(0) if x is None else x
+    total = np.zeros(len(readings))
+    moves = {
+        "slip": (slip, readings.slip_std, -MOST_SLIP, MOST_SLIP),
+        "load": (load, readings.load_std, LEAST_LOAD * load, MOST_LOAD * load),
+    }
+    for name, (values, std, least, most) in moves.items():
+        if not np.any(std > 0.0):
+            continue
+        low, high = (
+            predict(case, coordinates, x[None, :], _moved(readings, name, moved))[0]
+            for moved in (np.clip(values + sign * 0.5 * std, least, most) for sign in (-1.0, 1.0))
+        )
+        total = np.hypot(total, np.nan_to_num(high - low))
+    return np.asarray(total)
+
+
+def _moved(readings: Readings, name: str, values: Floats) -> Readings:
+    at = replace(readings.at, slip=values) if name == "slip" else replace(readings.at, load=values)
+    return replace(readings, at=at)
+
+
+def sensor_columns(readings: Readings, prediction: Floats) -> Floats | None:
+    r"""Changes (sets, k, e) of the readings with gains and offsets of one standard deviation.
+
+    .. math:: y = (1 + e_1) f + e_2
+
+    for torque and sinkage; drawbar pull has an error in proportion to load instead of a gain. Gains
+    and shares of load that grow with slip are in proportion to it. All are linear in the errors at
+    predictions f (sets, k), so that errors with normal priors are integrated out without
+    approximation: their covariance is that of the columns. None without such errors of a measured
+    channel.
+    """
+    prediction = np.nan_to_num(prediction)
+    errors, slip, load, parts = readings.shared_errors, np.abs(readings.slip), readings.load, []
+    for i, channel in enumerate(readings.channels):
+        own = readings.channel == i
+        size = own * prediction
+        factors: dict[str, tuple[str, Floats]] = {
+            "torque_gain": ("torque", size),
+            "torque_bias": ("torque", own * 1.0),
+            "torque_by_slip": ("torque", size * slip),
+            "sinkage": ("sinkage", size),
+            "sinkage_bias": ("sinkage", own * 1.0),
+            "sinkage_by_slip": ("sinkage", size * slip),
+            "drawbar_pull": ("drawbar_pull", own * load),
+            "drawbar_pull_bias": ("drawbar_pull", own * 1.0),
+            "drawbar_pull_by_slip": ("drawbar_pull", own * load * slip),
+        }
+        for name, (measured, factor) in factors.items():
+            if name in errors and measured == channel:
+                parts.append(np.broadcast_to(errors[name] * factor, prediction.shape))
+    return np.stack(parts, axis=-1) if parts else None

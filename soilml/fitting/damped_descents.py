@@ -1,0 +1,264 @@
+"""Bounded Levenberg-Marquardt descents of least-squares problems, many in step."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.errors import InputError
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.predictions import (
+    Linearisation,
+    PredictionRequest,
+    linearise_many,
+    predict_many,
+)
+from soilml.fitting.soil_tests import SoilTestTerms
+
+Floats = NDArray[np.float64]
+
+#: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
+MAX_ITERATIONS = 25
+#: A descent has converged when a step lowers the objective by less than `ENOUGH` (far below the
+#: thresholds on differences of the objective, which start at 9) or by less than the fraction
+#: `SHARE` of its excess over the number of readings (while the model is far from the data).
+ENOUGH, SHARE = 0.01, 2e-3
+#: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
+#: factor after an iteration without improvement, and the bounds.
+FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 1.0, 10.0), 1e2
+MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
+#: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
+#: along it and an exponent are straight in its logarithm.
+RATIO_OF_BOUNDS = 3.0
+#: Largest increase of the logarithm of such a parameter in one step.
+MOST_LOG_STEP = 2.0
+
+
+@dataclass(frozen=True)
+class DampedSteps:
+    """Steps in the coordinates of a fit: their bounds, priors and curvature.
+
+    Attributes
+    ----------
+    lower, upper : array (p,)
+        Bounds, at which steps end.
+    precision, centre : array (p,)
+        Precision of the normal density of each coordinate, 0 without one, and its middle.
+    offset : array (p,)
+        What is added to a coordinate to obtain a multiple of the parameter, where the parameter
+        moves by ratios; infinite where it moves by differences.
+    tests : SoilTestTerms
+        Tests of the soil, which stand beside the residuals.
+    """
+
+    lower: Floats
+    upper: Floats
+    precision: Floats
+    centre: Floats
+    offset: Floats
+    tests: SoilTestTerms = field(default_factory=SoilTestTerms)
+
+    @staticmethod
+    def of(problem: LeastSquaresProblem) -> DampedSteps:
+        """The steps of a problem."""
+        offset = np.asarray([_offset(c) for c in problem.coordinates])
+        return DampedSteps(
+            lower=problem.lower,
+            upper=problem.upper,
+            precision=problem.precision,
+            centre=problem.centre,
+            offset=offset,
+            tests=problem.soil_tests,
+        )
+
+    def within(self, x: Floats) -> Floats:
+        """Coordinates (..., p), moved to the bounds that they are beyond."""
+        return np.clip(x, self.lower, self.upper)
+
+    def are_held(self, x: Floats, residual: Floats, jacobian: Floats) -> bool:
+        """Whether bounds hold every coordinate of x (p,) against the descent."""
+        return not self._free(x, self._descent(x, residual, jacobian)).any()
+
+    def from_points(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
+        r"""Where damped steps lead from several points, (b, p).
+
+        .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u
+            = J^T r - P_0 x - T^T z
+
+        with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
+        and P = P_0 + T^T T.
+
+        Parameters
+        ----------
+        x : array (b, p)
+            The points.
+        residual : array (b, m)
+            Whitened residuals at each point.
+        jacobian : array (m, p)
+            Whitened derivatives of the readings, the same for all points.
+        damping : array (b,)
+            Factor lambda of each step.
+        """
+        of_readings = jacobian.T @ jacobian + np.diag(self.precision)
+        moved = np.empty_like(x)
+        for i, point in enumerate(x):
+            of_tests = self.tests.rates(point)
+            normal = of_readings + of_tests.T @ of_tests
+            scale = np.diag(normal) + 1e-9
+            descent = self._descent(point, residual[i], jacobian)
+            free = self._free(point, descent)
+            damped = normal + damping[i] * np.diag(scale)
+            step = np.zeros(len(point))
+            step[free] = np.linalg.solve(damped[np.ix_(free, free)], descent[free])
+            moved[i] = self._moved(point, step)
+        return self.within(moved)
+
+    def _descent(self, x: Floats, residual: Floats, jacobian: Floats) -> Floats:
+        """Half the negative gradient of the objective, (p,)."""
+        of_tests = self.tests.rates(x).T @ self.tests.deviation(x)
+        return np.asarray(jacobian.T @ residual - self.precision * (x - self.centre) - of_tests)
+
+    def _free(self, x: Floats, descent: Floats) -> NDArray[np.bool_]:
+        """The coordinates that no bound holds, (p,)."""
+        held = ((x <= self.lower) & (descent < 0)) | ((x >= self.upper) & (descent > 0))
+        return np.asarray(~held)
+
+    def _moved(self, x: Floats, step: Floats) -> Floats:
+        """Coordinates (p,) after steps (p,): those that move by ratios follow an exponential."""
+        multiple = x + self.offset
+        with np.errstate(invalid="ignore"):
+            growth = np.expm1(np.minimum(step / multiple, MOST_LOG_STEP))
+            return np.where(np.isfinite(multiple), x + multiple * growth, x + step)
+
+
+def _offset(coordinate: Coordinate) -> float:
+    prior = coordinate.prior
+    positive = prior.lower > 0.0 and prior.upper > RATIO_OF_BOUNDS * prior.lower
+    if prior.log or prior.normal_std is not None or not positive:
+        return float("inf")
+    return prior.lower / (prior.upper - prior.lower)
+
+
+def levenberg_marquardt(problem: LeastSquaresProblem, start: Floats) -> Solution:
+    """Bounded Levenberg-Marquardt descent from one start (p,); see `descend_together`.
+
+    Raises
+    ------
+    InputError
+        Where the model refuses the coordinates of a trial.
+    """
+    (fit,) = descend_together([problem], [start])
+    if isinstance(fit, InputError):
+        raise fit
+    return fit
+
+
+def descend_together(
+    problems: Sequence[LeastSquaresProblem], starts: Sequence[Floats]
+) -> list[Solution | InputError]:
+    """Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
+
+    Each starts at coordinates (p,), which are clipped to the bounds. The descents are independent;
+    the result of each is that of a descent alone, within the tolerance of the search for
+    equilibrium. Where the model refuses the coordinates of a trial, its `InputError` takes the
+    place of the solution.
+
+    References
+    ----------
+    Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
+    """
+    results: dict[int, Solution | InputError] = {}
+    descents = [_descent(problem, x) for problem, x in zip(problems, starts, strict=True)]
+    asked = {i: next(descent) for i, descent in enumerate(descents)}
+    while asked:
+        for i, answer in _answers(asked).items():
+            if isinstance(answer, InputError):
+                results[i] = answer
+                del asked[i]
+                continue
+            try:
+                asked[i] = descents[i].send(answer)
+            except StopIteration as end:
+                results[i] = end.value
+                del asked[i]
+    return [results[i] for i in range(len(problems))]
+
+
+@dataclass(frozen=True)
+class _Question:
+    """What a descent asks of the model: predictions, or a linearisation."""
+
+    request: PredictionRequest
+    linearise: bool
+
+
+#: A descent: asks questions, is sent the answers, and returns its fit.
+_Descent: TypeAlias = Generator[_Question, Any, Solution]
+
+
+def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation | InputError]:
+    """The answers to the questions of all descents."""
+    answers: dict[int, Floats | Linearisation | InputError] = {}
+    for linearised, answer in ((False, predict_many), (True, linearise_many)):
+        these = [i for i, question in asked.items() if question.linearise == linearised]
+        found = answer([asked[i].request for i in these])
+        answers |= dict(zip(these, found, strict=True))
+    return answers
+
+
+def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
+    """One descent; see `descend_together`.
+
+    Each damping is tried by a step and by a second step with the same Jacobian, which follows a
+    curved valley. Trials start at the sinkage that the last iterate predicts. An iterate is solved
+    by the full search; it is no improvement where that finds an equilibrium before the one of the
+    trial.
+    """
+    steps = DampedSteps.of(problem)
+
+    def trial(last: Solution, x: Floats) -> _Question:
+        sinkage = replace(last.model.sinkage_at(x - last.x), nearest=True)
+        return _Question(problem.request(x, sinkage), linearise=False)
+
+    x = steps.within(start)
+    last = problem.at(x, (yield _Question(problem.request(x[None, :]), linearise=True)))
+    damping, converged = FIRST_DAMPING, False
+    for _ in range(MAX_ITERATIONS):
+        if steps.are_held(last.x, last.residual, last.jacobian):
+            converged = True
+            break
+        dampings = damping * np.asarray(DAMPING_FACTORS)
+        here = np.tile(last.x, (len(dampings), 1))
+        residual = np.tile(last.residual, (len(dampings), 1))
+        trials, objectives = [], []
+        for _ in range(2):
+            here = steps.from_points(here, residual, last.jacobian, dampings)
+            residual = problem.whitened((yield trial(last, here)))
+            trials.append(here)
+            objectives.append(problem.objective(residual, here))
+        best = int(np.argmin(objectives))
+        improvement = last.objective - float(np.ravel(objectives)[best])
+        if improvement > 0.0:
+            x = np.concatenate(trials)[best]
+            sinkage = last.model.sinkage_at((x - last.x)[None, :])
+            question = _Question(problem.request(x[None, :], sinkage), linearise=True)
+            new = problem.at(x, (yield question))
+            improvement = last.objective - new.objective
+        if improvement <= 0.0:
+            # if the most damped, shortest step is negligible this is an optimum; else damp more
+            converged = float(np.abs(trials[0][-1] - last.x).max()) < 1e-3
+            damping *= DAMPING_INCREASE
+            if converged or damping > MAX_DAMPING:
+                break
+            continue
+        last = new
+        damping = max(float(dampings[best % len(dampings)]), MIN_DAMPING)
+        if improvement < max(ENOUGH, SHARE * (last.objective - len(problem.readings))):
+            converged = True
+            break
+    return replace(last, converged=converged)

@@ -1,0 +1,124 @@
+"""The readings of a table that an identification uses, and remarks on the others."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.config.compatibility import check_wheel_size
+from soilml.errors import FitError
+from soilml.fitting.operating_points import operating_points, with_rover_columns
+from soilml.fitting.readings import (
+    LEAST_RELATIVE_STD,
+    Booleans,
+    Readings,
+    declared_std,
+    stack_readings,
+)
+from soilml.io.table import Table
+from soilml.quantities import CHANNELS, QUANTITIES, column
+from soilml.remarks import Remark
+
+Floats = NDArray[np.float64]
+
+
+def usable_readings(case: Case, table: Table) -> Readings:
+    """The readings that an identification of a case uses of a table.
+
+    A channel whose noise is not declared is excluded if that of another one is; if none is, all
+    are used and their noise is to be estimated. Rows whose status is not ok are excluded. A
+    standard deviation of zero, which a relative noise has at a reading of zero, is replaced by the
+    median of the others.
+
+    Raises
+    ------
+    TableError
+        Where the table names another wheel than the case's.
+    FitError
+        Where no row or no reading remains, or all standard deviations of a channel are zero.
+    """
+    table = with_rover_columns(case, table)
+    dropped = int(np.count_nonzero(~table.answered))
+    if dropped == len(table):
+        raise FitError(f"{table.source}: no row has the status ok")
+    table = table.rows(table.answered)
+    check_wheel_size(case, table)
+    notes = _remarks_on(case, table)
+    if dropped:
+        text = f"{dropped} rows are excluded: their status is not ok"
+        notes.append(Remark("rows-excluded", text))
+    found = stack_readings(case, table)
+    if not found.channels:
+        raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
+    std, replaced, more = _without_zeros(case, table, found)
+    own = found.from_case & ~replaced
+    found = replace(found, std=std, from_case=own, notes=(*notes, *more))
+    unknown = found.undeclared
+    kept = [i for i, name in enumerate(found.channels) if column(name) not in unknown]
+    if not kept or not unknown:
+        return found
+    return replace(found.of_channels(kept), excluded_channels=unknown)
+
+
+def _remarks_on(case: Case, table: Table) -> list[Remark]:
+    """Several runs, and grousers that the model lacks."""
+    notes: list[Remark] = []
+    runs = len(np.unique(table["run"])) if "run" in table else 1
+    if runs > 1:
+        notes.append(Remark("runs-as-one-soil", f"{runs} runs are fitted as one soil"))
+    if case.gears:
+        for name in case.gears:
+            rows = table.rows(operating_points(table).gear == name) if "gear" in table else table
+            notes += _grouser_remark(case.of_gear(name), rows, f"the gear {name}")
+    else:
+        notes += _grouser_remark(case, table, "the model")
+    return notes
+
+
+def _grouser_remark(case: Case, table: Table, owner: str) -> list[Remark]:
+    """Whether the wheel of a table has grousers that the model lacks."""
+    lugs = QUANTITIES["grouser_height"].column
+    if lugs in table and np.nanmax(table[lugs], initial=0.0) > 0.0:
+        height = float(np.nanmax(table[lugs]))
+        if not any(effect.name == "grousers" for effect in case.model.effects):
+            text = f"{lugs} is {height:g}, but {owner} has no effect grousers"
+            return [Remark("grousers-missing", text, ("grousers",))]
+    return []
+
+
+def _without_zeros(
+    case: Case, table: Table, readings: Readings
+) -> tuple[Floats, Booleans, list[Remark]]:
+    """Standard deviations (m,) with zeros replaced by the median of their channel, and where.
+
+    Raises `FitError` where all of a channel are zero.
+    """
+    std, replaced, remarks = readings.std.copy(), np.zeros(len(readings), bool), []
+    for i, name in enumerate(readings.channels):
+        key, own = column(name), readings.channel == i
+        declared = declared_std(case, table, key)[readings.row[own]]
+        least = LEAST_RELATIVE_STD * float(np.abs(readings.reading[own]).max())
+        zero = declared <= least
+        if not zero.any():
+            continue
+        first = int(np.argmax(zero))
+        where = f"{table.place(int(readings.row[own][first]))}, column {key}"
+        others = declared[declared > least]
+        if others.size == 0:
+            raise FitError(
+                f"{where}: standard deviation {declared[first]:.3g}, and no row has a larger one; "
+                "declare one such as '2 % + 0.05'"
+            )
+        median = float(np.median(others))
+        std[own] = np.where(zero, median, declared)
+        replaced[own] = zero
+        more = int(zero.sum()) - 1
+        text = (
+            f"{where}: standard deviation {declared[first]:.3g} replaced by the column's median "
+            f"{median:.3g}{f'; {more} more rows likewise' if more else ''}"
+        )
+        remarks.append(Remark("zero-noise", text, (key,)))
+    return std, replaced, remarks

@@ -1,0 +1,257 @@
+"""Tables of more rows than a fit takes: near replicates become one row of equal information."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from heapq import heapify, heappop, heappush
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.case import Case
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import noise_of_operation
+from soilml.fitting.operating_points import gear_numbers, operating_points_of_rows
+from soilml.fitting.predictions import forces, predict
+from soilml.fitting.readings import CondensedRows, Readings
+from soilml.identification.nonlinear import nonlinear
+from soilml.physics.operating_point import COVARIATES, Operating
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+#: Rows above which they are condensed, and rows that become of them.
+MOST_ROWS, CELLS = 5_000, 1024
+#: Rows of the fit that shows where the optimum is, and rounds in which it is approached.
+FIRST_ROWS, ROUNDS = 1000, 2
+#: Rows that are solved at a time.
+BLOCK = 50_000
+#: Most rows without equilibrium at the optimum that stay as they are.
+MOST_UNSOLVED = 200
+
+
+def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Readings:
+    r"""The readings, with rows that were driven nearly alike as one row where there are many.
+
+    .. math::
+        y_c = f(x_c; \theta_0) + \frac{\sum_i w_i [y_i - f(x_i; \theta_0)]}{\sum_i w_i}, \quad
+        w_i = \sigma_i^{-2}, \quad \sigma_c = \left(\sum_i w_i\right)^{-1/2}
+
+    for the rows i of a cell c, whose operating points :math:`x_i` have the mean :math:`x_c`. What
+    differs within a cell is subtracted as the model has it at :math:`\theta_0`, so that the
+    condensed readings change with the parameters as the mean of all does: at :math:`\theta_0`
+    exactly, and beside it to second order in the width of the cells. Therefore
+    :math:`\theta_0` is a fit, of a part of the rows first, and then of the condensed ones.
+
+    Noise of slip and load becomes part of the noise of the readings. The squared distances within
+    the cells are kept for the misfit. Rows without equilibrium at :math:`\theta_0`, of which there
+    are few where the model holds, stay as they are.
+
+    Parameters
+    ----------
+    case, free
+        The model, and its free parameters.
+    readings
+        Rows (n,); they are returned where there are no more than `MOST_ROWS`.
+
+    Raises
+    ------
+    FitError
+        As `nonlinear` does.
+    """
+    count = len(readings.row_slip)
+    if count <= MOST_ROWS:
+        return readings
+    part = np.random.default_rng(0).permutation(count)[:FIRST_ROWS]
+    fewer = readings.of_rows(np.sort(part))[1]
+    cell: Integers | None = None
+    for _ in range(ROUNDS):
+        # near the optimum is enough: errors that rows share, which cost time, are left out
+        fit = nonlinear(case, replace(fewer, shared_errors={}), free)
+        known = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
+        residual, std = _residuals(known, readings)
+        if cell is None:
+            cell = cells_of(_coordinates(readings, std), _groups(readings.at), CELLS)
+        fewer = _condensed_at(known, readings, residual, std, cell)
+    return fewer
+
+
+def _condensed_at(
+    known: Case, readings: Readings, residual: Floats, std: Floats, cell: Integers
+) -> Readings:
+    """The condensed rows of cells (n,), with the differences that a known case has within them."""
+    n, has = len(readings.row_slip), np.isfinite(residual)
+    solved = np.zeros(n, bool)
+    solved[readings.row[has]] = True
+    measured = np.zeros(n, bool)
+    measured[readings.row] = True
+    unsolved = np.flatnonzero(measured & ~solved)
+    kept = unsolved[:: len(unsolved) // MOST_UNSOLVED + 1]
+    number = np.full(n, -1)
+    number[solved] = np.unique(cell[solved], return_inverse=True)[1]
+    cells = int(number.max()) + 1
+    first = np.zeros(cells, np.int64)
+    first[number[solved][::-1]] = np.flatnonzero(solved)[::-1]
+    means = _means(readings.at, solved, number[solved], first)
+    at = _joined(means, operating_points_of_rows(readings.at, kept))
+    middle = forces(known, operating_points_of_rows(at, np.arange(cells)))
+    position = np.full(n, -1)
+    position[kept] = cells + np.arange(len(kept))
+    parts: list[tuple[Integers, Integers, Floats, Floats]] = []
+    squares, counted = 0.0, 0
+    for i, name in enumerate(readings.channels):
+        own = np.flatnonzero(has & (readings.channel == i))
+        where, weight = number[readings.row[own]], std[own] ** -2.0
+        total = np.bincount(where, weight, cells)
+        with np.errstate(divide="ignore", invalid="ignore"):  # cells without a reading
+            mean = np.bincount(where, weight * residual[own], cells) / total
+            narrow = total**-0.5
+        squares += float(weight @ (residual[own] - mean[where]) ** 2)
+        left = np.flatnonzero((position[readings.row] >= 0) & (readings.channel == i))
+        counted += own.size + left.size
+        full = np.flatnonzero(total > 0.0)
+        reading = np.append((getattr(middle, name) + mean)[full], readings.reading[left])
+        row = np.append(full, position[readings.row[left]])
+        parts.append((row, np.full(row.size, i), reading, np.append(narrow[full], std[left])))
+    rows, channel, reading, own_std = (np.concatenate(part) for part in zip(*parts, strict=True))
+    count = cells + len(kept)
+    return replace(
+        readings,
+        at=at,
+        run=np.zeros(count, np.int64),
+        runs=readings.runs[:1],
+        order=np.arange(count),
+        row=rows,
+        channel=channel,
+        reading=reading,
+        std=own_std,
+        from_case=np.zeros(len(rows), bool),
+        slip_std=np.zeros(count),
+        load_std=np.zeros(count),
+        condensed=CondensedRows(n, counted, squares, readings.undeclared),
+    )
+
+
+def _residuals(known: Case, readings: Readings) -> tuple[Floats, Floats]:
+    """Residuals (m,) at a known case, NaN where none, and standard deviations.
+
+    Noise that is not declared is that of the residuals.
+    """
+    residual, std = np.full(len(readings), np.nan), np.full(len(readings), np.nan)
+    for block in _blocks(len(readings.row_slip)):
+        selected, part = readings.of_rows(block)
+        prediction = predict(known, [], np.zeros((1, 0)), part)[0]
+        residual[selected] = part.reading - prediction
+        std[selected] = np.hypot(part.noise_at(prediction), noise_of_operation(known, part))
+    for i in range(len(readings.channels)):
+        own = readings.channel == i
+        estimated = max(float(np.sqrt(np.nanmean(residual[own] ** 2))), 1e-15)
+        std[own & ~np.isfinite(std)] = estimated
+    return residual, std
+
+
+def _blocks(count: int) -> Iterator[Integers]:
+    for start in range(0, count, BLOCK):
+        yield np.arange(start, min(start + BLOCK, count))
+
+
+def _coordinates(readings: Readings, std: Floats) -> Floats:
+    """Coordinates (n, d) by which rows are alike.
+
+    Slip, log load and speeds over their spreads, and the logarithm of the noise: near a reading of
+    zero a relative noise, and with it the weight of a row, changes much with little of the slip.
+    """
+    at = readings.at
+    columns = [readings.row_slip, np.log(np.abs(readings.row_load))]
+    columns += [np.asarray(v) for name in COVARIATES if np.ndim(v := getattr(at, name))]
+    columns = [c / spread for c in columns if (spread := c.std()) > 0.0]
+    for i in range(len(readings.channels)):
+        own = readings.channel == i
+        log_std = np.full(len(readings.row_slip), np.nan)
+        log_std[readings.row[own]] = np.log(std[own])
+        columns.append(np.where(np.isfinite(log_std), log_std, np.nanmean(log_std)))
+    return np.stack(columns, axis=1)
+
+
+def _groups(at: Operating) -> Integers:
+    """Rows (n,) that are never one: of two gears, of two passes, driving and braking."""
+    slip = np.asarray(at.slip)
+    number = np.zeros(slip.shape) if at.pass_number is None else np.asarray(at.pass_number)
+    passes = np.unique(np.broadcast_to(number, slip.shape), return_inverse=True)[1]
+    return np.asarray((gear_numbers(at) * (passes.max() + 1) + passes) * 2 + (slip < 0.0))
+
+
+def _means(
+    at: Operating, solved: NDArray[np.bool_], number: Integers, first: Integers
+) -> Operating:
+    """Mean operating points (cells,) of the solved rows by the number of their cell."""
+    count = np.bincount(number, minlength=len(first))
+    means = {
+        name: np.bincount(number, np.asarray(value)[solved], len(first)) / count
+        for name in ("slip", "load", *COVARIATES)
+        if np.ndim(value := getattr(at, name))
+    }
+    gear = None if at.gear is None else np.asarray(at.gear)[first]
+    return replace(at, gear=gear, **means)
+
+
+def _joined(at: Operating, more: Operating) -> Operating:
+    """The operating points of both."""
+    arrays = {
+        name: np.append(value, getattr(more, name))
+        for name in ("slip", "load", "gear", *COVARIATES)
+        if np.ndim(value := getattr(at, name))
+    }
+    return replace(at, **arrays)
+
+
+def cells_of(points: Floats, groups: Integers, most: int) -> Integers:
+    """Number of the cell of each of n rows, (n,).
+
+    The cell whose points scatter most, all together, is divided at the mean of the coordinate in
+    which they do, until there are `most` cells or the points of each are equal.
+
+    Parameters
+    ----------
+    points
+        Coordinates (n, d), scaled so that their distances compare.
+    groups
+        Rows of different groups (n,) share no cell.
+    most
+        Number of cells, of which there are no more unless there are more groups.
+    """
+    waiting: list[tuple[float, int, int, Integers]] = []
+    done: list[Integers] = []
+
+    def put(rows: Integers) -> None:
+        scatter, widest = _scatter(points, rows)
+        if scatter > 0.0:
+            heappush(waiting, (-scatter, int(rows[0]), widest, rows))
+        else:
+            done.append(rows)
+
+    heapify(waiting)
+    for group in np.unique(groups):
+        put(np.flatnonzero(groups == group))
+    while waiting and len(waiting) + len(done) < most:
+        _, _, widest, rows = heappop(waiting)
+        values = points[rows, widest]
+        low = values <= values.mean()
+        if low.all() or not low.any():  # equal but for rounding
+            done.append(rows)
+            continue
+        put(rows[low])
+        put(rows[~low])
+    cell = np.zeros(len(points), np.int64)
+    for number, rows in enumerate([*done, *(entry[3] for entry in waiting)]):
+        cell[rows] = number
+    return cell
+
+
+def _scatter(points: Floats, rows: Integers) -> tuple[float, int]:
+    """Largest sum of squared distances from the mean of a coordinate, and this coordinate."""
+    own = points[rows]
+    sums = ((own - own.mean(axis=0)) ** 2).sum(axis=0)
+    widest = int(np.argmax(sums))
+    return float(sums[widest]), widest
