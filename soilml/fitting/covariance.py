@@ -209,30 +209,31 @@ def noise_of_operation(
         + \left(\frac{\partial y}{\partial W} \sigma_W\right)^2
 
     First order: the change over one standard deviation, centred, at coordinates x (p,) of the
-    case. Rows that have no equilibrium beside them count as exact. That the readings of one row share their slip and load
-    is left out, so that the noise of sets of several channels is overstated rather than
-    understated.
+    case. Rows that have no equilibrium beside them count as exact. That the readings of one row
+    share their slip and load is left out, so that the noise of sets of several channels is
+    overstated rather than understated.
     """
     slip, load = readings.row_slip, readings.row_load
     x = np.zeros(0) if x is None else x
     total = np.zeros(len(readings))
-    moves = {
-        "slip": (slip, readings.slip_std, -MOST_SLIP, MOST_SLIP),
-        "load": (load, readings.load_std, LEAST_LOAD * load, MOST_LOAD * load),
-    }
-    for name, (values, std, least, most) in moves.items():
-        if not np.any(std > 0.0):
-            continue
-        low, high = (
-            predict(case, coordinates, x[None, :], _moved(readings, name, moved))[0]
-            for moved in (np.clip(values + sign * 0.5 * std, least, most) for sign in (-1.0, 1.0))
-        )
-        total = np.hypot(total, np.nan_to_num(high - low))
+    for name, values, std in (
+        ("slip", slip, readings.slip_std),
+        ("load", load, readings.load_std),
+    ):
+        if np.any(std > 0.0):
+            ends = [_moved(readings, name, values + sign * 0.5 * std) for sign in (-1.0, 1.0)]
+            low, high = (predict(case, coordinates, x[None, :], end)[0] for end in ends)
+            total = np.hypot(total, np.nan_to_num(high - low))
     return np.asarray(total)
 
 
 def _moved(readings: Readings, name: str, values: Floats) -> Readings:
-    at = replace(readings.at, slip=values) if name == "slip" else replace(readings.at, load=values)
+    """The readings at other slips or loads (n,), kept where the model is defined."""
+    if name == "slip":
+        at = replace(readings.at, slip=np.clip(values, -MOST_SLIP, MOST_SLIP))
+    else:
+        load = readings.row_load
+        at = replace(readings.at, load=np.clip(values, LEAST_LOAD * load, MOST_LOAD * load))
     return replace(readings, at=at)
 
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
+from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
 from soilml.numerics.resampling import systematic_resampling
-from soilml.numerics.importance_sampling import importance_sample
 from soilml.traction.soil_draws import DRAWS, SoilDraws
 
 Floats = NDArray[np.float64]

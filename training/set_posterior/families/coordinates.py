@@ -26,7 +26,7 @@ NORMAL_TRUNCATION = 2.5
 
 
 @dataclass(frozen=True)
-class SoilCoordinate:
+class Coordinate:
     r"""A parameter's value along its coordinate x, and the density of its prior there.
 
     .. math:: \theta = \alpha + \beta e^{\gamma x} + \delta x, \qquad \log p(x) = \lambda x + const
@@ -52,7 +52,7 @@ class SoilCoordinate:
     tilt: float = 0.0
 
     @staticmethod
-    def of(name: str, prior: Prior) -> SoilCoordinate:
+    def of(name: str, prior: Prior) -> Coordinate:
         """The coordinate for a prior, uniform in the value or in its logarithm."""
         if prior.normal_std is not None:
             raise InputError(
@@ -64,12 +64,12 @@ class SoilCoordinate:
         ):
             rate = 0.5 * math.log(upper / lower)
             tilt = 0.0 if prior.log else rate
-            return SoilCoordinate(name, factor=math.sqrt(lower * upper), rate=rate, tilt=tilt)
+            return Coordinate(name, factor=math.sqrt(lower * upper), rate=rate, tilt=tilt)
         if 0.0 <= lower <= ZERO_SHARE * upper:
             rate, size = 0.5 * math.log(OFFSET_RATIO), (upper - lower) / (OFFSET_RATIO - 1.0)
             factor = size * math.sqrt(OFFSET_RATIO)
-            return SoilCoordinate(name, shift=lower - size, factor=factor, rate=rate, tilt=rate)
-        return SoilCoordinate(name, shift=0.5 * (lower + upper), slope=0.5 * (upper - lower))
+            return Coordinate(name, shift=lower - size, factor=factor, rate=rate, tilt=rate)
+        return Coordinate(name, shift=0.5 * (lower + upper), slope=0.5 * (upper - lower))
 
     def value(self, x: Floats) -> Floats:
         """The parameter at coordinates x, of any shape."""

@@ -18,7 +18,7 @@ from soilml.onboard.set_contract import LEAST_STD
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
-from training.set_posterior.families.coordinates import SoilCoordinate
+from training.set_posterior.families.coordinates import Coordinate
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ class WheelFamily(Protocol):
     """
 
     @property
-    def axes(self) -> tuple[SoilCoordinate, ...]:
+    def axes(self) -> tuple[Coordinate, ...]:
         """All unknowns."""
         ...
 
