@@ -213,6 +213,7 @@ def test_the_page_is_self_contained(whole):
     assert "http:" not in html and "https:" not in html and "@import" not in html
 
 
+@pytest.mark.slow
 def test_hostile_names_stay_text():
     c = curves()
     whole = report(
@@ -248,6 +249,7 @@ def test_the_same_report_gives_the_same_bytes():
     assert page(report(), "rover.toml", "runs.csv") == page(report(), "rover.toml", "runs.csv")
 
 
+@pytest.mark.slow
 def test_the_page_contains_the_figures_of_the_report():
     seen = read(page(report(), "rover.toml", "runs.csv"))
     text = " ".join(" ".join([*seen.text, *figures(seen)]).split())
@@ -268,6 +270,7 @@ def test_the_page_contains_the_figures_of_the_report():
         assert figure in text, figure
 
 
+@pytest.mark.slow
 def test_costs_of_runs_are_shown_where_they_are_given():
     costly = (NextRun("reverse", "the same slips in reverse", 7.25, (), cost=12.0),)
     plain, priced = (page(r, "m", "r") for r in (report(), report(next_runs=costly)))
