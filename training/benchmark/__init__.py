@@ -4,10 +4,3 @@
 (in `acceptance`) tests the scores against acceptance goals; `compare` (in `user_comparison`) does
 the same on the user's test data, without a Bayes limit.
 """
-
-from training.benchmark.acceptance import Goal, goals
-from training.benchmark.paired_results import MethodResult, PairedResult
-from training.benchmark.suite import benchmark
-from training.benchmark.user_comparison import MethodScores, compare
-
-__all__ = ["Goal", "MethodResult", "MethodScores", "PairedResult", "benchmark", "compare", "goals"]

@@ -54,33 +54,23 @@ SCALAR_COLUMNS = ("log_density", "denser", "flagged")
 HINT = "compute it again: soilml compare --limit FILE.parquet"
 
 
-class SetIdentity(Protocol):
-    """What identifies a set whose posterior is stored."""
+class StoredSet(Protocol):
+    """What identifies a set whose posterior is stored.
+
+    The unmodelled effect, blank where none; the key of the design and the number within it; the
+    estimated parameters; and a hash of the rows.
+    """
 
     @property
-    def effect(self) -> str:
-        """The unmodelled effect, blank where none."""
-        ...
-
+    def effect(self) -> str: ...
     @property
-    def design(self) -> str:
-        """Key of the experimental design."""
-        ...
-
+    def design(self) -> str: ...
     @property
-    def number(self) -> int:
-        """Number of the set within its design."""
-        ...
-
+    def number(self) -> int: ...
     @property
-    def names(self) -> tuple[str, ...]:
-        """The estimated parameters."""
-        ...
-
+    def names(self) -> tuple[str, ...]: ...
     @property
-    def hash(self) -> str:
-        """Hash of the set's rows."""
-        ...
+    def hash(self) -> str: ...
 
 
 @dataclass(frozen=True)
@@ -109,7 +99,7 @@ def packaged_limit() -> Path:
 
 def save_limit(
     path: str | os.PathLike[str],
-    sets: Sequence[SetIdentity],
+    sets: Sequence[StoredSet],
     summaries: Sequence[PosteriorSummary],
 ) -> None:
     """Write one row per set, as float32; the file is replaced atomically."""
@@ -130,7 +120,7 @@ def save_limit(
 
 
 def load_limit(
-    path: str | os.PathLike[str], sets: Sequence[SetIdentity], hint: str = HINT
+    path: str | os.PathLike[str], sets: Sequence[StoredSet], hint: str = HINT
 ) -> BayesLimit:
     """The stored posteriors of these sets, in their order.
 

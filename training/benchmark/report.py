@@ -209,10 +209,8 @@ def short_tables(results: Sequence[PairedResult]) -> str:
             title += f"\nsimulated with {same[0].effect}, which no method models"
             blocks.append(f"{title}\n\n{_short_table(same)}")
             continue
-        header, rows = _full_rows(same)
-        kept = [0, *(1 + 6 * k + i for k in range(len(SHEAR)) for i in (0, 2, 5)), len(header) - 1]
-        cells = [[row[i] for i in kept] for row in rows]
-        blocks.append(f"{title}\n\n{format_table([header[i] for i in kept], cells)}")
+        hidden = {"/prior", "s.e.", "50 %", "joint", "log p", "failed", "flagged"}
+        blocks.append(f"{title}\n\n{format_table(*_without(*_full_rows(same), hidden))}")
     return "\n\n".join(blocks)
 
 
@@ -255,20 +253,15 @@ def _full_rows(same: Sequence[PairedResult]) -> tuple[list[str], list[list[str]]
 
 
 def _short_rows(same: Sequence[PairedResult]) -> tuple[list[str], list[list[str]]]:
-    header = ["method"]
-    for symbol, (_, unit) in zip(SHEAR_SYMBOLS, SHEAR_UNITS, strict=True):
-        header += [f"{symbol} {unit}", "90 %"]
-    rows = []
-    for r in same:
-        row = [r.method]
-        for k, (factor, _) in enumerate(SHEAR_UNITS):
-            row += [
-                format_number(r.rmse[k] * factor, ".3g"),
-                format_number(r.coverage90[k], ".0%"),
-            ]
-        row += [format_number(r.joint_coverage90, ".0%"), str(r.failed or "")]
-        rows.append([*row, f"{r.flagged_fraction:.0%}"])
-    return [*header, "joint", "failed", "flagged"], rows
+    return _without(*_full_rows(same), {"/prior", "/limit", "s.e.", "50 %", "log p", "ms"})
+
+
+def _without(
+    header: list[str], rows: list[list[str]], hidden: set[str]
+) -> tuple[list[str], list[list[str]]]:
+    """A table without the columns of some names."""
+    kept = [i for i, name in enumerate(header) if name not in hidden]
+    return [header[i] for i in kept], [[row[i] for i in kept] for row in rows]
 
 
 #: Columns of the tables, explained.

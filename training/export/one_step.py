@@ -16,7 +16,7 @@ from soilml.onboard.set_contract import (
     SET_PREFIX,
     SET_SWITCH,
 )
-from training.onnx_graph.builder import SHORTCUT
+from training.onnx_graph.builder import SHORTCUT, needed_nodes
 
 #: Names of constants of the graph.
 ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"
@@ -156,15 +156,10 @@ def _renamed(node: Any, names: dict[str, str]) -> Any:
 def _pruned(model: Any) -> Any:
     """The model without nodes and constants that no output needs."""
     graph = model.graph
-    needed, kept = {value.name for value in graph.output}, []
-    for node in reversed(graph.node):
-        if needed.intersection(node.output):
-            kept.append(node)
-            needed.update(node.input)
+    kept, needed = needed_nodes(graph.node, [value.name for value in graph.output])
     constants = [one for one in graph.initializer if one.name in needed]
-    del graph.node[:]
-    graph.node.extend(reversed(kept))
-    del graph.initializer[:]
+    del graph.node[:], graph.initializer[:]
+    graph.node.extend(kept)
     graph.initializer.extend(constants)
     return model
 

@@ -13,7 +13,7 @@ from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RA
 from training.export_c.operators import OPERATORS
 from training.export_c.program import Node, Program
 from training.export_c.tensor import Size, Tensor
-from training.onnx_graph.builder import SHORTCUT
+from training.onnx_graph.builder import SHORTCUT, needed_nodes
 
 
 def translate_graph(
@@ -47,7 +47,7 @@ def translate_graph(
         known[initial.name] = Tensor.constant(numpy_helper.to_array(initial), initial.name)
     known |= inputs
     opsets = model.opset_import
-    nodes = _needed(_without_branches(model.graph, known), set(outputs))
+    nodes, _ = needed_nodes(_without_branches(model.graph, known), outputs)
     uses = Counter(name for node in nodes for name in node.input)
     uses.update(dict.fromkeys(outputs, 2))
     for node in nodes:
@@ -80,7 +80,7 @@ def rows_are_apart(model: Any) -> bool:
             "below it; this graph changes earlier rows"
         )
     wanted = {*joined.input[1:], ROW_IN_RANGE}
-    return not any(state in node.input for node in _needed(nodes, wanted))
+    return not any(state in node.input for node in needed_nodes(nodes, wanted)[0])
 
 
 def _source(makers: dict[str, Any], name: str, kind: str, wanted: str = "") -> Any:
@@ -175,16 +175,6 @@ def _without_branches(graph: Any, known: dict[str, Tensor]) -> list[Any]:
             for own, name in zip(branch.output, node.output, strict=True)
         ]
     return nodes
-
-
-def _needed(nodes: list[Any], wanted: set[str]) -> list[Any]:
-    """The nodes that the wanted outputs depend on, in their order."""
-    kept = []
-    for node in reversed(nodes):
-        if any(name in wanted for name in node.output):
-            wanted |= set(node.input)
-            kept.append(node)
-    return kept[::-1]
 
 
 def _comment(node: Any) -> str:

@@ -219,12 +219,8 @@ class Graph:
 
     def _needed(self, outputs: Iterable[str]) -> tuple[list[Any], list[Any]]:
         """The nodes and constants on which outputs depend; values of branches are included."""
-        wanted, nodes = set(outputs), []
-        for node in reversed(self._nodes):
-            if wanted.intersection(node.output):
-                nodes.append(node)
-                wanted.update(_read_by(node))
-        return nodes[::-1], [one for one in self._constants if one.name in wanted]
+        nodes, wanted = needed_nodes(self._nodes, outputs)
+        return nodes, [one for one in self._constants if one.name in wanted]
 
     def model(
         self,
@@ -261,6 +257,16 @@ class Graph:
         model.ir_version = IR_VERSION
         checker.check_model(model, full_check=True)
         return model
+
+
+def needed_nodes(nodes: Iterable[Any], outputs: Iterable[str]) -> tuple[list[Any], set[str]]:
+    """The nodes on which outputs depend, in their order, and the names of all values they need."""
+    wanted, needed = set(outputs), []
+    for node in reversed(list(nodes)):
+        if wanted.intersection(node.output):
+            needed.append(node)
+            wanted.update(_read_by(node))
+    return needed[::-1], wanted
 
 
 def _read_by(node: Any) -> set[str]:

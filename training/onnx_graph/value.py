@@ -198,44 +198,15 @@ def constant(graph: Graph, value: Any, dtype: type = np.float32) -> Value:
     return Value(graph, graph.constant(np.asarray(value, dtype=dtype), exact=True), dtype)
 
 
-def exp(x: Value) -> Value:
-    """Exponential."""
-    return x.node("Exp")
+def _function(kind: str) -> Callable[[Value], Value]:
+    """A function of each element, as one node."""
+    return lambda x: x.node(kind)
 
 
-def log(x: Value) -> Value:
-    """Natural logarithm."""
-    return x.node("Log")
-
-
-def sqrt(x: Value) -> Value:
-    """Square root."""
-    return x.node("Sqrt")
-
-
-def tanh(x: Value) -> Value:
-    """Hyperbolic tangent."""
-    return x.node("Tanh")
-
-
-def asinh(x: Value) -> Value:
-    """Inverse hyperbolic sine."""
-    return x.node("Asinh")
-
-
-def absolute(x: Value) -> Value:
-    """Absolute value."""
-    return x.node("Abs")
-
-
-def floor(x: Value) -> Value:
-    """Largest whole number that is not above the value."""
-    return x.node("Floor")
-
-
-def reciprocal(x: Value) -> Value:
-    """One over the value."""
-    return x.node("Reciprocal")
+#: Functions of one value, element by element, named as in numpy.
+exp, log, sqrt = _function("Exp"), _function("Log"), _function("Sqrt")
+tanh, asinh, absolute = _function("Tanh"), _function("Asinh"), _function("Abs")
+floor, reciprocal = _function("Floor"), _function("Reciprocal")
 
 
 def softmax(x: Value, axis: int) -> Value:
