@@ -13,7 +13,7 @@ from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.io.read_table import FILLED, read_table
 from soilml.io.table import Table
-from soilml.log_import.checks.table_remarks import table_remarks
+from soilml.log_import.checks.table_hints import table_remarks
 
 Result = TypeVar("Result")
 

@@ -23,13 +23,10 @@ from soilml.report.figure_style import (
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import FigureBase
 
 #: Colours of loads, from light to heavy.
 _LOADS = ("#0d0887", "#9c179e", "#cc4778", "#e0603f", "#d98300")
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
-
 #: Panels of a run: title with unit, quantities, and labels.
 _PANELS = (
     ("speed, m/s", ("rim_speed", "speed"), ("rim", "travel")),
@@ -142,8 +139,7 @@ def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
             values = scale * series.quantities[name]
             if name == "slip":
                 values = np.where(_turning(series), values, np.nan)
-            moving = values
-            shown.append(moving[np.isfinite(moving)])
+            shown.append(values[np.isfinite(values)])
             axes.plot(*_thinned(series.time, values), color=colour, lw=0.7, alpha=0.65)
             if label:
                 axes.plot([], [], color=colour, label=label)

@@ -1,15 +1,20 @@
 """Rows of a table of runs that look as if a unit, a sign or the radius were wrong.
 
-Imports numpy alone, so that it can be called on board. Nothing here is impossible: hints are
-remarks. What is impossible, such as a slip of 2, is refused where the table is read.
+Nothing here is impossible: hints are remarks. What is impossible, such as a slip of 2, is refused
+where the table is read.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from soilml.config.case import Case
+from soilml.fitting.operating_points import with_rover_columns
+from soilml.io.table import Table
 from soilml.log_import.recording import Floats
 from soilml.remarks import Remark
 
@@ -257,3 +262,30 @@ def _angles(columns: Mapping[str, Floats], radius: Floats | float | None) -> Ite
                 f"{name} goes to {np.nanmax(np.abs(values)):.3g}: probably it is in degrees",
                 (name,),
             )
+
+
+def table_remarks(table: Table, case: Case | None, radius: float | None = None) -> list[Remark]:
+    """A remark for each oddity of a table; see `table_hints`.
+
+    The radius of the wheel (m) is that of the case, else `radius`; None where it is not known.
+    """
+    used = table.rows(table.answered)
+    if case is not None and case.gears:
+        used = with_rover_columns(case, used)
+    radii = radius if case is None else _radii(used, case)
+    if not len(used):
+        return []
+    hints = table_hints(used.columns, radii)
+    return [replace(hint, text=f"{table.source}: {hint.text}") for hint in hints]
+
+
+def _radii(table: Table, case: Case) -> NDArray[np.float64] | None:
+    """Radius of each row, (rows,), m; None for a gear without a radius."""
+    if not case.gears:
+        radius = getattr(case.model.gear, "radius", None)
+        return None if radius is None else np.full(len(table), float(radius))
+    first = next(iter(case.gears))
+    names = table["gear"] if "gear" in table else np.full(len(table), first)
+    radii = {name: getattr(model.gear, "radius", None) for name, model in case.gears.items()}
+    found = [radii.get(str(name) or first) for name in names]
+    return None if any(r is None for r in found) else np.asarray(found, dtype=np.float64)

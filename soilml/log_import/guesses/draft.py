@@ -38,7 +38,7 @@ def toml_value(value: Any) -> str:
 
 
 class Marked(str):
-    """A line of a map, or the comment of a key, with what no log can tell: a person must look."""
+    """A line of a map, or the comment of a key, with what no log shows: a person must look."""
 
 
 def key_line(key: str, value: Any, comment: str = "") -> str:

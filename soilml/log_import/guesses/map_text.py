@@ -89,7 +89,7 @@ class DraftedMap:
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
     """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
 
-    Guesses come from names, units and the behaviour of the values. What no log can tell, such as
+    Guesses come from names, units and the behaviour of the values. What no log shows, such as
     the radius, is marked with CHANGE or NEEDED.
 
     Raises `InputError` where a file cannot be read or has no columns.

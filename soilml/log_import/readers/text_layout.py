@@ -44,7 +44,7 @@ _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*"
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
-#: Name of the column that tells the blocks apart.
+#: Name of the column that distinguishes the blocks.
 BLOCK = "block"
 #: Fewest samples of a block, and most blocks.
 _SHORTEST, _MOST = 20, 1000

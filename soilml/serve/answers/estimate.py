@@ -17,7 +17,7 @@ from soilml.identification import Fit, identify
 from soilml.identification.typical_errors import fit_with_typical_errors
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
-from soilml.log_import.checks.table_remarks import table_remarks
+from soilml.log_import.checks.table_hints import table_remarks
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark, texts
@@ -70,7 +70,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     }
     return {
         **table_summary(table),
-        "remarks": remarks,
+        "remarks": texts(remarks),
         "parameters": parameters(case, fit, typical),
         "use": "" if both is None else both.remark().text,
         "words": words(fit, advice),

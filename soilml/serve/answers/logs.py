@@ -12,11 +12,12 @@ from soilml.config.case import Case
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
-from soilml.log_import.checks.table_remarks import table_remarks
+from soilml.log_import.checks.table_hints import table_remarks
 from soilml.log_import.guesses.map_text import draft_map
 from soilml.log_import.page import page
 from soilml.log_import.workflow import import_log
 from soilml.quantities import COLUMNS
+from soilml.remarks import texts
 from soilml.report.result_files import json_text
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
@@ -36,7 +37,7 @@ def look(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     if len(names) > 1 or not is_table_of_runs(Path(names[0])):
         return {"kind": "log"}
     table = read_table(names[0], RUNS)
-    return {"kind": "runs", **table_summary(table), "remarks": table_remarks(table, None)}
+    return {"kind": "runs", **table_summary(table), "remarks": texts(table_remarks(table, None))}
 
 
 def guess_map(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
@@ -59,7 +60,7 @@ def import_logs(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     accept = request.get("accept") is True
     found = import_log(request["names"], log_map, accept=accept, progress=progress)
     tell("drawing the report")
-    texts = {
+    contents = {
         RUNS_FILE: csv_text(found.table.columns),
         "import_report.html": page(found, progress),
         "import_report.json": json_text(found.as_json()),
@@ -72,10 +73,10 @@ def import_logs(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "kind": "runs",
         **table_summary(found.table),
         "name": RUNS_FILE,
-        "remarks": [remark.text for remark in (*found.implausible, *found.remarks)],
+        "remarks": texts((*found.implausible, *found.remarks)),
         "left_out": left_out,
         "seconds": whole,
-        "files": write_files(texts),
+        "files": write_files(contents),
     }
 
 
