@@ -53,8 +53,9 @@ class SinkageEstimate:
 
     Where the load carried rises through the load more than once, the crossing next to the estimate
     need not be the first, at which a gear comes to rest. With `nearest` it is accepted, and rows
-    that are not solved from the estimate are left so, as trials of a descent may whose result is
-    solved again; without, it is checked, and such rows are solved, as in an ordinary search.
+    that are not solved from the estimate stay so: trials of a descent, whose result is solved
+    again, permit that. Without, the crossing is checked, and such rows are solved as in an ordinary
+    search.
     """
 
     log_sinkage: Array  # ln(z / m)

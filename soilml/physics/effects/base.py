@@ -204,9 +204,9 @@ class SlipLoadScaling(Effect):
         e^{b_s (|s| - 0.3)}
 
     All three exponents are zero unless they were fitted to data. The power describes effects that
-    need slip (exponent near 1), the exponential those that saturate or grow steeply at high slip.
-    `law_terms` are the exponents that may be fitted: the deflection of a wheel, for one, does not
-    depend on slip.
+    need slip (exponent near 1). The exponential describes those that saturate or grow steeply at
+    high slip. `law_terms` are the exponents that may be fitted: the deflection of a wheel, for one,
+    does not depend on slip.
     """
 
     law_terms: ClassVar[tuple[str, ...]] = ("slip_power", "by_slip", "by_load")

@@ -32,9 +32,9 @@ class Grousers(SlipLoadScaling):
     r_s omega - v cos(theta) over time (Wong and Reece, J. Terramechanics 4(1), 1967).
 
     For lugs so close that the soil between them moves with the wheel. The passive thrust of single
-    lugs (Wong, Theory of Ground Vehicles, chapter 2) is the other limit, for lugs far apart; the
-    two must not be added, and with all lugs at full passive failure it asks for several times the
-    drawbar pull that small lugged wheels show.
+    lugs (Wong, Theory of Ground Vehicles, chapter 2) is the other limit, for lugs far apart. The
+    two must not be added. With all lugs at full passive failure that limit gives several times the
+    measured drawbar pull of small lugged wheels.
     """
 
     name: ClassVar[str] = "grousers"

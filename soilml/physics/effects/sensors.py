@@ -220,8 +220,8 @@ class SlipOffset(Effect):
     .. math:: s = s' - s_0
 
     with s' as reported. An estimate of slip from images or from motor current can have such an
-    error; a wrong travel speed or wheel radius has the form of `slip-scale` instead, which equals
-    an offset of -e at small slip and vanishes towards full slip. References: sensor error of first
+    error. A wrong travel speed or wheel radius has the form of `slip-scale` instead: it equals an
+    offset of -e at small slip and vanishes towards full slip. References: sensor error of first
     order.
     """
 

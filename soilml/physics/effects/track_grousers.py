@@ -24,15 +24,16 @@ class TrackGrousers(SlipLoadScaling):
         g = 1 - \frac{l_w}{l_l}
 
     with g the share of the pitch between two tips. References: Wang et al. 2018, eqs. 10-14, after
-    Grecenko 2007: the tips count as a bare track, (l_w / l_l) DP; the rest is compressed by
-    F_x = a j^d up to j_k and then rubs, F_x = F_zt f_g. Their sum over the grousers is taken in
-    the mean over where the grousers happen to stand, an integral along the track. Ours, for the
-    paper does not print them: f_g = tan(phi); cohesion on the face sheared off below the tips and
-    on both sides of it, for the block between two grousers comes off as a whole; a such that the
-    two branches meet; d; and j_k in shear moduli, so that two soils differ by c, phi and K alone.
-    The paper's further cosine of the inclination in the friction is left out: it rubs along the
-    belt. Not for grousers so far apart that soil between them fails in wedges of its own, and
-    without friction on the block's sides. Before `shear-softening` in a model, where both soften.
+    Grecenko 2007: the tips count as a bare track, (l_w / l_l) DP; the rest is compressed by F_x = a
+    j^d up to j_k and then rubs, F_x = F_zt f_g. Their sum over the grousers is taken in the mean
+    over where the grousers happen to stand, an integral along the track. Not printed there, and our
+    own: f_g = tan(phi); cohesion on the face sheared off below the tips and on both sides of it,
+    because the block between two grousers comes off as a whole. The factor a makes the two branches
+    meet. The exponent d is ours too, and so is j_k in shear moduli: two soils differ by c, phi and
+    K alone. The paper's further cosine of the inclination in the friction is left out: it rubs
+    along the belt. Not for grousers so far apart that soil between them fails in wedges of its own,
+    and without friction on the block's sides. Before `shear-softening` in a model, where both
+    soften.
     """
 
     name: ClassVar[str] = "track-grousers"

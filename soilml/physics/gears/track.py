@@ -39,16 +39,15 @@ class Track:
     with alpha the inclination of the belt. The soil is loaded along k z^n under the front wheel as
     far as z_1, springs back and is loaded again along k_u (`track_belt.equivalent_depth`), and
     follows k z^n again where the rear wheel presses it deeper. Where the belt rises so far that no
-    pressure remains it does not touch, and there is no shear either
-    (`track_belt.shear_retention`). Load and forces are those of one track. References: Wang, Yan
-    and Du, J. Terramechanics 77, 2018, eqs. 1-9; Okello, Watany and Crolla, J. agric. Engng Res.
-    69, 1998. The trim angle comes from the balance of displacements, so that the centre of mass and
-    the hitch are those which that trim needs; tensions at the joints are inner forces, and the
-    middle arc's tension is the one that its pressure and radius ask for
-    (`soilml.systems.tracked_robot.track_balance`). While it brakes, shear reverses between the
-    nodes: forces are then accurate to some parts in a thousand, at worst in a hundred, and where
-    shear is many times the load, sinkage need not rise from one load to the next. Not for belts
-    stiff in bending, road wheels between the end wheels, or turning.
+    pressure remains it does not touch, and there is no shear either (`track_belt.shear_retention`).
+    Load and forces are those of one track. References: Wang, Yan and Du, J. Terramechanics 77,
+    2018, eqs. 1-9; Okello, Watany and Crolla, J. agric. Engng Res. 69, 1998. The trim angle comes
+    from the balance of displacements, so that the centre of mass and the hitch follow from it.
+    Tensions at the joints are inner forces; that of the middle arc follows from its pressure and
+    radius (`soilml.systems.tracked_robot.track_balance`). While it brakes, shear reverses between
+    the nodes: forces are then accurate to some parts in a thousand, at worst in a hundred. Where
+    shear is many times the load, sinkage need not rise with the load. Not for belts stiff in bending,
+    road wheels between the end wheels, or turning.
     """
 
     name: ClassVar[str] = "track"

@@ -19,9 +19,9 @@ FADING_PRESSURE = 0.05
 class Belt:
     """Inclinations where the arcs of a track meet, their radii and depths; arrays (batch,).
 
-    The inclination is that of the belt against the ground, positive where it leads down backwards:
-    it falls from `entry` to -`leave` around the front wheel, rises to `meet` along the middle arc,
-    which bulges upwards, and falls to -`exit` around the rear wheel.
+    The inclination is that of the belt against the ground, positive where it leads down backwards.
+    It falls from `entry` to -`leave` around the front wheel and rises to `meet` along the middle
+    arc, which bulges upwards. Around the rear wheel it falls to -`exit`.
     """
 
     entry: Array  # rad, theta_11
@@ -115,9 +115,9 @@ def shear_retention(belt: Belt, deepest: Array, height: Array) -> Array:
 
     .. math:: 1 - e^{-\sigma / (0.05 \sigma_u)}
 
-    It is 1 except in the last few per cent of the pressure, and 0 where the belt does not touch:
-    otherwise cohesion would end abruptly there, and the pull would have no derivative where the
-    belt is about to lift off. The form is ours.
+    It is 1 except in the last few per cent of the pressure, and 0 where the belt does not touch.
+    Otherwise cohesion would end abruptly, and the pull would have no derivative where the belt
+    lifts off. The form is ours.
     """
     xp = namespace(height)
     pressure = 1.0 - height / (belt.rebound * deepest)  # as a fraction of the largest

@@ -41,12 +41,12 @@ class Wheel(RigidWheel):
 
         j(\theta) = r [\theta_1 - \theta - (1 - s)(\sin\theta_1 - \sin\theta)]
 
-    While the wheel brakes, 1 - s gives way to the travel ratio v / (r omega) = 1 / (1 + s), and
-    shear stress has the sign of j: backward in front of the point where j is back at zero, forward
-    behind it. Torque, pull and sinkage are continuous through zero slip, and a wheel that is towed
-    without torque has a small negative slip. `braking="slip-sign"` is the law as the source papers
-    print it: 1 - s at any slip, \|j\|, and the sign of the slip along the rim, so that the three
-    jump at zero slip.
+    While the wheel brakes, the travel ratio v / (r omega) = 1 / (1 + s) replaces 1 - s, and shear
+    stress has the sign of j. It points backward in front of the point where j is back at zero,
+    forward behind it. Torque, pull and sinkage are continuous through zero slip, and a wheel that
+    is towed without torque has a small negative slip. `braking="slip-sign"` is the law as the
+    source papers print it: 1 - s at any slip, \|j\|, and the sign of the slip along the rim, so
+    that the three jump at zero slip.
 
     References: Wong and Reece, J. Terramechanics 4(1), 1967; the same set in Nagatani et al. 2009,
     eqs. 3-10; the two directions of shear under a towed wheel, Wong and Reece, J. Terramechanics

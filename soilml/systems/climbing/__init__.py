@@ -1,7 +1,7 @@
 """Climbing ability of a rover, predicted from gentle slopes and artificial slip.
 
-`identify_ground` estimates cohesion, friction angle and shear modulus from `Climb`s,
-`StressBySlip.fit` describes the stress on the rims as a function of slip, and `climbing_ability`
+`identify_ground` estimates cohesion, friction angle and shear modulus from `Climb`s.
+`StressBySlip.fit` describes the stress on the rims as a function of slip. `climbing_ability`
 predicts drawbar pull and slope against slip; `quantile_band` summarises the samples.
 `SimulatedRover` provides climbs on a known soil.
 

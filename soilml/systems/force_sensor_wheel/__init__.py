@@ -1,7 +1,7 @@
 """A wheel with force sensors in its rim: from readings to shear modulus and drawbar pull.
 
-Readings of the sensors (`SensorReadings`) are averaged in bins of angle (`bin_stress`), the
-averaging over the sensor's disc is removed (`deconvolve`), and the resulting `StressProfile` is
+Readings of the sensors (`SensorReadings`) are averaged in bins of angle (`bin_stress`), and the
+averaging over the sensor's disc is removed (`deconvolve`). The resulting `StressProfile` is
 integrated to load, drawbar pull and torque (`forces_from_profile`). `estimate_shear_modulus` solves
 the force balance of a `SteadyRun`, and `predict_pull` predicts the pull at another slip. Source:
 Nagatani, Ikeda, Sato and Yoshida, IROS 2009.

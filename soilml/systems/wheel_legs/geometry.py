@@ -19,10 +19,9 @@ MAX_LEGS = 6
 class Section:
     """A strip of constant width and curvature: leg, tip or heel (Comin and Saaj 2017, fig. 4).
 
-    `arc` is the height of the arc over its chord, positive to the right when going outwards from
-    the hub along the leg and on along the foot: a leg bulges to the rear, a tip downwards and a
-    heel upwards. The heel of the CIF, -0.5 cm, is thus convex and its tip, -1 cm, concave, as
-    stated in the paper.
+    `arc` is the height of the arc over its chord, positive to the right on the way from the hub
+    along the leg and the foot. A leg bulges to the rear, a tip downwards and a heel upwards. The
+    heel of the CIF, -0.5 cm, is thus convex and its tip, -1 cm, concave, as stated in the paper.
     """
 
     segments: int
