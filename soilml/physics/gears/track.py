@@ -46,8 +46,8 @@ class Track:
     Tensions at the joints are inner forces; that of the middle arc follows from its pressure and
     radius (`soilml.systems.tracked_robot.track_balance`). While it brakes, shear reverses between
     the nodes: forces are then accurate to some parts in a thousand, at worst in a hundred. Where
-    shear is many times the load, sinkage need not rise with the load. Not for belts stiff in bending,
-    road wheels between the end wheels, or turning.
+    shear is many times the load, sinkage need not rise with the load. Not for belts stiff in
+    bending, road wheels between the end wheels, or turning.
     """
 
     name: ClassVar[str] = "track"
