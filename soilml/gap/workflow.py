@@ -199,7 +199,7 @@ def gap(
         held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
         held_out = held_out.subset(np.isfinite(held_out.std))
     analysis = replace(analysis, result=with_refused_outside(analysis.result))
-    report = _build_report(case, analysis, checks, split, held_out, seed)
+    report = _build_report(case, analysis, checks, split, held_out, seed=seed)
     report = replace(
         report,
         next_runs=tuple(rank_by_cost(report.next_runs, known_costs)),
@@ -224,6 +224,7 @@ def _build_report(
     checks: DataCheckResult,
     split: HoldoutSplit,
     held_out: Readings | None,
+    *,
     seed: int,
 ) -> GapReport:
     """Decide the status, then compute the entries of the report."""

@@ -171,7 +171,9 @@ def audit(
     added_runs = []
     for option in run_options(readings, case, tuple(effects.values())):
         try:
-            extended = _with_added_run(case, readings, option, coordinates, nominal, effects)
+            extended = _with_added_run(
+                case, readings, option, coordinates, nominal, effects=effects
+            )
         except (InputError, np.linalg.LinAlgError):
             continue
         if not extended:

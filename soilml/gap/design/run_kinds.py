@@ -1,4 +1,4 @@
-"""Kinds of runs and checks: what checks and tests of the soil tell, and what each costs."""
+"""Kinds of runs and checks: what checks and tests of the soil determine, and what each costs."""
 
 from __future__ import annotations
 

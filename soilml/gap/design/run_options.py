@@ -37,7 +37,7 @@ class RunOption:
     """A possible run: its kind, a description, its operating points and the gear it needs.
 
     `plain` are the same slips and loads driven as usual, where the run differs by a covariate:
-    the run tells more than a repeat only if some model predicts other readings for it.
+    the run adds more than a repeat only if some model predicts other readings for it.
     """
 
     kind: str
@@ -183,7 +183,7 @@ def _unvaried(value: object) -> bool:
 LUG_EFFECTS = frozenset({"grousers", "track-grousers"})
 #: Kind of a run on such a gear.
 SMOOTH_GEAR = "smooth gear"
-#: Another size of the gear: kind of run -> (parameter, factor, effects that this tells apart). Half
+#: Another size of the gear: kind of run -> (parameter, factor, effects that this separates). Half
 #: as wide or half as large again: other wheels of a small rig, whose effect exceeds the noise.
 SIZES = {
     "narrower gear": ("width", 0.5, frozenset({"sidewall-shear", "wheel-flexibility"})),
@@ -220,7 +220,7 @@ class GearChange:
 
 
 def gear_changes(case: Case, effects: Sequence[type[Effect]]) -> Iterator[GearChange]:
-    """The changes of the gear that tell some of these effects apart from others.
+    """The changes of the gear that separate some of these effects from others.
 
     None where a case has several gears: it is those that are there to drive.
     """
@@ -230,8 +230,8 @@ def gear_changes(case: Case, effects: Sequence[type[Effect]]) -> Iterator[GearCh
     if names & LUG_EFFECTS:
         yield GearChange(SMOOTH_GEAR, "lugs removed or covered")
     sizes = declared(type(case.model.gear))
-    for kind, (parameter, factor, told_apart) in SIZES.items():
-        if names & told_apart and parameter in sizes:
+    for kind, (parameter, factor, separated) in SIZES.items():
+        if names & separated and parameter in sizes:
             size = float(f"{factor * float(getattr(case.model.gear, parameter)):.2g}")
             text = f"a {parameter} of {size:g} m"
             yield GearChange(kind, text, parameter, size)

@@ -350,7 +350,12 @@ def restricted_likelihood(
     counts = np.bincount(readings.channel, minlength=channels).astype(np.float64)
     log_determinant += 2.0 * float(np.log(readings.std).sum())
     return RestrictedLikelihood(
-        basis.shape[1], cross_products, run_products, run_squares, log_determinant, counts
+        fixed=basis.shape[1],
+        cross_products=cross_products,
+        run_products=run_products,
+        run_squares=run_squares,
+        log_determinant=log_determinant,
+        counts=counts,
     )
 
 

@@ -40,7 +40,7 @@ SWEEPS = 2
 class Evidence:
     """-2 ln of a marginal posterior probability, up to a constant that all fits share.
 
-    `amplitude` holds the amplitudes of the discrepancy by channel, in usual ones, at which the
+    `amplitude` has the amplitudes of the discrepancy by channel, in usual ones, at which the
     evidence is largest. `expected_amplitude` is their root mean square over the probability of each
     amplitude, which intervals need: the most probable amplitude is often zero where a discrepancy
     is not excluded. It is not computed where further effects are screened.
@@ -212,7 +212,7 @@ def _size_prior(x: float, *, two_sided: bool) -> tuple[float, float, float]:
     return power * shifted**-2, power * float(np.sign(x)) / shifted, value
 
 
-#: Distance from a bound, as a fraction of the prior, at which a coordinate is held by it.
+#: Distance from a bound, as a fraction of the prior, at which a coordinate counts as fixed by it.
 AT_BOUND = 1e-6
 #: Smallest precision by the likelihood alone: the likelihood is flat over the prior.
 FLAT = 1e-3
@@ -239,8 +239,8 @@ def outside_bounds(fit: Solution, gradient: Floats, curvature: Floats) -> float:
     """
     low = np.asarray([c.lower for c in fit.coordinates])
     high = np.asarray([c.upper for c in fit.coordinates])
-    held = (fit.x <= low + AT_BOUND) | (fit.x >= high - AT_BOUND)
-    movable = np.concatenate([~held, np.ones(len(gradient) - len(held), dtype=np.bool_)])
+    fixed = (fit.x <= low + AT_BOUND) | (fit.x >= high - AT_BOUND)
+    movable = np.concatenate([~fixed, np.ones(len(gradient) - len(fixed), dtype=np.bool_)])
     value = 0.0
     for i, c in enumerate(fit.coordinates):
         if c.effect:
@@ -255,7 +255,7 @@ def outside_bounds(fit: Solution, gradient: Floats, curvature: Floats) -> float:
         integral = _log_integral(
             precision * step, max(precision - UNIFORM_PRECISION, FLAT), low[i] - x, high[i] - x
         )
-        laplace = 0.5 * log(2.0 * pi / precision) + (0.0 if held[i] else 0.5 * precision * step**2)
+        laplace = 0.5 * log(2.0 * pi / precision) + (0.0 if fixed[i] else 0.5 * precision * step**2)
         value -= 2.0 * (integral - laplace)
     return value
 

@@ -29,7 +29,7 @@ def outliers(
     covariance: Covariance,
     residual: Floats,
     space: Floats,
-    alike: Integers | None = None,
+    replicate_group: Integers | None = None,
     run: Integers | None = None,
 ) -> NDArray[np.bool_]:
     r"""Readings (m,) whose studentised residual is large, and which no repeat confirms.
@@ -44,7 +44,7 @@ def outliers(
     residual : array (m,)
     space : array (m, q)
         X, all that soil, effects and smooth functions could explain.
-    alike : array (m,), optional
+    replicate_group : array (m,), optional
         Group of each reading: readings of one group are repeats of each other, of one channel. A
         reading whose repeat strays to the same side and agrees with it is a strange but repeatable
         response and no outlier.
@@ -67,21 +67,27 @@ def outliers(
     if defined.any():
         scale = max(1.0, float(np.median(np.abs(t[defined]))) / Z_50)
     strays = np.abs(t) > OUTLIER_SIGMA * scale
-    if alike is None:
+    if replicate_group is None:
         return np.asarray(strays)
     run = np.zeros(len(residual), dtype=np.int64) if run is None else run
     confirmed = [
-        bool(strays[i]) and _is_confirmed(int(i), covariance, residual, t / scale, alike, run)
+        bool(strays[i])
+        and _is_confirmed(int(i), covariance, residual, t / scale, replicate_group, run)
         for i in range(len(residual))
     ]
     return np.asarray(strays & ~np.asarray(confirmed))
 
 
 def _is_confirmed(
-    i: int, covariance: Covariance, residual: Floats, t: Floats, alike: Integers, run: Integers
+    i: int,
+    covariance: Covariance,
+    residual: Floats,
+    t: Floats,
+    replicate_group: Integers,
+    run: Integers,
 ) -> bool:
     """Whether a repeat of reading `i` strays to the same side, and agrees with it."""
-    repeats = np.flatnonzero(alike == alike[i])
+    repeats = np.flatnonzero(replicate_group == replicate_group[i])
     repeats = repeats[repeats != i]
     of_other_runs = repeats[run[repeats] != run[i]]
     repeats = of_other_runs if of_other_runs.size else repeats

@@ -40,7 +40,7 @@ class FitProblem:
     """Everything that stays the same while candidates are fitted.
 
     `covariance` is that of noise and run-to-run scatter; `discrepancy` adds a smooth discrepancy.
-    `calibration` holds standard deviations of sensor and rig errors by effect name, in the unit of
+    `calibration` has standard deviations of sensor and rig errors by effect name, in the unit of
     the effect's size.
     """
 

@@ -82,10 +82,10 @@ def repeat_disagreement(
     """
     matrix = np.diag(readings.std**2) if covariance is None else covariance
     value = readings.reading if expected is None else readings.reading - expected
-    alike = readings.replicates
+    group_of = readings.replicates
     found = []
     for channel in range(len(readings.channels)):
-        contrasts = _contrasts(alike, readings.channel == channel)
+        contrasts = _contrasts(group_of, readings.channel == channel)
         if not len(contrasts):
             continue
         first, other = contrasts.T
@@ -94,7 +94,7 @@ def repeat_disagreement(
         chi_square = float(
             difference @ np.linalg.solve(rows[:, other] - rows[:, first], difference)
         )
-        pair = _worst_pair(alike, readings.channel == channel, value, matrix)
+        pair = _worst_pair(group_of, readings.channel == channel, value, matrix)
         found.append(
             RepeatComparison(
                 channel=readings.channels[channel],
@@ -134,22 +134,22 @@ def overstated_noise_notes(readings: Readings) -> list[Remark]:
     ]
 
 
-def _contrasts(alike: Integers, in_channel: NDArray[np.bool_]) -> Integers:
+def _contrasts(group_of: Integers, in_channel: NDArray[np.bool_]) -> Integers:
     """The first reading of each group of repeats with each of its others, (k, 2)."""
     pairs = []
-    for group in np.unique(alike[in_channel]):
-        own = np.flatnonzero(in_channel & (alike == group))
+    for group in np.unique(group_of[in_channel]):
+        own = np.flatnonzero(in_channel & (group_of == group))
         pairs += [(own[0], other) for other in own[1:]]
     return np.asarray(pairs, dtype=np.int64).reshape(-1, 2)
 
 
 def _worst_pair(
-    alike: Integers, in_channel: NDArray[np.bool_], value: Floats, matrix: Floats
+    group_of: Integers, in_channel: NDArray[np.bool_], value: Floats, matrix: Floats
 ) -> tuple[int, int]:
     """The two repeats that differ most in standard deviations."""
     own = np.flatnonzero(in_channel)
     first, second = np.triu_indices(len(own), 1)
-    same = alike[own[first]] == alike[own[second]]
+    same = group_of[own[first]] == group_of[own[second]]
     i, j = own[first[same]], own[second[same]]
     variance = np.diag(matrix)
     squares = variance[i] + variance[j] - 2.0 * matrix[i, j]

@@ -116,7 +116,9 @@ def _channel_figure(
         for run in runs:
             here = np.flatnonzero((curves.channel == number) & run.rows)
             if here.size:
-                _plot_run(top, curves, here[np.argsort(curves.slip[here])], factor, run, changed)
+                _plot_run(
+                    top, curves, here[np.argsort(curves.slip[here])], factor, run, changed=changed
+                )
         top.set_title(
             with_unit(channel_name(column), f"({unit})") if unit else channel_name(column)
         )

@@ -70,11 +70,17 @@ def analyse(
 ) -> Analysis:
     """Search for the effects that explain what the soil alone does not.
 
-    `place` gives the file and line of a row, for messages; `progress` is told the share done.
+    `place` gives the file and line of a row, for messages; `progress` is called with the share that
+    is done.
     """
     coordinates = tuple(free)
     problem = FitProblem(
-        case, coordinates, readings, _declared_covariance(readings), effects, calibration
+        case=case,
+        soil=coordinates,
+        readings=readings,
+        covariance=_declared_covariance(readings),
+        effects=effects,
+        calibration=calibration,
     )
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
     soil = problem.fit_soil([nominal, *(np.full(len(free), x) for x in SOIL_STARTS)])
@@ -162,8 +168,8 @@ def _reestimate_covariance(
     readings = readings.with_noise_of_operation(noise_of_operation(case, readings))
 
     covariance = assemble_covariance(readings, columns, typical)
-    alike = readings.replicates * len(readings.channels) + readings.channel
-    is_outlier = outliers(covariance, residual, space, alike, readings.run[readings.row])
+    replicates = readings.replicates * len(readings.channels) + readings.channel
+    is_outlier = outliers(covariance, residual, space, replicates, readings.run[readings.row])
     excluded = [
         (column(readings.channels[readings.channel[i]]), int(readings.row[i]))
         for i in np.flatnonzero(is_outlier)

@@ -71,7 +71,7 @@ class Explanation:
 class CandidateRequest:
     """A set of effects to be fitted.
 
-    `start` holds coordinates by path, and `amplitude` those of the discrepancy by channel, to start
+    `start` has the coordinates by path, and `amplitude` those of the discrepancy by channel, to start
     with. `noise_start` are the coordinates to start with under noise alone, if that is asked for.
     """
 

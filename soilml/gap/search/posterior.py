@@ -74,12 +74,12 @@ class Posterior:
         core = tuple(name for name in names if self.effect_log_odds(name) > 0.0)
         return core if core and core in self.log_weights else names
 
-    def _log_odds(self, holds: Callable[[Names], bool]) -> float:
-        odds = self._log_sum(holds) - self._log_sum(lambda names: not holds(names))
+    def _log_odds(self, counts: Callable[[Names], bool]) -> float:
+        odds = self._log_sum(counts) - self._log_sum(lambda names: not counts(names))
         return float(np.clip(odds, -MOST_LOG_ODDS, MOST_LOG_ODDS))
 
-    def _log_sum(self, holds: Callable[[Names], bool]) -> float:
-        values = [w for names, w in self.log_weights.items() if holds(names)]
+    def _log_sum(self, counts: Callable[[Names], bool]) -> float:
+        values = [w for names, w in self.log_weights.items() if counts(names)]
         return float(np.logaddexp.reduce(values)) if values else -np.inf
 
     def effects(self) -> list[str]:

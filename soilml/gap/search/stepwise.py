@@ -142,7 +142,7 @@ def search(
     none = _soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, none, soil, signatures)
     fitted: dict[tuple[str, ...], Explanation] = {(): none}
-    selected = effects_to_fit(problem, none, soil, signatures, gains, starts)
+    selected = effects_to_fit(problem, none, soil, signatures, gains=gains, starts=starts)
     level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
     fitted |= {c.names: c for c in level}
     for effects in range(1, MAX_EFFECTS):
@@ -301,6 +301,12 @@ def residual_test(
     columns = np.vstack([columns, np.zeros((tests, columns.shape[1]))])
     space = np.vstack([space, np.hstack([rates, np.zeros((tests, space.shape[1] - k))])])
     residual = np.append(fit.residual, -deviation)
-    degrees_of_freedom = problem.covariance.components.degrees_of_freedom
-    test = score_test(residual, columns, space, signs, degrees_of_freedom, seed)
+    test = score_test(
+        residual,
+        columns=columns,
+        space=space,
+        signs=signs,
+        degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
+        seed=seed,
+    )
     return ResidualTest(tuple(signatures), test)

@@ -156,7 +156,7 @@ def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> 
     Values are rounded to significant digits.
 
     The size of each effect gets a uniform prior of three standard deviations to either side, so
-    that its uncertainty is propagated where the model is used. `discrepancy` holds the standard
+    that its uncertainty is propagated where the model is used. `discrepancy` has the standard
     deviations of the smooth discrepancy by column, in the column's unit; None keeps what the case
     declares.
     """

@@ -17,7 +17,7 @@ from soilml.report.numbers import decimal
 Floats = NDArray[np.float64]
 
 #: Factor on the expected amplitude in intervals: the part of a discrepancy that resembles a change
-#: of the soil leaves no residual to tell its amplitude by. It lies between 1.5, with which 90 %
+#: of the soil leaves no residual that determines its amplitude. It lies between 1.5, with which 90 %
 #: intervals covered 86 and 88 % on 50 and 99 simulated sets with a discrepancy of 2 % (seeds 0 and
 #: 7, 6 and 8), and 2, with which they covered 93 % on the 50; without a discrepancy it changed
 #: nothing.
@@ -150,11 +150,11 @@ def discrepancy_map(problem: FitProblem, fit: Solution, seed: int) -> list[Regio
     fit = fit.whitened_by(problem.covariance.whiten)
     test = score_test(
         fit.residual,
-        problem.covariance.whiten @ columns,
-        fit.jacobian,
-        np.zeros(len(parts)),
-        problem.covariance.components.degrees_of_freedom,
-        seed,
+        columns=problem.covariance.whiten @ columns,
+        space=fit.jacobian,
+        signs=np.zeros(len(parts)),
+        degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
+        seed=seed,
     )
     standardised = (problem.readings.reading - fit.prediction) / std
     found = []

@@ -224,7 +224,7 @@ def searched(monkeypatch):
         "residual_test": lambda *_: SimpleNamespace(p_value=seen.p_value),
         "_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
-        "effects_to_fit": lambda *_: ["a"],
+        "effects_to_fit": lambda *_, **__: ["a"],
         "_fit_level": fit_level,
         "_extensions": grown,
         "_is_complete": lambda problem, best, seed: best.names == seen.complete,
