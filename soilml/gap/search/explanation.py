@@ -71,8 +71,8 @@ class Explanation:
 class CandidateRequest:
     """A set of effects to be fitted.
 
-    `start` has the coordinates by path, and `amplitude` those of the discrepancy by channel, to start
-    with. `noise_start` are the coordinates to start with under noise alone, if that is asked for.
+    `start` has the coordinates to start with by path, and `amplitude` those of the discrepancy by
+    channel. `noise_start` are the coordinates to start with under noise alone, if that is asked for.
     """
 
     names: tuple[str, ...]

@@ -17,7 +17,7 @@ from soilml.report.numbers import decimal
 Floats = NDArray[np.float64]
 
 #: Factor on the expected amplitude in intervals: the part of a discrepancy that resembles a change
-#: of the soil leaves no residual that determines its amplitude. It lies between 1.5, with which 90 %
+#: of the soil leaves no residual that determines its size. It lies between 1.5, with which 90 %
 #: intervals covered 86 and 88 % on 50 and 99 simulated sets with a discrepancy of 2 % (seeds 0 and
 #: 7, 6 and 8), and 2, with which they covered 93 % on the 50; without a discrepancy it changed
 #: nothing.
