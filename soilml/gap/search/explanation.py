@@ -72,7 +72,7 @@ class CandidateRequest:
     """A set of effects to be fitted.
 
     `start` has the coordinates to start with by path, and `amplitude` those of the discrepancy by
-    channel. `noise_start` are the coordinates to start with under noise alone, if that is asked for.
+    channel. `noise_start` are those to start with under noise alone, if that is asked for.
     """
 
     names: tuple[str, ...]
