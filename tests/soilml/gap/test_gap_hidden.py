@@ -48,14 +48,14 @@ def test_where_nothing_is_hidden_no_cause_is_named(kind):
 
 def test_run_to_run_variation_is_reported():
     found = analysed("scatter").variance_components
-    assert 0.002 < found["friction_angle_from_run_to_run_rad"] < 0.02  # half a degree is 0.0087
-    assert 0.01 < found["bearing_from_run_to_run"] < 0.12  # 0.05 is true
+    assert 0.002 < found["friction_angle_std"] < 0.02  # half a degree is 0.0087
+    assert 0.01 < found["bearing_std"] < 0.12  # 0.05 is true
 
 
 def test_autocorrelation_is_reported():
-    assert analysed("memory").variance_components["memory_of_samples"] > 0.0
+    assert analysed("memory").variance_components["autocorrelation"] > 0.0
     assert any("noise of neighbouring samples" in note for note in texts(analysed("memory").notes))
-    assert analysed("nothing").variance_components["memory_of_samples"] == 0.0
+    assert analysed("nothing").variance_components["autocorrelation"] == 0.0
 
 
 def test_outliers_are_excluded_and_reported():
