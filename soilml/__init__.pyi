@@ -2,12 +2,15 @@
 
 from soilml.config.case import Case as Case
 from soilml.config.case import read_case as read_case
+from soilml.config.measurement_noise import Noise as Noise
 from soilml.errors import SoilmlError as SoilmlError
+from soilml.fitting.simulation import simulate as simulate
 from soilml.gap import gap as gap
 from soilml.identification import METHODS as METHODS
 from soilml.identification import identify as identify
 from soilml.io.read_table import read_table as read_table
 from soilml.io.table import Table as Table
+from soilml.numerics.prior import Prior as Prior
 from soilml.onboard.estimate import Estimate as Estimate
 from soilml.onboard.estimator import Estimator as Estimator
 from soilml.onboard.tracking import SoilTracker as SoilTracker

@@ -4,19 +4,9 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
 
 from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output, number
 from soilml.errors import InputError
-
-if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from soilml.config.case import Case
-
-    Floats = NDArray[np.float64]
-    from soilml.physics.contact import Force
 
 HELP = "forces and sinkage against slip and load, from a model"
 DESCRIPTION = """\
@@ -32,8 +22,6 @@ the reason in the column `status`; it is an error if no row has an equilibrium.
 Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
-#: Rows that are simulated at a time.
-BLOCK = 65536
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -71,10 +59,12 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.options import MAX_ROWS, available_effects, parse_numbers
     from soilml.cli.output import write_columns
+    from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
+    from soilml.fitting.simulation import simulate
     from soilml.io.table import fault_of_text
-    from soilml.physics.operating_point import COVARIATES
+    from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
 
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
@@ -87,34 +77,19 @@ def run(args: argparse.Namespace) -> int:
             f"at most {MAX_ROWS} are possible"
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
-    covariates = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
-    force = _forces(case, slip, load, covariates)
-    failed = int(np.count_nonzero(force.status))
+    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
+    with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
+        rows = simulate(case, slip, load, **known, on_rows=done)
+    failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
+        force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))
         worst = Status(int(force.status[0]))
         limit = f" (at most {force.load.max():.4g} N)" if worst is Status.TOO_HEAVY else ""
         raise InputError(
             f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
         )
     labels = {} if args.label is None else {"run": [args.label] * slip.size}
-    write_columns(
-        labels
-        | {
-            "slip": slip,
-            "load_N": load,
-            **{
-                COVARIATES[field]: np.full(slip.size, value)
-                for field, value in covariates.items()
-                if value is not None
-            },
-            "torque_Nm": force.torque,
-            "drawbar_pull_N": force.drawbar_pull,
-            "sinkage_m": force.sinkage,
-            "entry_angle_rad": force.entry_angle,
-            "status": [Status(int(code)).reason for code in force.status],
-        },
-        args.out,
-    )
+    write_columns(labels | dict(rows.columns), args.out)
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
     if failed:
@@ -123,24 +98,3 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     return 0
-
-
-def _forces(case: Case, slip: Floats, load: Floats, covariates: dict[str, float | None]) -> Force:
-    """Forces (n,) at slips and loads (n,), in blocks, which bounds the memory."""
-    from dataclasses import fields
-
-    import numpy as np
-
-    from soilml.cli.progress import progress_bar
-    from soilml.physics.contact import Force
-    from soilml.physics.operating_point import Operating
-
-    parts = []
-    with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        for first in range(0, slip.size, BLOCK):
-            rows = slice(first, first + BLOCK)
-            at = Operating(slip=slip[rows], load=load[rows], **covariates)
-            parts.append(case.model(case.soil, at))
-            done(min(rows.stop, slip.size))
-    names = [f.name for f in fields(Force)]
-    return Force(**{name: np.concatenate([getattr(p, name) for p in parts]) for name in names})

@@ -1,0 +1,93 @@
+"""Rows that a case predicts, as a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import fields
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.io.table import Table
+from soilml.physics.contact import Force
+from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.quantities import CHANNELS, column
+from soilml.row_status import Status
+
+#: Rows that are solved at a time.
+BLOCK = 65_536
+
+
+def simulate(
+    case: Case,
+    slip: ArrayLike,
+    load: ArrayLike,
+    *,
+    speed: float | None = None,
+    pass_number: float | None = None,
+    slip_angle: float | None = None,
+    seed: int | None = None,
+    on_rows: Callable[[int], None] | None = None,
+) -> Table:
+    """Rows that a case predicts: torque, drawbar pull, sinkage and entry angle.
+
+    Parameters
+    ----------
+    case
+        Gear, soil and effects, as `read_case` returns them; a case of one gear.
+    slip, load
+        Slip ratios and vertical loads (N), (n,) or numbers.
+    speed, pass_number, slip_angle
+        Speed in m/s, pass and slip angle in rad of all rows, where effects need them.
+    seed
+        Adds normal noise as the case declares it in [noise], with this seed; without one, readings
+        are exact. An error of the model, [discrepancy], is not added.
+    on_rows
+        Called with the number of rows that are done.
+
+    Returns
+    -------
+    Table
+        Columns `slip`, `load_N`, known covariates, `torque_Nm`, `drawbar_pull_N`, `sinkage_m`,
+        `entry_angle_rad`, NaN without equilibrium, and `status`.
+
+    Raises
+    ------
+    InputError
+        For a case of several gears, and for values that are not valid.
+
+    Examples
+    --------
+    >>> from soilml import Case, Model, Wheel, simulate, soil
+    >>> case = Case(Model(Wheel(radius=0.15, width=0.12)), soil("wong1989/dry_sand"))
+    >>> rows = simulate(case, slip=[0.1, 0.3], load=60.0)
+    >>> print(rows["torque_Nm"].round(2), rows["status"])
+    [1.19 2.26] ['ok' 'ok']
+    """
+    if case.gears:
+        raise InputError(f"simulate takes one gear; this case has {', '.join(case.gears)}")
+    known = {"speed": speed, "pass_number": pass_number, "slip_angle": slip_angle}
+    slips, loads = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (slip, load)))
+    parts = []
+    for first in range(0, slips.size, BLOCK):
+        rows = slice(first, first + BLOCK)
+        parts.append(case.model(case.soil, Operating(slip=slips[rows], load=loads[rows], **known)))
+        if on_rows is not None:
+            on_rows(min(rows.stop, slips.size))
+    names = [f.name for f in fields(Force)]
+    force = Force(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
+    columns = {"slip": slips, "load_N": loads}
+    for field, value in known.items():
+        if value is not None:
+            columns[COVARIATES[field]] = np.full(slips.size, value)
+    rng = None if seed is None else np.random.default_rng(seed)
+    for name in CHANNELS:
+        values = np.asarray(getattr(force, name))
+        if rng is not None and column(name) in case.noise:
+            values = values + case.noise[column(name)].std(values) * rng.standard_normal(slips.size)
+        columns[column(name)] = values
+    columns["entry_angle_rad"] = np.asarray(force.entry_angle)
+    status = np.asarray([Status(int(code)).reason for code in force.status])
+    return Table(columns | {"status": status}, source="simulated rows")

@@ -1,0 +1,67 @@
+"""Rows that a case predicts, and the names that users import."""
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Noise, Prior, gap, identify, read_case, simulate
+from soilml.errors import InputError
+from soilml.fitting import simulation
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def test_rows_are_those_of_the_model_in_blocks_and_say_where_there_is_none(case, monkeypatch):
+    slip, load = np.asarray([0.1, 0.3, 0.5]), np.asarray([30.0, 1e7, 90.0])
+    whole, counted = simulate(case, slip, load), []
+    monkeypatch.setattr(simulation, "BLOCK", 2)
+    rows = simulate(case, slip, load, speed=0.05, on_rows=counted.append)
+    assert counted == [2, 3] and rows["speed_m_s"].tolist() == [0.05] * 3
+    assert rows.answered.tolist() == [True, False, True] and np.isnan(rows["torque_Nm"][1])
+    for name in ("torque_Nm", "drawbar_pull_N", "sinkage_m", "entry_angle_rad"):
+        np.testing.assert_allclose(rows[name], whole[name], rtol=1e-9)
+
+
+def test_noise_is_that_of_the_case_and_its_seed(case):
+    case = replace(case, noise={"torque_Nm": Noise(share=0.1)})
+    slip = np.full(2000, 0.3)
+    exact, noisy = simulate(case, slip, 60.0), simulate(case, slip, 60.0, seed=1)
+    relative = noisy["torque_Nm"] / exact["torque_Nm"] - 1.0
+    assert np.std(relative) == pytest.approx(0.1, rel=0.05)
+    assert abs(np.mean(relative)) < 0.01
+    np.testing.assert_array_equal(noisy["sinkage_m"], exact["sinkage_m"])
+    again = simulate(case, slip, 60.0, seed=1)
+    np.testing.assert_array_equal(again["torque_Nm"], noisy["torque_Nm"])
+
+
+def test_simulated_rows_are_read_by_identify_and_gap(case):
+    case = replace(
+        case,
+        prior={"friction_angle": Prior(0.3, 0.8)},
+        noise={"torque_Nm": Noise(share=0.02), "drawbar_pull_N": Noise(constant=0.3)},
+    )
+    slip, load = np.tile(np.linspace(0.05, 0.6, 8), 2), np.repeat([40.0, 80.0], 8)
+    rows = simulate(case, slip, load, seed=2)
+    fit = identify(case, rows)
+    assert abs(fit["friction_angle"] - case.soil.friction_angle) < 4.0 * fit.std[0]
+    labelled = replace(rows, columns=rows.columns | {"run": np.repeat(["a", "b"], 8)})
+    assert gap(case, labelled).status == "no-gap"
+
+
+def test_a_case_of_several_gears_is_refused(case):
+    two = replace(case, gears={"a": case.model, "b": case.model})
+    with pytest.raises(InputError, match="one gear; this case has a, b"):
+        simulate(two, 0.1, 60.0)
+
+
+def test_the_names_of_the_readme_can_be_imported_together():
+    names = "gap, identify, simulate, read_case, read_table, Prior, Noise"
+    code = f"from soilml import {names}; print(all(map(callable, ({names}))))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
