@@ -79,7 +79,7 @@ def identify_report(
         ]
     else:
         answer = [f"The table has a result for each of {len(found)} values of {by}."]
-    warnings: list[Remark | str] = [
+    warnings = [
         remark.under(head[name]) for name, one in found.items() for remark in one.fit.warnings
     ]
     warnings += [
@@ -87,7 +87,10 @@ def identify_report(
         for name, one in found.items()
         if one.typical is not None
     ]
-    warnings += [f"{by} {name} has no result: {why}" for name, why in failed.items()]
+    warnings += [
+        Remark("no-result", f"{by} {name} has no result: {why}", (name,))
+        for name, why in failed.items()
+    ]
     steps = [f"{head[name]}{row}" for name, one in found.items() for row in one.next_rows]
     if first.method != "posterior":
         steps.append("--method posterior tells which measurement would help most.")

@@ -132,18 +132,12 @@ class Report:
     tone: str = "named"
     pictures: Sequence[ReportPicture] = ()
     tables: Sequence[ReportTable] = ()
-    warnings: Sequence[Remark | str] = ()
+    warnings: Sequence[Remark] = ()
     next_steps: Sequence[str] = ()
     notation: Sequence[tuple[str, str]] = field(default_factory=tuple)
 
     def as_json(self, origin: Provenance) -> dict[str, Any]:
         """The entry `report` of the JSON file beside the page."""
-        warnings = [
-            replace(given, text=_plain(given.text)).as_json()
-            if isinstance(given, Remark)
-            else _plain(given)
-            for given in self.warnings
-        ]
         return {
             "format": "soilml-report",
             "version": FORMAT_VERSION,
@@ -152,7 +146,7 @@ class Report:
             "soilml_version": origin.version,
             "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
             "answer": [_plain(text) for text in self.answer],
-            "warnings": warnings,
+            "warnings": [replace(w, text=_plain(w.text)).as_json() for w in self.warnings],
             "next": [_plain(text) for text in self.next_steps],
         }
 

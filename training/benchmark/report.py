@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES, SHEAR
+from soilml.remarks import Remark
 from soilml.report.figure_style import picture, take_axes
 from soilml.report.page import Report, ReportPicture, ReportTable
 from training.benchmark.acceptance import (
@@ -333,7 +334,11 @@ def benchmark_report(results: Sequence[PairedResult]) -> Report:
         pictures=[figure],
         tables=tables,
         warnings=[
-            "The sets are simulated by the model: no error of the model is in these figures."
+            Remark(
+                "simulated-by-the-model",
+                "The sets are simulated by the model: no error of the model is in these figures.",
+                severity="note",
+            )
         ],
         next_steps=["soilml compare MODEL.toml TEST.parquet MODEL.onnx for data of your own."],
         notation=LEGEND,

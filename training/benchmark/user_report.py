@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
+from soilml.remarks import Remark
 from soilml.report.figure_style import picture, short_label, take_axes
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import shown_unit
@@ -180,8 +181,12 @@ def comparison_report(scores: Sequence[MethodResult], names: Sequence[str], test
         ],
         tables=[ReportTable(title, header, rows, 2) for title, rows in blocks],
         warnings=[
-            "One equation does not determine three unknowns: for single readings the prior "
-            "supplies the missing information, and intervals must be correspondingly wide."
+            Remark(
+                "prior-supplies-information",
+                "One equation does not determine three unknowns: for single readings the prior "
+                "supplies the missing information, and intervals must be correspondingly wide.",
+                severity="note",
+            )
         ],
         next_steps=["soilml estimate MODEL.onnx RUNS.csv with the method that suits your rows."],
         notation=[
