@@ -48,8 +48,8 @@ def read_rows(
 
 def print_table_hints(table: Table, case: Case | None, radius: float | None = None) -> None:
     """Print a line on standard error for each oddity of a table; see `table_remarks`."""
-    for text in table_remarks(table, case, radius):
-        tell(f"! {text}")
+    for remark in table_remarks(table, case, radius):
+        tell(f"! {remark}")
 
 
 def result_by_group(

@@ -1,7 +1,7 @@
 """Whether a case, a table and a model file are of the same wheel, soil, effects and priors.
 
 Differences are phrases such as "gear.radius 0.15, the model file has 0.1": the value of the other,
-then that of the case, which comes from the user's model file.
+then that of the case, which comes from the user's model file or from `owner`.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from soilml.quantities import QUANTITIES
 SIZE_TOLERANCE = 0.005
 #: The same for other values, which are copied from file to file.
 VALUE_TOLERANCE = 0.001
+#: What a case is called in a difference.
+OWNER = "the model file"
 
 
 def recipe_content(text: str, source: str) -> dict[str, Any]:
@@ -132,53 +134,55 @@ def _check_gear_names(case: Case, table: Table) -> None:
         )
 
 
-def gear_differences(case: Case, other: Case) -> Iterator[str]:
+def gear_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
     """Differences of type and dimensions of the gear; a dimension that varies is not compared."""
     own, others = case.model.gear.name, other.model.gear.name
     if type(case.model.gear) is not type(other.model.gear):
-        yield f"gear type {others!r}, the model file has {own!r}"
+        yield f"gear type {others!r}, {owner} has {own!r}"
         return
-    yield from _fixed_differences(case, other, _is_of_gear, SIZE_TOLERANCE)
+    yield from _fixed_differences(case, other, owner, _is_of_gear, SIZE_TOLERANCE)
 
 
-def value_differences(case: Case, other: Case) -> Iterator[str]:
+def value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
     """Differences of the fixed values of soil and effects; what `other` varies has no value."""
-    yield from soil_value_differences(case, other)
-    yield from effect_value_differences(case, other)
+    yield from soil_value_differences(case, other, owner)
+    yield from effect_value_differences(case, other, owner)
 
 
-def soil_value_differences(case: Case, other: Case) -> Iterator[str]:
+def soil_value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
     """Differences of the fixed values of the soil."""
-    yield from _fixed_differences(case, other, lambda path: "." not in path, VALUE_TOLERANCE)
+    yield from _fixed_differences(case, other, owner, lambda path: "." not in path, VALUE_TOLERANCE)
 
 
-def effect_value_differences(case: Case, other: Case) -> Iterator[str]:
+def effect_value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
     """Differences of the fixed values of effects, whose paths are such as slip-sinkage.n1."""
     yield from _fixed_differences(
-        case, other, lambda path: "." in path and not _is_of_gear(path), VALUE_TOLERANCE
+        case, other, owner, lambda path: "." in path and not _is_of_gear(path), VALUE_TOLERANCE
     )
 
 
-def effect_differences(case: Case, other: Case) -> Iterator[str]:
+def effect_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
     """The effects of both, where their names differ."""
     own, others = ({effect.name for effect in c.model.effects} for c in (case, other))
     if own != others:
-        yield f"effects {_join(others)}, the model file has {_join(own)}"
+        yield f"effects {_join(others)}, {owner} has {_join(own)}"
 
 
-def prior_differences(case: Case, other: Case, names: Sequence[str]) -> Iterator[str]:
+def prior_differences(
+    case: Case, other: Case, names: Sequence[str], owner: str = OWNER
+) -> Iterator[str]:
     """Differences of the priors of these parameters, where the case has one."""
     for name in names:
         own, others = case.prior.get(name), other.prior.get(name)
         if own is None:
             continue
         if others is None:
-            yield f"no prior of {name}, the model file has {own.as_setting()}"
+            yield f"no prior of {name}, {owner} has {own.as_setting()}"
         elif own.log != others.log or not (
             _is_close(own.lower, others.lower, VALUE_TOLERANCE)
             and _is_close(own.upper, others.upper, VALUE_TOLERANCE)
         ):
-            yield f"prior {others.as_setting()} of {name}, the model file has {own.as_setting()}"
+            yield f"prior {others.as_setting()} of {name}, {owner} has {own.as_setting()}"
 
 
 def _is_of_gear(path: str) -> bool:
@@ -186,13 +190,13 @@ def _is_of_gear(path: str) -> bool:
 
 
 def _fixed_differences(
-    case: Case, other: Case, compared: Callable[[str], bool], tolerance: float
+    case: Case, other: Case, owner: str, compared: Callable[[str], bool], tolerance: float
 ) -> Iterator[str]:
     values = other.parameters()
     for path, (_, value) in case.parameters().items():
         fixed = path in values and path not in other.prior
         if compared(path) and fixed and not _is_close(value, values[path][1], tolerance):
-            yield f"{path} {values[path][1]:g}, the model file has {value:g}"
+            yield f"{path} {values[path][1]:g}, {owner} has {value:g}"
 
 
 def _is_close(a: float, b: float, tolerance: float) -> bool:

@@ -95,7 +95,7 @@ def channel_label(channels: Sequence[str]) -> str:
 def repeated_points(measured: Operating, channels: tuple[str, ...] = ()) -> list[CandidateRow]:
     """The operating points of rows (n,), each once; of many, `REPETITIONS` spread over all.
 
-    The point of rows that are driven alike is their median.
+    The point of replicate rows is their median.
     """
     slip, load = np.atleast_1d(measured.slip), np.atleast_1d(measured.load)
     group = replicate_rows(Operating(slip=slip, load=load))

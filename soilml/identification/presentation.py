@@ -151,7 +151,17 @@ def _picture(case: Case, answers: Mapping[str, Fit]) -> ReportPicture:
 def _lines(fit: Fit) -> list[ParameterLine]:
     left = [fit.remaining_fraction.get(name) for name in fit.names]
     doubted = about(fit.warnings, "not-identified")
-    return parameter_lines(fit.names, fit.units, fit.values, fit.std, *fit.interval, left, doubted)
+    low, high = fit.interval
+    return parameter_lines(
+        names=fit.names,
+        units=fit.units,
+        values=fit.values,
+        std=fit.std,
+        low=low,
+        high=high,
+        left=left,
+        doubted=doubted,
+    )
 
 
 def _fit_text(found: Fit) -> str:

@@ -95,38 +95,34 @@ def _compare(estimator: Estimator, case: Case, name: str, together: bool) -> lis
         text = f"{estimator.path} does not state its wheel: it cannot be compared with {name}"
         return [Remark("wheel-not-stated", text)]
     wrong = [
-        *gear_differences(case, own),
-        *effect_differences(case, own),
-        *effect_value_differences(case, own),
+        *gear_differences(case, own, name),
+        *effect_differences(case, own, name),
+        *effect_value_differences(case, own, name),
     ]
     if wrong:
-        said = "; ".join(wrong).replace("the model file", name)
         raise InputError(
-            f"{estimator.path} is not for the wheel of {name}: {said}; train a file for this "
-            "model, or correct [gear] and [[effect]]"
+            f"{estimator.path} is not for the wheel of {name}: {'; '.join(wrong)}; train a file "
+            "for this model, or correct [gear] and [[effect]]"
         )
     used = narrower_priors(estimator, case) if together else {}
     different = chain(
-        soil_value_differences(case, own),
-        prior_differences(case, own, [name for name in estimator.names if name not in used]),
-        () if together else _noise_differences(case, own),
+        soil_value_differences(case, own, name),
+        prior_differences(case, own, [n for n in estimator.names if n not in used], name),
+        () if together else _noise_differences(case, own, name),
     )
     return [
-        Remark(
-            "ignored-setting",
-            f"{estimator.path}: {text.replace('the model file', name)}, which is ignored",
-        )
+        Remark("ignored-setting", f"{estimator.path}: {text}, which is ignored")
         for text in different
     ]
 
 
-def _noise_differences(case: Case, own: Case) -> Iterator[str]:
+def _noise_differences(case: Case, own: Case, name: str) -> Iterator[str]:
     """Declared noise of the case that is not that of the file."""
     for key, noise in case.noise.items():
         if noise != own.noise.get(key):
-            yield f"noise of {key} as in its recipe, the model file has another one"
+            yield f"noise of {key} as in its recipe, {name} has another one"
     if case.bias:
-        yield f"no bias of {', '.join(case.bias)}, the model file declares it"
+        yield f"no bias of {', '.join(case.bias)}, {name} declares it"
 
 
 def _discrepancy_remark(estimator: Estimator, case: Case, pooled: bool) -> Remark:
@@ -136,7 +132,7 @@ def _discrepancy_remark(estimator: Estimator, case: Case, pooled: bool) -> Remar
         return Remark("ignored-setting", text, tuple(case.discrepancy))
     text = (
         f"[discrepancy] of {names} is included as independent errors of the rows, enlarged by the "
-        "rows that are alike: intervals are wider than those of soilml identify"
+        "rows near them: intervals are wider than those of soilml identify"
     )
     return Remark("discrepancy-included", text, tuple(case.discrepancy), "note")
 

@@ -29,7 +29,7 @@ from soilml.report.terminal import shown_unit, significant
 
 Floats = NDArray[np.float64]
 
-#: Ending of the columns of the answer with typical model errors.
+#: Ending of the columns of the estimate with typical model errors.
 TYPICAL = "usual"
 #: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
 MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
@@ -167,7 +167,7 @@ def remarks_on_runs(by: str, found: Sequence[tuple[Any, Remark]]) -> list[Remark
 
 
 def typical_columns(estimate: Estimate) -> dict[str, NDArray[Any]]:
-    """Columns (runs,) of the answer with typical model errors: `cohesion_Pa_usual_std`, ..."""
+    """Columns (runs,) of the estimate with typical model errors: `cohesion_Pa_usual_std`, ..."""
     columns: dict[str, NDArray[Any]] = {}
     for key, values in estimate_columns(estimate).items():
         name, dash, part = key.rpartition("_")
@@ -185,7 +185,7 @@ def is_typical_column(name: str) -> bool:
 def typical_remarks(
     by: str, names: Sequence[Any], exact: Estimate, typical: Estimate
 ) -> list[Remark]:
-    """What the two answers are, how they differ, and which one to use."""
+    """What the two intervals are, how they differ, and which one to use."""
     text = (
         f"two intervals: columns without _{TYPICAL} take the model of wheel and soil as exact; "
         f"columns with _{TYPICAL} include typical model errors, in the bearing of the soil, its "
@@ -245,11 +245,16 @@ def estimate_report(
     answered = np.isfinite(values).any(axis=1)
     lines = {
         str(labels[i]): parameter_lines(
-            names, units, values[i], std[i], low[i], high[i],
-            [float(x) if inside[i] else 1.0 for x in std[i] / prior.std],
+            names=names,
+            units=units,
+            values=values[i],
+            std=std[i],
+            low=low[i],
+            high=high[i],
+            left=[float(x) if inside[i] else 1.0 for x in std[i] / prior.std],
         )
         for i in np.flatnonzero(answered)
-    }  # fmt: skip
+    }
     if len(lines) <= _MOST_SENTENCES:
         answer = [
             f"{group.capitalize()} {name}: {' '.join(x.sentence for x in own)}"
@@ -271,9 +276,15 @@ def estimate_report(
     outside = int(np.count_nonzero(answered & ~inside))
     badge = "in range" if outside == 0 else "out of range" if outside == len(lines) else "mixed"
     drawn = ParameterIntervals(
-        names, units, list(lines), values[answered], low[answered], high[answered],
-        prior.lower, prior.upper,
-    )  # fmt: skip
+        names=names,
+        units=units,
+        labels=list(lines),
+        values=values[answered],
+        low=low[answered],
+        high=high[answered],
+        prior_low=prior.lower,
+        prior_high=prior.upper,
+    )
     return Report(
         kind="estimate",
         title=f"Estimates of {Path(files[1]).name} by {Path(files[0]).name}",
@@ -314,7 +325,7 @@ class _Answer:
 
 
 def _answer(columns: Mapping[str, Any], names: Sequence[str], by: str | None, end: str) -> _Answer:
-    """Estimates (n, q) of the columns that end so: `_usual` for the second answer."""
+    """Estimates (n, q) of the columns that end so: `_usual` for those with typical errors."""
     values, std, low, high = (
         np.stack([np.asarray(columns[column(n) + end + part], float) for n in names], axis=1)
         for part in ("", "_std", "_p05", "_p95")
@@ -324,7 +335,9 @@ def _answer(columns: Mapping[str, Any], names: Sequence[str], by: str | None, en
     text = said.get(end, f", {TYPICAL_ERRORS}")
     labels = np.asarray([f"{name}{text}" for name in own], dtype=np.str_)
     inside = np.nan_to_num(np.asarray(columns[f"in_range{end}"], float)) > 0.5
-    return _Answer(labels, values, std, low, high, np.asarray(inside))
+    return _Answer(
+        labels=labels, values=values, std=std, low=low, high=high, inside=np.asarray(inside)
+    )
 
 
 def _number(value: object) -> str:

@@ -71,12 +71,12 @@ def parameter_lines(
         factor, shown = numbers.display_unit(unit, float(abs(value)))
         found.append(
             ParameterLine(
-                numbers.parameter_name(name),
-                numbers.format_with_std(factor * value, factor * error),
-                numbers.format_interval(factor * ends[0], factor * ends[1], factor * error),
-                shown,
-                share,
-                name in doubted,
+                name=numbers.parameter_name(name),
+                value=numbers.format_with_std(factor * value, factor * error),
+                ends=numbers.format_interval(factor * ends[0], factor * ends[1], factor * error),
+                unit=shown,
+                left=share,
+                doubted=name in doubted,
             )
         )
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -63,7 +63,7 @@ class Presentation(Generic[Result]):
 
 
 def pull_columns(report: PullReport) -> dict[str, Any]:
-    """A row for each load and slip, in SI units; what holds for a load stands in all its rows."""
+    """A row for each load and slip, in SI units; what belongs to a load stands in all its rows."""
     parts = [_columns(one) for one in report.by_load]
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
@@ -115,35 +115,23 @@ def pull_text(report: PullReport) -> str:
 
 
 def _load_text(one: LoadPrediction) -> str:
-    known, prior = one.posterior, one.prior
-    pull, slope, before = (
-        quantile_band(known.pull),
-        quantile_band(known.slope),
-        quantile_band(prior.pull),
-    )
+    known, prior, (no_pull, no_slope) = one.posterior, one.prior, _not_known(one)
     header = (
         "slip", "pull_N", "p05", "p95", "pull/load", "slope_deg", "p05", "p95",
         "prior_p05_N", "prior_p95_N",
     )  # fmt: skip
-    lines = []
-    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
-        cells = [f"{known.slip[i]:.3g}", *(f"{v[i]:.1f}" for v in _ends(pull))]
-        cells += [f"{pull.middle[i] / known.load:.2f}"]
-        cells += [f"{DEGREES * v[i]:.1f}" for v in _ends(slope)]
-        lines.append((*cells, f"{before.lower[i]:.1f}", f"{before.upper[i]:.1f}"))
-    ends = quantile_band(known.best_slip), quantile_band(known.steepest_slip)
-    pulled = _value_text(
-        quantile_band(known.largest_pull), 1.0, one.remaining_fraction[0] > NOT_IDENTIFIED_ABOVE
-    )
-    climbed = _value_text(
-        quantile_band(known.steepest_slope),
-        DEGREES,
-        one.remaining_fraction[1] > NOT_IDENTIFIED_ABOVE,
-    )
+    lines = [
+        (slip, *pull, f"{middle / known.load:.2f}", *slope, *before)
+        for (slip, pull, slope, before), middle in zip(
+            _curve(one), _printed(quantile_band(known.pull).middle), strict=True
+        )
+    ]
+    pulled = _value(quantile_band(known.largest_pull), 1.0, no_pull)
+    climbed = _value(quantile_band(known.steepest_slope), DEGREES, no_slope)
     best = [
-        f"largest pull    {pulled} N, at slip {_slips(ends[0])}; "
+        f"largest pull    {pulled} N, at slip {_slips(quantile_band(known.best_slip))}; "
         f"before the rows {_range(quantile_band(prior.largest_pull), 1.0)} N",
-        f"steepest slope  {climbed} deg, at slip {_slips(ends[1])}; "
+        f"steepest slope  {climbed} deg, at slip {_slips(quantile_band(known.steepest_slip))}; "
         f"before the rows {_range(quantile_band(prior.steepest_slope), DEGREES)} deg",
     ]
     doubts = [f"! {text}" for text in one.warnings]
@@ -151,8 +139,28 @@ def _load_text(one: LoadPrediction) -> str:
     return "\n".join([f"load {known.load:.4g} N", table, *best, *doubts])
 
 
-def _value_text(found: QuantileBand, factor: float, unknown: bool) -> str:
-    middle = "not known" if unknown else f"{factor * float(found.middle):.1f}"
+def _not_known(one: LoadPrediction) -> list[bool]:
+    """Whether pull and slope are no better known than before the rows."""
+    return [share > NOT_IDENTIFIED_ABOVE for share in one.remaining_fraction]
+
+
+def _printed(values: Any) -> Any:
+    """Every second one of the values along the curve."""
+    return values[PRINTED_STEP - 1 :: PRINTED_STEP]
+
+
+def _curve(one: LoadPrediction) -> Iterator[tuple[str, list[str], list[str], list[str]]]:
+    """Slip; middle and ends of pull (N) and of slope (degrees); ends of the prior's pull."""
+    known = one.posterior
+    pull, slope, before = map(quantile_band, (known.pull, known.slope, one.prior.pull))
+    parts = [known.slip, *_ends(pull), *(DEGREES * v for v in _ends(slope))]
+    for slip, *values in zip(*map(_printed, [*parts, before.lower, before.upper]), strict=True):
+        cells = [f"{value:.1f}" for value in values]
+        yield f"{slip:.3g}", cells[:3], cells[3:6], cells[6:]
+
+
+def _value(found: QuantileBand, factor: float, unknown: bool = False, unit: str = "") -> str:
+    middle = "not known" if unknown else f"{factor * float(found.middle):.1f}{unit}"
     return f"{middle} ({_range(found, factor)})"
 
 
@@ -171,18 +179,17 @@ def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str,
     for name, report in found.items():
         for one in report.by_load:
             head = f"{by} {name}, " if by else ""
-            pulled, climbed = _bests(one)
-            unknown = [share > NOT_IDENTIFIED_ABOVE for share in one.remaining_fraction]
-            known += [not any(unknown)]
-            load = significant(one.posterior.load)
-            parts = [
-                f"{what} {'is not known better than before the rows' if vague else 'is'} {value}"
-                for what, value, vague in zip(
-                    ("the largest pull", "the steepest slope"), (pulled, climbed), unknown,
-                    strict=True,
-                )
-            ]  # fmt: skip
-            answer.append(f"{numbers.capitalised(head)}{load} N: {', '.join(parts)}.")
+            pulled = _value(quantile_band(one.posterior.largest_pull), 1.0, unit=" N")
+            climbed = _value(quantile_band(one.posterior.steepest_slope), DEGREES, unit="°")
+            no_pull, no_slope = (
+                "is not known better than before the rows" if vague else "is"
+                for vague in _not_known(one)
+            )
+            known += [not any(_not_known(one))]
+            answer.append(
+                f"{numbers.capitalised(head)}{significant(one.posterior.load)} N: the largest pull "
+                f"{no_pull} {pulled}, the steepest slope {no_slope} {climbed}."
+            )
             rows += [([name] if by else []) + row for row in _page_rows(one)]
     header = ["load, N", "slip", "pull, N", "90 %", "slope, °", "90 %", "pull before, N (90 %)"]
     first = next(iter(found.values()))
@@ -226,29 +233,13 @@ def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str,
 MOST_PICTURES, MOST_SENTENCES = 6, 6
 
 
-def _bests(one: LoadPrediction) -> tuple[str, str]:
-    known = one.posterior
-    pulled, climbed = quantile_band(known.largest_pull), quantile_band(known.steepest_slope)
-    return f"{_middle(pulled, 1.0)} N ({_range(pulled, 1.0)})", (
-        f"{_middle(climbed, DEGREES)}° ({_range(climbed, DEGREES)})"
-    )
-
-
-def _middle(found: QuantileBand, factor: float) -> str:
-    return f"{factor * float(found.middle):.1f}"
-
-
 def _page_rows(one: LoadPrediction) -> list[list[str]]:
-    known = one.posterior
-    pull, slope, before = map(quantile_band, (known.pull, known.slope, one.prior.pull))
-    rows = []
-    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
-        cells = [significant(known.load), f"{known.slip[i]:.3g}"]
-        for band, factor in ((pull, 1.0), (slope, DEGREES)):
-            low, middle, high = (factor * v[i] for v in (band.lower, band.middle, band.upper))
-            cells += [f"{middle:.1f}", f"{low:.1f} to {high:.1f}"]
-        rows.append([*cells, f"{before.lower[i]:.1f} to {before.upper[i]:.1f}"])
-    return [[cell.replace("-", "−") for cell in row] for row in rows]
+    load, rows = significant(one.posterior.load), []
+    for slip, pull, slope, before in _curve(one):
+        ends = [" to ".join(values) for values in (pull[1:], slope[1:], before)]
+        cells = [load, slip, pull[0], ends[0], slope[0], ends[1], ends[2]]
+        rows.append([cell.replace("-", "−") for cell in cells])
+    return rows
 
 
 PRESENTATION = Presentation(

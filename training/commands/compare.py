@@ -156,7 +156,15 @@ def _run_benchmark(args: argparse.Namespace) -> int:
         }
         draw = partial(save_png, partial(plot_benchmark, results), 4, 3, SIZE)
         page = report.benchmark_report(results)
-        _write(args, folder, BENCHMARK, page, content, draw, files)
+        _write(
+            args=args,
+            folder=folder,
+            names=BENCHMARK,
+            page=page,
+            content=content,
+            draw=draw,
+            read=files,
+        )
     print(f"{report.short_tables(results)}\n\n{report.short_goals(found)}")
     _say_where(folder, BENCHMARK)
     return 0
@@ -254,7 +262,9 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
         content = {"columns": report.csv_columns(scores, names)}
         draw = partial(save_png, scores.plot, 2, len(names), report.figure_size(names))
         page = report.comparison_report(scores, names, Path(test).name)
-        _write(args, folder, FILES, page, content, draw, [])
+        _write(
+            args=args, folder=folder, names=FILES, page=page, content=content, draw=draw, read=[]
+        )
     print(report.format_tables(scores, names))
     _say_where(folder, FILES)
     return 0

@@ -109,7 +109,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _table(path: str, ignore_extra: bool) -> Table:
-    """A table of tests; where it has other names and units, it is told what they are taken for."""
+    """A table of tests; what other names and units are taken for is printed."""
     from soilml.cli.output import tell
     from soilml.io.read_table import check_table, read_table
     from soilml.log_import.soil_tests import read_soil_tests
@@ -132,7 +132,7 @@ def _table(path: str, ignore_extra: bool) -> Table:
 
 
 def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None]:
-    """The plate tests and the shear tests, told apart by their columns."""
+    """The plate tests and the shear tests, distinguished by their columns."""
     found: dict[str, Table] = {}
     for path in args.tables:
         table = _table(path, args.ignore_extra)

@@ -132,7 +132,7 @@ def _text(given: dict[str, str | float | None], mass: float | None, wheels: int 
     if mass is not None:
         parts.append(_rover(mass, 4 if wheels is None else wheels))
     parts.append(
-        "# [discrepancy] # usual error of the model, beyond the noise\n"
+        "# [discrepancy] # typical error of the model, beyond the noise\n"
         '# torque_Nm = "2 %"\n\n'
         "# [[effect]] # `soilml effects` lists them, `soilml gap` finds which ones are missing\n"
         '# name = "slip-sinkage"\n# n1 = 0.3'

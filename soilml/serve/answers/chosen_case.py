@@ -47,7 +47,7 @@ _COMMENTS = (
 
 @dataclass(frozen=True)
 class WheelChoice:
-    """A running gear of the list, with the load (N) that it usually carries."""
+    """A running gear of the list, with the load (N) that it typically carries."""
 
     label: str
     source: str

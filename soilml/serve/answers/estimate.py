@@ -47,7 +47,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     case = read_case(model, with_bias=True)
     tell("reading the table")
     table = read_rows(request)
-    remarks = table_remarks(table, case)
+    remarks = texts(table_remarks(table, case))
     tell(f"estimating the soil from {len(table)} rows")
     fit = identify(case, table, None, "posterior")
     tell("allowing for typical errors of model and sensors")
@@ -91,7 +91,7 @@ def read_rows(request: dict[str, Any]) -> Table:
 
 
 def parameters(case: Case, fit: Fit, usual: Fit | None = None) -> list[dict[str, Any]]:
-    """Each parameter with its posterior, that with usual errors, and its prior.
+    """Each parameter with its posterior, that with typical errors, and its prior.
 
     In shown units; `si` and `usual_si` are the values in SI units.
     """
@@ -125,7 +125,7 @@ def parameters(case: Case, fit: Fit, usual: Fit | None = None) -> list[dict[str,
 
 
 def _usual(usual: Fit, i: int, factor: float) -> dict[str, Any]:
-    """The second answer on parameter `i`."""
+    """Parameter `i` with typical errors."""
     left = usual.remaining_fraction.get(usual.names[i], float("nan"))
     return {
         "usual": factor * float(usual.values[i]),

@@ -36,34 +36,33 @@ class Slider:
     symbol: str
     unit: str
     factor: float
-    lower: float
-    upper: float
+    ends: tuple[float, float]
     log: bool = False
     text: str = ""
 
 
 _OPERATING = {
-    "slip": Slider("Slip", "s", "", 1.0, -0.9, 0.95, text="driving above zero, braking below"),
-    "load": Slider("Vertical load", "W", "N", 1.0, 5.0, 5000.0, True),
+    "slip": Slider("Slip", "s", "", 1.0, (-0.9, 0.95), text="driving above zero, braking below"),
+    "load": Slider("Vertical load", "W", "N", 1.0, (5.0, 5000.0), log=True),
 }
 _STRENGTH = {
-    "cohesion": Slider("Cohesion", "c", "kPa", 1e-3, 0.0, 10.0),
-    "friction_angle": Slider("Friction angle", "φ", "°", 180.0 / pi, 10.0, 50.0),
-    "shear_modulus": Slider("Shear modulus", "K", "mm", 1e3, 1.0, 100.0, True,
+    "cohesion": Slider("Cohesion", "c", "kPa", 1e-3, (0.0, 10.0)),
+    "friction_angle": Slider("Friction angle", "φ", "°", 180.0 / pi, (10.0, 50.0)),
+    "shear_modulus": Slider("Shear modulus", "K", "mm", 1e3, (1.0, 100.0), log=True,
                             text="how far soil is sheared until its strength is mobilised"),
 }  # fmt: skip
 _BEARING = {
-    "kphi": Slider("Frictional modulus", "kφ", "kN/mⁿ⁺²", 1e-3, 10.0, 1e5, True),
-    "kc": Slider("Cohesive modulus", "kc", "kN/mⁿ⁺¹", 1e-3, 0.0, 100.0),
-    "n": Slider("Exponent of sinkage", "n", "", 1.0, 0.3, 2.0),
-    "a0": Slider("Place of the largest stress", "a₀", "", 1.0, 0.1, 0.8,
+    "kphi": Slider("Frictional modulus", "kφ", "kN/mⁿ⁺²", 1e-3, (10.0, 1e5), log=True),
+    "kc": Slider("Cohesive modulus", "kc", "kN/mⁿ⁺¹", 1e-3, (0.0, 100.0)),
+    "n": Slider("Exponent of sinkage", "n", "", 1.0, (0.3, 2.0)),
+    "a0": Slider("Place of the largest stress", "a₀", "", 1.0, (0.1, 0.8),
                  text="as a share of the entry angle, at no slip"),
-    "a1": Slider("Its growth with slip", "a₁", "", 1.0, 0.0, 0.5),
+    "a1": Slider("Its growth with slip", "a₁", "", 1.0, (0.0, 0.5)),
 }  # fmt: skip
 _GEAR = {
-    "gear.radius": Slider("Radius", "r", "mm", 1e3, 20.0, 500.0, True),
-    "gear.width": Slider("Width", "b", "mm", 1e3, 10.0, 500.0, True),
-    "gear.base": Slider("Length between axles", "l", "mm", 1e3, 100.0, 2000.0, True),
+    "gear.radius": Slider("Radius", "r", "mm", 1e3, (20.0, 500.0), log=True),
+    "gear.width": Slider("Width", "b", "mm", 1e3, (10.0, 500.0), log=True),
+    "gear.base": Slider("Length between axles", "l", "mm", 1e3, (100.0, 2000.0), log=True),
 }
 #: Shown units of what has no slider above.
 _UNITS = {"Pa": ("kPa", 1e-3), "rad": ("°", 180.0 / pi), "m": ("mm", 1e3), "1": ("", 1.0)}
@@ -114,14 +113,14 @@ def _effects(case: Case) -> Any:
             low = min(low, -high)
         low, high = (factor * min(max(v, parameter.lower), parameter.upper) for v in (low, high))
         name = effect.name.replace("-", " ").capitalize()
-        slider = Slider(name, "", unit, factor, low, high, text=effect.about.text)
+        slider = Slider(name, "", unit, factor, (low, high), text=effect.about.text)
         yield _control(path, slider, parameter, float(value)) | {"neutral": default}
 
 
 def _control(path: str, slider: Slider, parameter: Parameter, value: float) -> dict[str, Any]:
     """A slider as the page takes it; the value is in SI units, all else in the shown unit."""
     shown = slider.factor * float(value)
-    low, high = min(slider.lower, shown), max(slider.upper, shown)
+    low, high = min(slider.ends[0], shown), max(slider.ends[1], shown)
     if slider.log:
         low = max(low, 1e-9)
     return {

@@ -40,8 +40,8 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         case, table, calibration=checked, progress=lambda share: tell(stage, min(share, 1.0))
     )
     tell("drawing the report")
-    texts = gap_files(report, model.name, table.source)
-    return verdict(report) | {"rows": len(table), "files": write_files(texts)}
+    files = gap_files(report, model.name, table.source)
+    return verdict(report) | {"rows": len(table), "files": write_files(files)}
 
 
 def verdict(report: GapReport) -> dict[str, Any]:

@@ -24,14 +24,13 @@ def climb_report(report: ClimbingReport, files: tuple[str, str]) -> Report:
     fit, ability = report.ground.fit, report.ability
     best, where = quantile_band(ability.steepest), quantile_band(ability.steepest_slip)
     answer = [
-        f"The steepest slope is {_page_band(best, DEGREES, '.1f', '°')}, at slip "
-        f"{_page_band(where, 1.0, '.2f', '')}."
+        f"The steepest slope is {_band(best, DEGREES, '.1f', '°', '90 %: ')}, at slip "
+        f"{_band(where, 1.0, '.2f', note='90 %: ')}."
     ]
     if report.slip_limit is not None:
         within = quantile_band(ability.steepest_within(report.slip_limit))
-        answer.append(
-            f"At slips up to {report.slip_limit:g} it is {_page_band(within, DEGREES, '.1f', '°')}."
-        )
+        text = _band(within, DEGREES, ".1f", "°", "90 %: ")
+        answer.append(f"At slips up to {report.slip_limit:g} it is {text}.")
     lines = _lines(report)
     answer += [line.sentence for line in lines]
     rows = []
@@ -77,11 +76,6 @@ def _lines(report: ClimbingReport) -> list[ParameterLine]:
     return parameter_lines(fit.names, fit.units, fit.values, fit.std, *fit.interval, left)
 
 
-def _page_band(found: QuantileBand, factor: float, form: str, unit: str) -> str:
-    low, middle, high = (factor * float(v) for v in (found.lower, found.middle, found.upper))
-    return f"{middle:{form}}{unit} (90 %: {low:{form}} to {high:{form}}{unit})"
-
-
 def _printed(report: ClimbingReport) -> list[int]:
     last = len(report.ability.slip) - 1
     return [i * last // (PRINTED_SLIPS - 1) for i in range(PRINTED_SLIPS)]
@@ -92,12 +86,11 @@ def climb_text(report: ClimbingReport) -> str:
     fit, ability = report.ground.fit, report.ability
     best, where = quantile_band(ability.steepest), quantile_band(ability.steepest_slip)
     slopes_text = [
-        f"steepest slope {_band_text(best, DEGREES, '.1f')} deg, at slip "
-        f"{_band_text(where, 1.0, '.2f')}"
+        f"steepest slope {_band(best, DEGREES, '.1f')} deg, at slip {_band(where, 1.0, '.2f')}"
     ]
     if report.slip_limit is not None:
         within = quantile_band(ability.steepest_within(report.slip_limit))
-        text = _band_text(within, DEGREES, ".1f")
+        text = _band(within, DEGREES, ".1f")
         slopes_text.append(f"steepest slope at slips up to {report.slip_limit:g}: {text} deg")
     climbs, slopes = fit.rows_used, report.ground.distinct_slopes
     parts = [
@@ -139,6 +132,6 @@ def _point(report: ClimbingReport, i: int) -> tuple[str, ...]:
     return tuple(line)
 
 
-def _band_text(found: QuantileBand, factor: float, form: str) -> str:
+def _band(found: QuantileBand, factor: float, form: str, unit: str = "", note: str = "") -> str:
     low, middle, high = (factor * float(v) for v in (found.lower, found.middle, found.upper))
-    return f"{middle:{form}} ({low:{form}} to {high:{form}})"
+    return f"{middle:{form}}{unit} ({note}{low:{form}} to {high:{form}}{unit})"

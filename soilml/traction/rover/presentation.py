@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -55,19 +55,24 @@ def rover_columns(report: RoverReport) -> dict[str, Any]:
 
 
 def _slopes(report: RoverReport) -> str:
-    found = report.performance
     header = (
         "slope_deg", "climbed", "slip", "p05", "p95", "margin_N", "p05", "p95", "work_J/m", "p05",
         "p95",
     )  # fmt: skip
-    lines = []
-    for i, slope in enumerate(np.rad2deg(found.slope)):
-        cells = [f"{slope:.3g}", f"{100 * found.climbed[i]:.0f} %"]
-        cells += _cells(found.slip[:, i], "{:.2f}", needs=FEWEST)
-        cells += _cells(found.margin[:, i], "{:.1f}")
-        cells += _cells(found.energy[:, i], "{:.1f}", needs=FEWEST)
-        lines.append(cells)
+    lines = [(*head, *slip, *margin, *work) for head, slip, margin, work in _by_slope(report)]
     return format_table(header, lines, text_columns=0)
+
+
+def _by_slope(report: RoverReport) -> Iterator[tuple[list[str], ...]]:
+    """Slope and share that climbs it; middle and ends of slip, of margin (N), of work (J/m)."""
+    found = report.performance
+    for i, slope in enumerate(np.rad2deg(found.slope)):
+        yield (
+            [f"{slope:.3g}", f"{100 * found.climbed[i]:.0f} %"],
+            _cells(found.slip[:, i], "{:.2f}", needs=FEWEST),
+            _cells(found.margin[:, i], "{:.1f}"),
+            _cells(found.energy[:, i], "{:.1f}", needs=FEWEST),
+        )
 
 
 def _wheels(report: RoverReport) -> str:
@@ -200,15 +205,10 @@ def _sentence(report: RoverReport) -> str:
 
 
 def _page_rows(report: RoverReport) -> list[list[str]]:
-    found, rows = report.performance, []
-    for i, slope in enumerate(np.rad2deg(found.slope)):
-        cells = [f"{slope:.3g}", f"{100 * found.climbed[i]:.0f} %"]
-        for draws, form, needs in (
-            (found.slip[:, i], "{:.2f}", FEWEST),
-            (found.margin[:, i], "{:.1f}", 0.0),
-            (found.energy[:, i], "{:.1f}", FEWEST),
-        ):
-            middle, low, high = _cells(draws, form, needs)
+    rows = []
+    for head, *bands in _by_slope(report):
+        cells = [*head]
+        for middle, low, high in bands:
             cells += [middle or "–", f"{low} to {high}" if middle else "–"]
         rows.append([cell.replace("-", "−") for cell in cells])
     return rows
