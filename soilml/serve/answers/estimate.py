@@ -47,7 +47,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     case = read_case(model, with_bias=True)
     tell("reading the table")
     table = read_rows(request)
-    remarks = texts(table_remarks(table, case))
+    remarks = table_remarks(table, case)
     tell(f"estimating the soil from {len(table)} rows")
     fit = identify(case, table, None, "posterior")
     tell("allowing for typical errors of model and sensors")
