@@ -67,37 +67,21 @@ LEAST_ROWS = 200
 
 @dataclass(frozen=True)
 class Dataset:
-    """Rows with measured quantities, features, and true values of the targets.
+    """Rows with measured quantities, features, and true values of the targets."""
 
-    Attributes
-    ----------
-    measured : dict of str to ndarray, shape (n,)
-        Readings in SI units, by name.
-    features, targets : ndarray, shapes (n, d) and (n, q)
-        Inputs of the regressors, and true values.
-    run : ndarray of int, shape (n,)
-        Run number; rows of a run have one soil.
-    row : ndarray of int, shape (n,)
-        Number of the row in the file.
-    lower, upper : ndarray, shape (q,)
-        Range of the prior of the targets.
-    recipe : str
-        Recipe of the data as JSON.
-    dropped : int
-        Rows of the file without equilibrium or without a reading.
-    """
-
-    measured: dict[str, Floats]
+    measured: dict[str, Floats]  # (n,) readings in SI units, by name
+    #: (n, d) and (n, q) inputs of the regressors, and true values
     features: Floats
     targets: Floats
-    run: NDArray[np.int64]
-    row: NDArray[np.int64]
+    run: NDArray[np.int64]  # (n,) run number; rows of a run have one soil
+    row: NDArray[np.int64]  # (n,) number of the row in the file
     feature_names: tuple[str, ...]
     target_names: tuple[str, ...]
+    #: (q,) range of the prior of the targets
     lower: Floats
     upper: Floats
-    recipe: str
-    dropped: int
+    recipe: str  # recipe of the data as JSON
+    dropped: int  # rows of the file without equilibrium or without a reading
 
     def __len__(self) -> int:
         return len(self.targets)

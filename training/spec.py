@@ -41,33 +41,17 @@ SEED = "a whole number from 0 to 2^32 - 1"
 
 @dataclass(frozen=True)
 class Spec:
-    """What to train from data.
+    """What to train from data."""
 
-    Attributes
-    ----------
-    name : str
-        File name without suffix.
-    seed : int
-        Of the split, and of regressors without a seed of their own.
-    features, targets : tuple of str
-        Inputs of the regressors, such as ``torque/load``, and estimated quantities.
-    regressors : tuple of FeatureSubset
-        Not fitted yet.
-    rule : str
-        Fusion rule of several regressors.
-    text : str
-        Content of the file as JSON with sorted keys.
-    set_posterior : ResponseSettings or None
-        Settings of the set posterior, for targets with one value per run.
-    """
-
-    name: str
-    seed: int
+    name: str  # file name without suffix
+    seed: int  # of the split, and of regressors without a seed of their own
+    #: inputs of the regressors, such as ``torque/load``, and estimated quantities
     features: tuple[str, ...]
     targets: tuple[str, ...]
-    regressors: tuple[FeatureSubset, ...]
-    rule: str
-    text: str
+    regressors: tuple[FeatureSubset, ...]  # not fitted yet
+    rule: str  # fusion rule of several regressors
+    text: str  # content of the file as JSON with sorted keys
+    #: settings of the set posterior, for targets with one value per run
     set_posterior: ResponseSettings | None = None
 
     @property
@@ -78,24 +62,13 @@ class Spec:
 
 @dataclass(frozen=True)
 class AnyWheelSpec:
-    """What to train for wheels of any size, from simulated rows.
+    """What to train for wheels of any size, from simulated rows."""
 
-    Attributes
-    ----------
-    family : DimensionlessFamily
-        Ranges of wheels, loads and soils.
-    response : ResponseSettings
-        Settings of the learned response of the wheel.
-    noise : dict of str to [float, float]
-        Default noise of the file: constant part in SI units and share of the reading.
-    text : str
-        Content of the file as JSON with sorted keys.
-    """
-
-    family: DimensionlessFamily
-    response: ResponseSettings
+    family: DimensionlessFamily  # ranges of wheels, loads and soils
+    response: ResponseSettings  # settings of the learned response of the wheel
+    #: default noise of the file: constant part in SI units and share of the reading
     noise: dict[str, list[float]]
-    text: str
+    text: str  # content of the file as JSON with sorted keys
 
 
 def read_spec(path: str | os.PathLike[str]) -> Spec:

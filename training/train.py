@@ -58,47 +58,28 @@ TrainedSetPosterior = tuple[SetPosteriorGraph, dict[int, SetFigures]]
 
 @dataclass(frozen=True)
 class TrainedModel:
-    """A trained model, what its file needs, and its metrics on unseen rows.
+    """A trained model, what its file needs, and its metrics on unseen rows."""
 
-    Attributes
-    ----------
-    spec, data, parts : Spec, Dataset, DataSplit
-        What it was trained from.
-    estimator : CalibratedRegressor
-        The only regressor, or the ensemble of all.
-    members : tuple of CalibratedRegressor
-        The single regressors.
-    domain : TrainingDomain
-        Where estimates are in range.
-    pooling : PoolingCalibration
-        Calibration of single rows, and of several rows of one soil that are pooled as Gaussians;
-        rows are not pooled where they have targets of their own, or a set posterior.
-    prior : PriorSummary
-        Prior of the targets.
-    scores : dict of str to Metrics
-        Of single rows: of each member, of each fusion rule, and of the estimator.
-    pooled_scores : dict of str to dict of int to Metrics
-        Of pooled rows, by pattern of operating conditions and number of rows.
-    repeat_scores : dict of int to Metrics
-        Of repeated readings at one slip, by their number, for targets that differ between rows.
-    set_posterior : SetPosteriorGraph or None
-        Posterior of several rows, where the spec asks for it.
-    set_figures : dict of int to SetFigures
-        Its metrics by number of rows.
-    """
-
+    #: what it was trained from
     spec: Spec
-    estimator: CalibratedRegressor
-    domain: TrainingDomain
+    estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
+    domain: TrainingDomain  # where estimates are in range
+    #: calibration of single rows, and of several rows of one soil that are pooled as
+    #: Gaussians; rows are not pooled where they have targets of their own, or a set posterior
     pooling: PoolingCalibration
-    prior: PriorSummary
+    prior: PriorSummary  # prior of the targets
     data: Dataset
     parts: DataSplit
+    #: of single rows: of each member, of each fusion rule, and of the estimator
     scores: dict[str, Metrics]
+    #: of pooled rows, by pattern of operating conditions and number of rows
     pooled_scores: dict[str, dict[int, Metrics]]
-    members: tuple[CalibratedRegressor, ...]
+    members: tuple[CalibratedRegressor, ...]  # the single regressors
+    #: of repeated readings at one slip, by their number, for targets that differ between rows
     repeat_scores: dict[int, Metrics] = field(default_factory=dict)
+    #: posterior of several rows, where the spec asks for it
     set_posterior: SetPosteriorGraph | None = None
+    #: its metrics by number of rows
     set_figures: dict[int, SetFigures] = field(default_factory=dict)
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:

@@ -25,26 +25,17 @@ class MethodResult:
 
     Estimates outside the prior are clipped to it, and a failed one counts as its median. Figures of
     parameters that the method does not estimate are NaN.
-
-    Attributes
-    ----------
-    rows
-        Readings of a set.
-    method, kind, inputs
-        Label, kind and inputs of the method.
-    priors, truth
-        Priors and true values (n, q) of the parameters, SI units.
-    estimates
-        The method's estimates.
     """
 
-    rows: int
+    rows: int  # readings of a set
+    #: label, kind and inputs of the method
     method: str
     kind: MethodKind
     inputs: str
+    #: priors and true values (n, q) of the parameters, SI units
     priors: tuple[Prior, ...]
     truth: Floats
-    estimates: MethodEstimates
+    estimates: MethodEstimates  # the method's estimates
 
     @property
     def sets(self) -> int:
@@ -95,25 +86,16 @@ class MethodResult:
 
 @dataclass(frozen=True)
 class PairedResult(MethodResult):
-    """The same with the Bayes limit of these sets, which have one design.
+    """The same with the Bayes limit of these sets, which have one design."""
 
-    Attributes
-    ----------
-    design, effect
-        Experimental design, and the effect that the method's model lacks (blank where none).
-    limit_mean
-        Mean (n, q) of the exact posterior.
-    log_densities
-        Logarithm (n,) of the method's own density at the truth, parameters as fractions of their
-        priors, where it is available; NaN elsewhere.
-    hpd_levels
-        Share (n,) of the method's density that is higher than at the truth; NaN elsewhere.
-    """
-
+    #: experimental design, and the effect that the method's model lacks (blank where none)
     design: Design
     effect: str
-    limit_mean: Floats
+    limit_mean: Floats  # mean (n, q) of the exact posterior
+    #: logarithm (n,) of the method's own density at the truth, parameters as fractions of
+    #: their priors, where it is available; NaN elsewhere
     log_densities: Floats
+    #: share (n,) of the method's density that is higher than at the truth; NaN elsewhere
     hpd_levels: Floats
 
     def subset(self, index: NDArray[np.bool_]) -> PairedResult:

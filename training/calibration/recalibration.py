@@ -16,26 +16,17 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Metrics:
-    """Metrics of each of q quantities, (q,).
+    """Metrics of each of q quantities, (q,)."""
 
-    Attributes
-    ----------
-    rmse, relative : ndarray
-        Root mean square error, in SI units and in standard deviations of the prior.
-    nll : ndarray
-        Mean negative log density, Gaussian, of the value in standard deviations of the prior.
-    cover50, cover90 : ndarray
-        Share of the true values within the Gaussian 50 and 90 % intervals.
-    rows : int
-        Number of rows that they were measured on.
-    """
-
+    #: root mean square error, in SI units and in standard deviations of the prior
     rmse: Floats
     relative: Floats
+    #: mean negative log density, Gaussian, of the value in standard deviations of the prior
     nll: Floats
+    #: share of the true values within the Gaussian 50 and 90 % intervals
     cover50: Floats
     cover90: Floats
-    rows: int
+    rows: int  # number of rows that they were measured on
 
 
 def compute_metrics(truth: Floats, mean: Floats, std: Floats, prior_std: Floats) -> Metrics:
@@ -55,21 +46,11 @@ def compute_metrics(truth: Floats, mean: Floats, std: Floats, prior_std: Floats)
 
 @dataclass(frozen=True)
 class CalibratedRegressor:
-    """A fitted regressor with calibrated standard deviations.
+    """A fitted regressor with calibrated standard deviations."""
 
-    Attributes
-    ----------
-    regressor : FeatureSubset, Ensemble or scikit-learn regressor
-        Anything with `predict(features, return_std=True)`.
-    std_scale : ndarray, shape (q,)
-        Factor on its standard deviations.
-    correlation : ndarray, shape (q, q)
-        Correlation between the errors of the q outputs in one row.
-    """
-
-    regressor: Any
-    std_scale: Floats
-    correlation: Floats
+    regressor: Any  # anything with `predict(features, return_std=True)`
+    std_scale: Floats  # (q,) factor on its standard deviations
+    correlation: Floats  # (q, q) correlation between the errors of the q outputs in one row
 
     def predict(self, features: Floats) -> tuple[Floats, Floats]:
         """Mean and recalibrated standard deviation, (n, q), of features (n, d)."""

@@ -37,18 +37,12 @@ _MATH = {"EXP": {"float": "expf", "double": "exp"}}
 
 @dataclass(frozen=True)
 class CFile:
-    """Texts of the C file and of its header, and the memory that they need.
+    """Texts of the C file and of its header, and the memory that they need."""
 
-    Parameters
-    ----------
-    source, header : str
-        C99.
-    memory_bytes, work_bytes, constant_bytes : int
-        Memory of one set, working memory of a call, and constants.
-    """
-
+    #: c99
     source: str
     header: str
+    #: memory of one set, working memory of a call, and constants
     memory_bytes: int
     work_bytes: int
     constant_bytes: int

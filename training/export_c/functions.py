@@ -36,28 +36,17 @@ WIDTH = 100
 
 @dataclass(frozen=True)
 class GraphFunction:
-    """One function: its text, and what it takes and gives.
+    """One function: its text, and what it takes and gives."""
 
-    Parameters
-    ----------
-    name, text : str
-        Name and C text of the function.
-    inputs : tuple of str
-        Inputs of the graph that it reads, after the working memory and the counts.
-    outputs : dict of str to (str, int)
-        C type and number of elements of each output; -1 for a number that varies.
-    lengths : dict of str to int
-        Elements of working memory by type.
-    constants : frozenset of str
-        Names of the constant arrays that it reads.
-    """
-
+    #: name and C text of the function
     name: str
     text: str
+    #: inputs of the graph that it reads, after the working memory and the counts
     inputs: tuple[str, ...]
+    #: C type and number of elements of each output; -1 for a number that varies
     outputs: dict[str, tuple[str, int]]
-    lengths: dict[str, int]
-    constants: frozenset[str]
+    lengths: dict[str, int]  # elements of working memory by type
+    constants: frozenset[str]  # names of the constant arrays that it reads
 
 
 def single_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:

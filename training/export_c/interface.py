@@ -26,40 +26,21 @@ from training.export_c.tensor import kind_of
 
 @dataclass(frozen=True)
 class RowField:
-    """A number that belongs to a row: what it must be, and what stands for it where it is NaN.
+    """A number that belongs to a row: what it must be, and what stands for it where it is NaN."""
 
-    Parameters
-    ----------
-    name : str
-        Input of the graph.
-    required : bool
-        Whether NaN is refused.
-    lower, upper : float
-        Open interval of values.
-    zero : bool
-        Whether zero is allowed although it is the lower end.
-    absent : float
-        Value where nothing was measured.
-    reading : str
-        For a standard deviation: the reading that it belongs to, else empty.
-    constant, share : float
-        Noise of the file: constant part, and share of the reading.
-    least : float
-        Smallest standard deviation that the noise of the file gives.
-    absent_std : float
-        For a standard deviation: its value where its reading is absent, zero if it is never.
-    """
-
-    name: str
-    required: bool = False
+    name: str  # input of the graph
+    required: bool = False  # whether NaN is refused
+    #: open interval of values
     lower: float = -np.inf
     upper: float = np.inf
-    zero: bool = False
-    absent: float = np.nan
-    reading: str = ""
+    zero: bool = False  # whether zero is allowed although it is the lower end
+    absent: float = np.nan  # value where nothing was measured
+    reading: str = ""  # for a standard deviation: the reading that it belongs to, else empty
+    #: noise of the file: constant part, and share of the reading
     constant: float = 0.0
     share: float = 0.0
-    least: float = 0.0
+    least: float = 0.0  # smallest standard deviation that the noise of the file gives
+    #: for a standard deviation: its value where its reading is absent, zero if it is never
     absent_std: float = 0.0
 
 
@@ -75,25 +56,14 @@ class ContextField:
 
 @dataclass(frozen=True)
 class Interface:
-    """Inputs and outputs of a model file as the C code sees them.
+    """Inputs and outputs of a model file as the C code sees them."""
 
-    Parameters
-    ----------
-    rows : tuple of RowField
-        Inputs of one row, those that must be measured first.
-    context : tuple of ContextField
-        Inputs of a whole set.
-    single, sets : bool
-        Whether the file estimates from single rows, and from sets.
-    columns : int
-        Columns of the state of a set.
-    """
-
-    rows: tuple[RowField, ...]
-    context: tuple[ContextField, ...]
+    rows: tuple[RowField, ...]  # inputs of one row, those that must be measured first
+    context: tuple[ContextField, ...]  # inputs of a whole set
+    #: whether the file estimates from single rows, and from sets
     single: bool
     sets: bool
-    columns: int
+    columns: int  # columns of the state of a set
 
     @property
     def optional_context(self) -> bool:

@@ -17,13 +17,6 @@ from soilml.errors import ModelFileError
 class Size:
     """A whole number, or a linear form of counts such as ``3 * rows + kept``.
 
-    Parameters
-    ----------
-    constant : int
-        The part that is always there.
-    parts : tuple of (str, int)
-        Counts with their factors, sorted by name; no factor is zero.
-
     Examples
     --------
     >>> rows = Size.of("rows")
@@ -35,7 +28,8 @@ class Size:
     98
     """
 
-    constant: int
+    constant: int  # the part that is always there
+    #: counts with their factors, sorted by name; no factor is zero
     parts: tuple[tuple[str, int], ...] = ()
 
     @staticmethod
@@ -156,52 +150,32 @@ def kind_of_array(values: NDArray[Any], name: str) -> str:
 
 @dataclass(frozen=True)
 class Expression:
-    """A computation of one element from elements of other tensors.
+    """A computation of one element from elements of other tensors."""
 
-    Parameters
-    ----------
-    text : str
-        A C expression in which ``{0}``, ``{1}``, ... stand for the operands.
-    operands : tuple of Tensor
-        All broadcast to the shape of the tensor that the expression belongs to.
-    """
-
+    #: a C expression in which ``{0}``, ``{1}``, ... stand for the operands.
     text: str
+    #: all broadcast to the shape of the tensor that the expression belongs to
     operands: tuple[Tensor, ...]
 
 
 @dataclass(frozen=True, eq=False)
 class Tensor:
-    """A tensor: a constant, an input, a part of the working memory, or an expression.
+    """A tensor: a constant, an input, a part of the working memory, or an expression."""
 
-    Parameters
-    ----------
-    name : str
-        C expression of the pointer to its first element; tensors with the same elements in
-        another shape share it.
-    kind : str
-        C type of the elements.
-    shape : Shape
-        Its sizes.
-    value : ndarray, optional
-        Elements of a constant.
-    sizes : tuple of Size, optional
-        Elements of a vector of whole numbers that are sizes of other tensors.
-    expression : Expression, optional
-        How an element follows from others, where the tensor has no memory of its own.
-    block_of : (str, Size), optional
-        For a block of consecutive elements: name of the tensor in whose memory it lies, and where.
-    source : Tensor, optional
-        An expression in another shape, of which this tensor has the same elements.
-    """
-
+    #: C expression of the pointer to its first element; tensors with the same elements in
+    #: another shape share it
     name: str
-    kind: str
-    shape: Shape
-    value: NDArray[Any] | None = None
+    kind: str  # C type of the elements
+    shape: Shape  # its sizes
+    value: NDArray[Any] | None = None  # elements of a constant
+    #: elements of a vector of whole numbers that are sizes of other tensors
     sizes: tuple[Size, ...] | None = None
+    #: how an element follows from others, where the tensor has no memory of its own
     expression: Expression | None = None
+    #: for a block of consecutive elements: name of the tensor in whose memory it lies, and
+    #: where
     block_of: tuple[str, Size] | None = None
+    #: an expression in another shape, of which this tensor has the same elements
     source: Tensor | None = None
 
     @staticmethod

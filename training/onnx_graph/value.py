@@ -30,15 +30,6 @@ _ELEMENT_TYPES: dict[type, int] = {
 class Value:
     """A tensor of a graph: the name of an input, a constant or a node's output.
 
-    Parameters
-    ----------
-    graph : Graph
-        The graph to which operators append their nodes.
-    name : str
-        Name of the tensor in the graph.
-    dtype : type
-        numpy.float32 or numpy.float64: the type of constants that it is combined with.
-
     Examples
     --------
     >>> from training.onnx_graph.builder import BOOL, FLOAT, Graph
@@ -48,8 +39,9 @@ class Value:
     'v3'
     """
 
-    graph: Graph
-    name: str
+    graph: Graph  # the graph to which operators append their nodes
+    name: str  # name of the tensor in the graph
+    #: numpy.float32 or numpy.float64: the type of constants that it is combined with
     dtype: type = np.float32
 
     #: numpy leaves `array + value` to the operators below.

@@ -39,25 +39,17 @@ PASSES = 3
 class FixedSizeSolution:
     """How a fixed-size LS-SVM is solved.
 
-    Parameters
-    ----------
-    centres : int
-        Number of prototype rows.
-    gamma, width : float or None
-        Selected if None.
-    seed : int
-        Of the selection of prototypes.
-
     References
     ----------
     Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; De Brabanter et al.,
     Computational Statistics and Data Analysis 54, 2010 (large data sets).
     """
 
-    centres: int
+    centres: int  # number of prototype rows
+    #: selected if None
     gamma: float | None
     width: float | None
-    seed: int
+    seed: int  # of the selection of prototypes
 
     @property
     def name(self) -> str:

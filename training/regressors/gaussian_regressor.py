@@ -196,23 +196,14 @@ class FeatureSubset:
     Errors of estimates from different sensors are less correlated than those of different
     regressors of the same reading: fusing them reduces the error more.
 
-    Attributes
-    ----------
-    name : str
-        Label in metrics, card and plots.
-    model : GaussianRegressor
-        The regressor itself.
-    columns : tuple of int or None
-        Columns that it reads; None for all.
-
     References
     ----------
     Comin and Saaj 2017, eqs. 18, 24 and 26.
     """
 
-    name: str
-    model: GaussianRegressor
-    columns: tuple[int, ...] | None = None
+    name: str  # label in metrics, card and plots
+    model: GaussianRegressor  # the regressor itself
+    columns: tuple[int, ...] | None = None  # columns that it reads; None for all
 
     def select(self, features: Floats) -> Floats:
         """The columns (n, k) that the regressor reads."""

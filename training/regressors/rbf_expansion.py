@@ -52,37 +52,21 @@ Search = list[tuple[float, Floats, Floats]]
 
 @dataclass(frozen=True)
 class Expansion:
-    """What a solution gives to its regressor, in standardised units.
+    """What a solution gives to its regressor, in standardised units."""
 
-    Attributes
-    ----------
-    solution : str
-        "exact" or "fixed-size".
-    centres : ndarray, shape (m, d)
-    width, gamma : float
-    alpha, bias : ndarray, shapes (m, q) and (q,)
-        Of the mean.
-    log_variance_alpha, log_variance_bias : ndarray, shapes (m, q) and (q,)
-        Of the log-variance.
-    log_variances : ndarray, shape (k, q)
-        On training rows.
-    residual : ndarray, shape (n, q)
-        Leave-one-out residuals of the training rows.
-    search : Search
-        What width and gamma were selected from; the selected width is the last.
-    """
-
-    solution: str
-    centres: Floats
+    solution: str  # "exact" or "fixed-size"
+    centres: Floats  # (m, d)
     width: float
     gamma: float
+    #: (m, q) and (q,) of the mean
     alpha: Floats
     bias: Floats
+    #: (m, q) and (q,) of the log-variance
     log_variance_alpha: Floats
     log_variance_bias: Floats
-    log_variances: Floats
-    residual: Floats
-    search: Search
+    log_variances: Floats  # (k, q) on training rows
+    residual: Floats  # (n, q) leave-one-out residuals of the training rows
+    search: Search  # what width and gamma were selected from; the selected width is the last
 
 
 def by_error(search: Search) -> Search:

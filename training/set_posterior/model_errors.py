@@ -31,25 +31,14 @@ OF_CHANNELS, GROWS = MODEL_ERROR_COLUMNS.index("sinkage"), "_by_slip"
 
 @dataclass(frozen=True)
 class ModelErrors:
-    """Changes of the residuals with errors of the model, before weights.
+    """Changes of the residuals with errors of the model, before weights."""
 
-    Parameters
-    ----------
-    family, response : WheelFamily, Response
-        Typical errors of the model, and surfaces of the channels and of their changes.
-    context : ContextValues
-        Features, and how the scale of torque depends on load.
-    readings : mapping
-        Readings by input name.
-    slope : Value
-        Derivatives of the channels' scales by the readings, (channels, rows).
-    """
-
+    #: typical errors of the model, and surfaces of the channels and of their changes
     family: WheelFamily
     response: Response
-    context: ContextValues
-    readings: Mapping[str, Value]
-    slope: Value
+    context: ContextValues  # features, and how the scale of torque depends on load
+    readings: Mapping[str, Value]  # readings by input name
+    slope: Value  # derivatives of the channels' scales by the readings, (channels, rows)
 
     def columns_at(self, slopes: Value, coefficients: Value, basis: Value) -> Value:
         r"""Columns (errors, readings) at a soil, in the order of `MODEL_ERROR_COLUMNS`.

@@ -49,27 +49,13 @@ NEIGHBOUR_FACTOR, LEAST_NEIGHBOURS = 1.13, 300
 
 @dataclass(frozen=True)
 class SetFigures:
-    """Accuracy for sets of one size.
+    """Accuracy for sets of one size."""
 
-    Parameters
-    ----------
-    sets : int
-        Number of sets.
-    relative : ndarray
-        RMSE over the standard deviation of the prior, (q,).
-    cover90 : ndarray
-        Coverage of the 90 % intervals, (q,).
-    joint90 : float
-        Coverage of the 90 % ellipsoid of mean and covariance.
-    refused : float
-        Share of sets that were refused; they count with the prior.
-    """
-
-    sets: int
-    relative: Floats
-    cover90: Floats
-    joint90: float
-    refused: float
+    sets: int  # number of sets
+    relative: Floats  # RMSE over the standard deviation of the prior, (q,)
+    cover90: Floats  # coverage of the 90 % intervals, (q,)
+    joint90: float  # coverage of the 90 % ellipsoid of mean and covariance
+    refused: float  # share of sets that were refused; they count with the prior
 
 
 def calibrate_misfit_limits(

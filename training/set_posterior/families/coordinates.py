@@ -33,23 +33,15 @@ class Coordinate:
 
     Torque is nearly linear in the logarithms of shear modulus and cohesion, so that a polynomial of
     low degree in these coordinates approximates it closely.
-
-    Parameters
-    ----------
-    name : str
-        The parameter.
-    shift, factor, rate, slope : float
-        alpha, beta, gamma and delta of the value.
-    tilt : float
-        lambda of the prior, nil where the prior is uniform in x.
     """
 
-    name: str
+    name: str  # the parameter
+    #: alpha, beta, gamma and delta of the value
     shift: float = 0.0
     factor: float = 0.0
     rate: float = 0.0
     slope: float = 0.0
-    tilt: float = 0.0
+    tilt: float = 0.0  # lambda of the prior, nil where the prior is uniform in x
 
     @staticmethod
     def of(name: str, prior: Prior) -> Coordinate:
