@@ -15,7 +15,7 @@ from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 from soilml import Case, Model, Table, Wheel, identify, soil
 from soilml.config.measurement_noise import Noise
 from soilml.identification.bevameter import bevameter
-from soilml.identification.bevameter.model_file import updated_soil
+from soilml.identification.bevameter.soil_section import updated_soil
 from soilml.numerics.prior import Prior
 from soilml.physics.soils import Soil
 

@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
-    from soilml.identification.bevameter.model_file import missing_values, model_file_text
+    from soilml.identification.bevameter.soil_section import missing_values, model_file_text
     from soilml.optional_imports import need
     from soilml.report.result_files import json_text
 
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     with working("fitting the tests"):
         result = bevameter(plates, shear, case)
     if args.picture is not None:
-        from soilml.identification.bevameter.plot import save_picture
+        from soilml.identification.bevameter.result import save_picture
 
         save_picture(args.picture, result)
     if args.json is not None:
@@ -161,8 +161,8 @@ def _text(result: BevameterResult) -> str:
         (
             name,
             significant(factor * e.value),
-            _range(e.mean_range, factor),
-            _range(e.place_range, factor),
+            _range(e.mean_95, factor),
+            _range(e.another_place_95, factor),
             unit,
         )
         for name, e in result.estimates().items()

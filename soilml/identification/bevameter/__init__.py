@@ -4,24 +4,29 @@ from __future__ import annotations
 
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.identification.bevameter.plate_tests import read_plate_tests
-from soilml.identification.bevameter.pressure_sinkage import (
+from soilml.identification.bevameter.plate_tests import (
     PressureSinkageFit,
     fit_pressure_sinkage,
+    read_plate_tests,
 )
-from soilml.identification.bevameter.reduced_tests import pressure_test, strength_test
 from soilml.identification.bevameter.remarks import plate_remarks, shear_remarks
 from soilml.identification.bevameter.result import BevameterResult
-from soilml.identification.bevameter.shear_strength import ShearFit, fit_shear_strength
-from soilml.identification.bevameter.shear_tests import read_shear_tests
+from soilml.identification.bevameter.shear_tests import (
+    ShearFit,
+    fit_shear_strength,
+    read_shear_tests,
+)
 from soilml.identification.bevameter.soil_section import (
     plate_section,
+    pressure_test,
     shear_section,
+    strength_test,
     within_bounds,
 )
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import SoilTest
+from soilml.remarks import Remark
 from soilml.report.numbers import significant
 
 
@@ -71,7 +76,7 @@ def bevameter(
         raise InputError("no tests: give plate tests, shear tests, or both")
     soil: dict[str, float] = {}
     prior: dict[str, Prior] = {}
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     plate_fit = shear_fit = None
     tests: list[SoilTest | None] = []
     if plates is not None:

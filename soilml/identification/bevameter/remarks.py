@@ -1,4 +1,4 @@
-"""What plate and shear tests cannot tell, in words."""
+"""What plate and shear tests leave open, how far repeats differ, and where a law does not fit."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from soilml.identification.bevameter.estimate import is_level
-from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
-from soilml.identification.bevameter.shear_strength import ShearFit
+from soilml.identification.bevameter.plate_tests import PressureSinkageFit
+from soilml.identification.bevameter.scatter import is_level
+from soilml.identification.bevameter.shear_tests import ShearFit
+from soilml.remarks import Remark
 
 #: Change of the exponent between the shallower and the deeper half of a curve from which the law is
 #: said not to fit: the law's pressure is then wrong by 10 % within a factor of three in depth.
@@ -34,136 +35,180 @@ def _kpa(stress: float) -> str:
     return f"{1e-3 * stress:.3g}"
 
 
-def plate_remarks(fit: PressureSinkageFit) -> Iterator[str]:
+def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
     """Remarks on plate tests."""
     largest = max(float(test.pressure.max()) for test in fit.tests)
     if largest < ODD_PRESSURE:
-        yield (
+        yield Remark(
+            "doubtful-unit",
             f"the largest pressure is {largest:.3g} Pa, which is very little: check that it is in "
-            "Pa, not in kPa"
+            "Pa, not in kPa",
+            ("pressure_Pa",),
         )
     for size in fit.sizes[:LISTED]:
         p = fit.pressure_at_depth(size)
-        yield (
+        yield Remark(
+            "pressure-at-depth",
             f"at {fit.depth:.3g} m the plate of {size:.3g} m has a pressure of {_kpa(p.value)} "
-            f"kPa, {_kpa(p.place_range[0])} to {_kpa(p.place_range[1])} at another place"
+            f"kPa, {_kpa(p.another_place_95[0])} to {_kpa(p.another_place_95[1])} at another place",
+            ("kc", "kphi"),
+            "note",
         )
     depths = [float(test.sinkage[-1]) for test in fit.tests]
-    yield (
+    yield Remark(
+        "parameters-correlated",
         "n and the moduli trade off, so each range alone is wide; they hold down to "
-        f"{max(depths):.3g} m, the deepest test"
+        f"{max(depths):.3g} m, the deepest test",
+        ("kc", "kphi", "n"),
+        "note",
     )
     if not fit.several_sizes:
-        yield (
+        yield Remark(
+            "one-plate-size",
             f"one plate size ({fit.sizes[0]:.3g} m): kc and kphi cannot be told apart, only "
-            f"k = kc / b + kphi for b = {fit.sizes[0]:.3g} m; for another width it may differ"
+            f"k = kc / b + kphi for b = {fit.sizes[0]:.3g} m; for another width it may differ",
+            ("kc", "kphi"),
         )
-    elif fit.estimates()["kc"].mean_range[0] < 0.0 < fit.estimates()["kc"].mean_range[1]:
+    elif fit.estimates()["kc"].mean_95[0] < 0.0 < fit.estimates()["kc"].mean_95[1]:
         sizes = ", ".join(f"{b:.3g}" for b in fit.sizes)
-        yield (
+        yield Remark(
+            "sign-uncertain",
             f"kc may be below or above zero: plates of {sizes} m differ by no more than repeats "
-            "do; use kc and kphi together, at widths between these"
+            "do; use kc and kphi together, at widths between these",
+            ("kc",),
         )
     elif fit.moduli[0] < 0.0:
-        yield (
+        yield Remark(
+            "below-zero",
             "kc is below zero: larger plates carry more pressure; do not use it for widths below "
-            f"{fit.sizes[0]:.3g} m"
+            f"{fit.sizes[0]:.3g} m",
+            ("kc",),
         )
     yield from _repeats_of_plates(fit)
     halves = np.asarray([c.halves for c in fit.curves if np.isfinite(c.halves).all()])
     if halves.size and abs(np.diff(halves.mean(axis=0))[0]) > NOTABLE_BEND:
         shallow, deep = halves.mean(axis=0)
-        yield (
+        yield Remark(
+            "exponent-depends-on-depth",
             "the logarithms of pressure and sinkage are not on a straight line: the exponent is "
             f"{shallow:.2f} in the shallower and {deep:.2f} in the deeper half, so n depends on "
-            "the depth; its range contains both"
+            "the depth; its range contains both",
+            ("n",),
         )
     yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
     omitted = sum(test.omitted for test in fit.tests)
     if omitted:
-        yield (
-            f"{omitted} samples without pressure, or less deep than an earlier one, are left out"
+        yield Remark(
+            "samples-omitted",
+            f"{omitted} samples without pressure, or less deep than an earlier one, are left out",
+            severity="note",
         )
 
 
-def _repeats_of_plates(fit: PressureSinkageFit) -> Iterator[str]:
+def _repeats_of_plates(fit: PressureSinkageFit) -> Iterator[Remark]:
     size = np.asarray([test.size for test in fit.tests])
     log_pressure = np.asarray([curve.log_pressure for curve in fit.curves])
     for level in fit.sizes:
         near = log_pressure[is_level(size, level)]
         if near.size > 1:
-            yield (
+            yield Remark(
+                "repeats-differ",
                 f"{near.size} tests with the plate of {level:.3g} m differ by a factor "
-                f"{math.exp(np.ptp(near)):.2f} in pressure at {fit.depth:.3g} m"
+                f"{math.exp(np.ptp(near)):.2f} in pressure at {fit.depth:.3g} m",
+                severity="note",
             )
     if size.size == len(fit.sizes):
-        yield "no plate test was repeated: a usual scatter of 15 % in pressure is assumed"
+        yield Remark(
+            "not-repeated",
+            "no plate test was repeated: a usual scatter of 15 % in pressure is assumed",
+        )
 
 
-def shear_remarks(fit: ShearFit) -> Iterator[str]:
+def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
     """Remarks on shear tests."""
     ratio = max(c.strength / t.normal_stress for t, c in zip(fit.tests, fit.curves, strict=True))
     if ratio > ODD_RATIO:
-        yield (
-            f"the shear strength is {ratio:.3g} times the normal stress: check that both are in Pa"
+        yield Remark(
+            "doubtful-unit",
+            f"the shear strength is {ratio:.3g} times the normal stress: check that both are in Pa",
+            ("shear_stress_Pa", "normal_stress_Pa"),
         )
     if fit.cohesion is None:
-        yield (
+        yield Remark(
+            "one-normal-stress",
             f"one normal stress ({_kpa(fit.stresses[0])} kPa): cohesion and friction angle cannot "
-            f"be told apart, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there"
+            f"be told apart, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there",
+            ("cohesion", "friction_angle"),
         )
     elif fit.cohesion.value == 0.0:
-        yield "the failure line meets the axis below zero: cohesion is set to zero"
+        yield Remark(
+            "below-zero",
+            "the failure line meets the axis below zero: cohesion is set to zero",
+            ("cohesion",),
+        )
     yield from _repeats_of_shear(fit)
     if fit.halves:
         (c0, phi0), (c1, phi1) = fit.halves
-        yield (
+        yield Remark(
+            "curved-failure-line",
             "the failure line is curved: cohesion and friction angle depend on the normal stress, "
             f"c = {_kpa(c0)} kPa and phi = {math.degrees(phi0):.1f} deg in the lighter half of the "
             f"tests, {_kpa(c1)} kPa and {math.degrees(phi1):.1f} deg in the heavier; the ranges "
-            "contain both"
+            "contain both",
+            ("cohesion", "friction_angle"),
         )
     if fit.modulus_trend:
         moduli = [curve.modulus for curve in fit.curves]
         way = "grows" if fit.modulus_trend > 0.0 else "falls"
-        yield (
+        yield Remark(
+            "modulus-depends-on-stress",
             f"K {way} with the normal stress: {1e3 * min(moduli):.2g} to {1e3 * max(moduli):.2g} "
-            "mm in these tests; its range contains them"
+            "mm in these tests; its range contains them",
+            ("shear_modulus",),
         )
     yield from _shapes(fit)
     yield from _poor_fits([(t.name, c.misfit) for t, c in zip(fit.tests, fit.curves, strict=True)])
     varying = [t.name for t in fit.tests if t.normal_variation > NOTABLE_VARIATION]
     if varying:
-        yield f"the normal stress varies by more than 5 % within {_list(varying)}; its mean is used"
+        yield Remark(
+            "normal-stress-varies",
+            f"the normal stress varies by more than 5 % within {_list(varying)}; its mean is used",
+            tuple(varying),
+        )
 
 
-def _repeats_of_shear(fit: ShearFit) -> Iterator[str]:
+def _repeats_of_shear(fit: ShearFit) -> Iterator[Remark]:
     sigma = np.asarray([test.normal_stress for test in fit.tests])
     strength = np.asarray([curve.strength for curve in fit.curves])
     for level in fit.stresses:
         near = strength[is_level(sigma, level)]
         if near.size > 1:
-            yield (
+            yield Remark(
+                "repeats-differ",
                 f"{near.size} tests at {_kpa(level)} kPa differ by a factor "
-                f"{near.max() / near.min():.2f} in strength"
+                f"{near.max() / near.min():.2f} in strength",
+                severity="note",
             )
     if len(fit.tests) == len(fit.stresses):
-        yield (
+        yield Remark(
+            "not-repeated",
             "no shear test was repeated: the scatter is that of the tests about the line, and a "
-            "usual one of 8 % in strength"
+            "usual one of 8 % in strength",
         )
 
 
-def _shapes(fit: ShearFit) -> Iterator[str]:
+def _shapes(fit: ShearFit) -> Iterator[Remark]:
     pairs = list(zip(fit.tests, fit.curves, strict=True))
     peaked = [(t, c) for t, c in pairs if c.peak > NOTABLE_PEAK * c.end]
     if peaked:
         falls = ", ".join(
             f"{t.name} {_kpa(c.peak)} to {_kpa(c.end)} kPa" for t, c in peaked[:LISTED]
         )
-        yield (
+        yield Remark(
+            "peak",
             f"the stress passes a peak and falls to a residual ({falls}); the curve of Janosi and "
-            "Hanamoto has none: its strength lies between. The effect shear-softening describes it"
+            "Hanamoto has none: its strength lies between. The effect shear-softening describes it",
+            tuple(t.name for t, _ in peaked),
         )
     rising = [
         t.name
@@ -171,16 +216,22 @@ def _shapes(fit: ShearFit) -> Iterator[str]:
         if c.mobilised < NOTABLE_RISE or c.end > NOTABLE_END * c.mobilised * c.strength
     ]
     if rising:
-        yield (
+        yield Remark(
+            "still-rising",
             f"the stress still rises at the end of {_list(rising)}: strength and K depend on how "
-            "far the test goes"
+            "far the test goes",
+            tuple(rising),
         )
 
 
-def _poor_fits(misfits: Sequence[tuple[str, float]]) -> Iterator[str]:
-    poor = [f"{name} ({misfit:.0%})" for name, misfit in misfits if misfit > NOTABLE_MISFIT]
+def _poor_fits(misfits: Sequence[tuple[str, float]]) -> Iterator[Remark]:
+    poor = {name: f"{name} ({m:.0%})" for name, m in misfits if m > NOTABLE_MISFIT}
     if poor:
-        yield f"the law fits poorly, by its relative residual: {_list(poor)}"
+        yield Remark(
+            "poor-fit",
+            f"the law fits poorly, by its relative residual: {_list(list(poor.values()))}",
+            tuple(poor),
+        )
 
 
 def _list(names: Sequence[str]) -> str:

@@ -1,8 +1,9 @@
-"""Scatter from test to test, and what it leaves open."""
+"""What tests tell of a quantity: levels, least squares, and scatter from test to test."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,71 @@ DRAWS = 20000
 USUAL_FREEDOM = 2.0
 #: Seed of the draws: the same tables give the same file.
 SEED = 0
+#: Sizes or loads that differ by less than this factor are meant to be the same.
+SAME_LEVEL = 1.03
+#: Rounds in which the weights follow the fit; they settle in two or three.
+ROUNDS = 4
+#: Least fitted value, as a fraction of the measured one, that is used for a weight.
+LEAST_FITTED = 1e-3
+
+
+@dataclass(frozen=True)
+class SpreadEstimate:
+    """A value with two ranges of 95 %.
+
+    Attributes
+    ----------
+    value
+        The estimate, in `unit`.
+    mean_95
+        Where the mean of many such tests would lie.
+    another_place_95
+        Where the value at another place of the same soil would lie; it contains the scatter from
+        test to test, and is what a prior for other runs should be.
+    """
+
+    value: float
+    mean_95: tuple[float, float]
+    another_place_95: tuple[float, float]
+    unit: str
+
+    def as_json(self) -> dict[str, Any]:
+        """Its entry in a JSON file."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in asdict(self).items()}
+
+
+def spread_estimate(value: float, mean: Floats, place: Floats, unit: str) -> SpreadEstimate:
+    """The estimate with the ranges of draws of the mean and of another place, (draws,) each."""
+    low, high = np.quantile(mean, [0.025, 0.975])
+    first, last = np.quantile(place, [0.025, 0.975])
+    return SpreadEstimate(value, (float(low), float(high)), (float(first), float(last)), unit)
+
+
+def distinct_levels(values: Floats) -> tuple[float, ...]:
+    """Means of the groups of positive values that are one level but for their scatter."""
+    ordered = np.sort(values)
+    groups = np.split(ordered, np.flatnonzero(ordered[1:] > SAME_LEVEL * ordered[:-1]) + 1)
+    return tuple(float(group.mean()) for group in groups)
+
+
+def is_level(values: Floats, level: float) -> NDArray[np.bool_]:
+    """Which values belong to a level, (k,)."""
+    return np.asarray(np.maximum(values / level, level / values) < SAME_LEVEL)
+
+
+def relative_line(columns: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """Coefficients (p,) of columns (N, p), their derivatives (p, N), and the fitted values (N,).
+
+    The residuals are those of y (N,), which is positive, relative to the fit; the derivatives are
+    those by the relative errors of y.
+    """
+    fitted = y.copy()
+    for _ in range(ROUNDS):
+        scaled = columns / fitted[:, None]
+        hat = np.asarray(np.linalg.pinv(scaled))
+        line = np.asarray(hat @ (y / fitted))
+        fitted = np.maximum(columns @ line, LEAST_FITTED * y)
+    return line, hat, fitted
 
 
 @dataclass(frozen=True)

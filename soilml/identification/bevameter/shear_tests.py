@@ -1,20 +1,43 @@
-"""Shear tests in a table: a normal stress and a shear curve for each test."""
+"""Shear tests: their table, and cohesion, friction angle and shear modulus fitted to them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
-from soilml.identification.bevameter.plate_tests import MOST_POINTS
+from soilml.identification.bevameter.plate_tests import thinned
+from soilml.identification.bevameter.scatter import (
+    SpreadEstimate,
+    distinct_levels,
+    pooled_scatter,
+    relative_line,
+    spread_estimate,
+)
 from soilml.io.table import Table
 
 Floats = NDArray[np.float64]
 
 #: Points of a shear curve that its two parameters need.
 LEAST_POINTS = 2
+#: Usual standard deviations of repeated shear tests: of the logarithms of strength and of K.
+USUAL_SCATTER = np.asarray([0.08, 0.3])
+#: Ratio of the largest to the smallest normal stress below which cohesion and friction are not told
+#: apart: what friction could add is then below the scatter of repeats.
+LEAST_STRESS_RATIO = 1.15
+#: Candidates of K, from a tenth of the smallest displacement to the upper limit; steps of 1 %.
+UPPER_MODULUS = 2.0  # in largest displacements: beyond, a curve is a straight line
+STEP = 0.01
+#: Last part of a curve, as a fraction of its displacement, whose mean is its end.
+END = 0.2
+#: Loads from which on a bend of the failure line, or a trend of K, is looked for.
+LEAST_LOADS = 4
+#: Studentised size of a bend or trend from which it is reported: chance gives it in 1 of 50 tables
+#: of five tests.
+SIGNIFICANT = 3.0
 
 
 @dataclass(frozen=True)
@@ -118,13 +141,204 @@ def _test(
             f"and a shear stress above zero; it has {j.size}"
         )
     curve = np.isfinite(j)
-    if np.count_nonzero(curve) > MOST_POINTS:
-        end = j[curve].max()
-        step = np.minimum((j[curve] / end * MOST_POINTS).astype(np.int64), MOST_POINTS - 1)
-        count = np.bincount(step, minlength=MOST_POINTS)
-        kept = count > 0
-        means = [np.bincount(step, v[curve], MOST_POINTS)[kept] / count[kept] for v in (j, stress)]
-        j = np.append(means[0], j[~curve])
-        stress = np.append(means[1], stress[~curve])
+    means = thinned(j[curve], stress[curve])
+    j, stress = (np.append(a, b[~curve]) for a, b in zip(means, (j, stress), strict=True))
     mean = float(sigma.mean())
     return ShearTest(name, mean, j, stress, float(np.abs(sigma / mean - 1.0).max()))
+
+
+@dataclass(frozen=True)
+class ShearCurve:
+    """Janosi and Hanamoto's curve fitted to one test: strength (Pa) and K (m).
+
+    `peak` and `end` are the largest stress and that of the end (Pa); `mobilised` is the fraction of
+    the strength that is reached at the largest displacement; `misfit` is the relative residual.
+    """
+
+    strength: float
+    modulus: float
+    peak: float
+    end: float
+    mobilised: float
+    misfit: float
+
+
+@dataclass(frozen=True)
+class ShearFit:
+    """Mohr and Coulomb's line through the strengths of N tests, and K.
+
+    Attributes
+    ----------
+    tests, curves
+        The tests, and the curve fitted to each.
+    stresses
+        Distinct normal stresses (Pa).
+    cohesion, friction_angle
+        Estimates (Pa, rad); None where there is one normal stress.
+    strength
+        Shear strength (Pa) at the mean normal stress.
+    shear_modulus
+        K (m), the geometric mean of the tests.
+    halves
+        (c, phi) of the lighter and of the heavier half of the loads where the failure line is
+        curved; else empty.
+    modulus_trend
+        Exponent of K in the normal stress where it differs from zero; else 0.
+    """
+
+    tests: tuple[ShearTest, ...]
+    curves: tuple[ShearCurve, ...]
+    stresses: tuple[float, ...]
+    cohesion: SpreadEstimate | None
+    friction_angle: SpreadEstimate | None
+    strength: SpreadEstimate
+    shear_modulus: SpreadEstimate
+    halves: tuple[tuple[float, float], ...]
+    modulus_trend: float
+
+    def estimates(self) -> dict[str, SpreadEstimate]:
+        """What the tests determine, by name."""
+        found = {"shear_modulus": self.shear_modulus}
+        if self.cohesion is None or self.friction_angle is None:
+            return {"shear_strength": self.strength, **found}
+        return {"cohesion": self.cohesion, "friction_angle": self.friction_angle, **found}
+
+
+def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
+    r"""Fit c, phi and K to shear tests at one or several normal stresses.
+
+    .. math:: \tau = (c + \sigma \tan\varphi) (1 - e^{-j / K})
+
+    Strength and K are fitted to each test, then the line to the strengths by least squares of
+    relative residuals. The scatter of the tests about line and mean gives the uncertainty, together
+    with the deviation of the ends and peaks of the curves from the fitted shape. A line that meets
+    the axis below zero is drawn again through the origin.
+
+    References
+    ----------
+    Janosi and Hanamoto, Proc. 1st ISTVS, 1961. Wong, Theory of Ground Vehicles, 2008, section 2.4.
+    """
+    curves = tuple(fit_shear_curve(test) for test in tests)
+    sigma = np.asarray([test.normal_stress for test in tests])
+    strength = np.asarray([curve.strength for curve in curves])
+    log_modulus = np.log([curve.modulus for curve in curves])
+    stresses = distinct_levels(sigma)
+    columns = np.stack([np.ones(sigma.size), sigma], axis=1)
+    if stresses[-1] < LEAST_STRESS_RATIO * stresses[0]:
+        columns = columns[:, 1:]
+    line, hat, fitted = relative_line(columns, strength)
+    through_origin = len(line) == 2 and line[0] < 0.0
+    if through_origin:
+        slope = relative_line(columns[:, 1:], strength)
+        line, fitted = np.append(0.0, slope[0]), slope[2]
+    mean_log = float(log_modulus.mean())
+    residual = np.stack([np.log(strength / fitted), log_modulus - mean_log], axis=1)
+    scatter = pooled_scatter(residual, USUAL_SCATTER, columns.shape[1])
+    p, s = len(line), scatter.covariance
+    covariance = np.zeros((p + 1, p + 1))
+    covariance[:p, :p] = hat @ hat.T * s[0, 0]
+    covariance[p, p] = s[1, 1] / len(tests)
+    error, deviation = scatter.draws(covariance)
+    modulus = np.exp(mean_log + error[:, p])
+    draws = (line + error[:, :p]) * _shape_factors(curves, len(error))[:, None]
+    other = draws * np.exp(deviation[:, :1])
+    middle = float(sigma.mean())
+    at = np.asarray([1.0, middle])[-p:]
+    halves = _halves(sigma, strength) if len(stresses) >= LEAST_LOADS else ()
+    c = phi = None
+    if p == 2:
+        c = _with(
+            spread_estimate(
+                float(line[0]), _above_zero(draws[:, 0]), _above_zero(other[:, 0]), "Pa"
+            ),
+            [max(half[0], 0.0) for half in halves],
+        )
+        angle, other_angle = (np.arctan(_above_zero(d[:, 1])) for d in (draws, other))
+        phi = _with(
+            spread_estimate(float(np.arctan(max(line[1], 0.0))), angle, other_angle, "rad"),
+            [half[1] for half in halves],
+        )
+    return ShearFit(
+        tuple(tests),
+        curves,
+        stresses,
+        c,
+        phi,
+        spread_estimate(float(line @ at), draws @ at, other @ at, "Pa"),
+        spread_estimate(float(np.exp(mean_log)), modulus, modulus * np.exp(deviation[:, 1]), "m"),
+        halves,
+        _trend(np.log(sigma), log_modulus) if len(stresses) >= LEAST_LOADS else 0.0,
+    )
+
+
+def fit_shear_curve(test: ShearTest) -> ShearCurve:
+    """Least squares of strength and K; the steady end of a test counts as one more point."""
+    j, stress = test.displacement, test.stress
+    finite = j[np.isfinite(j)]
+    low, high = np.log(0.1 * finite.min()), np.log(UPPER_MODULUS * finite.max())
+    candidates = np.exp(np.arange(low, high, STEP))
+    mobilised = -np.expm1(-j / candidates[:, None])  # (candidates, k)
+    strengths = (mobilised @ stress) / np.sum(mobilised**2, axis=1)
+    squares = np.sum((stress - strengths[:, None] * mobilised) ** 2, axis=1)
+    best = int(np.argmin(squares))
+    last = stress[(j >= (1.0 - END) * finite.max())]
+    return ShearCurve(
+        strength=float(strengths[best]),
+        modulus=float(candidates[best]),
+        peak=float(stress.max()),
+        end=float(stress[-1] if not np.isfinite(j[-1]) else last.mean()),
+        mobilised=float(mobilised[best].max()),
+        misfit=float(np.sqrt(squares[best] / np.sum(stress**2))),
+    )
+
+
+def _shape_factors(curves: Sequence[ShearCurve], count: int) -> Floats:
+    """Factors (count,) on the strength, from the end of the curves to their peak.
+
+    Uniform in the logarithm; 1 where the curves have the shape of Janosi and Hanamoto.
+    """
+    reached = [(c, c.mobilised * c.strength) for c in curves]
+    low = float(np.mean([min(np.log(c.end / fitted), 0.0) for c, fitted in reached]))
+    high = float(np.mean([max(np.log(c.peak / fitted), 0.0) for c, fitted in reached]))
+    return np.exp(np.linspace(low, high, count))
+
+
+def _halves(sigma: Floats, strength: Floats) -> tuple[tuple[float, float], ...]:
+    """(c, phi) of the lighter and the heavier tests, where a parabola is needed; else empty."""
+    columns = np.stack([np.ones(sigma.size), sigma, sigma**2], axis=1) / strength[:, None]
+    scale = np.abs(columns).max(axis=0)
+    normal = np.linalg.inv((columns / scale).T @ (columns / scale))
+    x = normal @ (columns / scale).sum(axis=0)
+    residual = 1.0 - (columns / scale) @ x
+    freedom = sigma.size - 3
+    std = np.sqrt(normal[2, 2] * max(float(residual @ residual), 1e-12) / freedom)
+    if freedom < 1 or abs(x[2]) < SIGNIFICANT * std:
+        return ()
+    halves = []
+    for part in (sigma <= np.median(sigma), sigma >= np.median(sigma)):
+        own = np.stack([np.ones(part.sum()), sigma[part]], axis=1)
+        c, slope = relative_line(own, strength[part])[0]
+        halves.append((float(c), float(np.arctan(max(slope, 0.0)))))
+    return tuple(halves)
+
+
+def _trend(x: Floats, y: Floats) -> float:
+    """Slope of a straight line where it differs from zero; else 0."""
+    x = x - x.mean()
+    slope = float(x @ y / (x @ x))
+    residual = y - y.mean() - slope * x
+    std = np.sqrt(max(float(residual @ residual), 1e-12) / (x.size - 2) / (x @ x))
+    return slope if abs(slope) > SIGNIFICANT * std else 0.0
+
+
+def _above_zero(values: Floats) -> Floats:
+    return np.maximum(values, 0.0)
+
+
+def _with(estimate: SpreadEstimate, values: Sequence[float]) -> SpreadEstimate:
+    """The estimate with ranges that contain these values too."""
+    first, second = (
+        (min(low, *values, low), max(high, *values, high))
+        for low, high in (estimate.mean_95, estimate.another_place_95)
+    )
+    return SpreadEstimate(estimate.value, first, second, estimate.unit)

@@ -1,18 +1,28 @@
-"""Values and priors of a model file's soil from plate and shear tests."""
+"""The soil of a model file from plate and shear tests: values, priors, tests."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
 
 from soilml.config.case import Case
-from soilml.identification.bevameter.pressure_sinkage import PressureSinkageFit
-from soilml.identification.bevameter.shear_strength import ShearFit
+from soilml.config.write_case import case_as_toml, soil_as_toml
+from soilml.identification.bevameter.plate_tests import LEAST_SIZE_RATIO, PressureSinkageFit
+from soilml.identification.bevameter.result import BevameterResult
+from soilml.identification.bevameter.scatter import SpreadEstimate
+from soilml.identification.bevameter.shear_tests import ShearFit
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
+from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
+from soilml.remarks import Remark, texts
 from soilml.report.numbers import significant
 
+#: Soil parameters that plates determine, and those that shear tests determine.
+BEARING, SHEARING = ("kc", "kphi", "n"), ("cohesion", "friction_angle", "shear_modulus")
 #: Least modulus of a width, as a fraction of the estimate, where tests at other widths leave it
 #: open down to zero.
 LEAST_MODULUS = 0.01
@@ -20,8 +30,12 @@ LEAST_MODULUS = 0.01
 LOG_FACTOR = 3.0
 #: Least width of a prior, as a fraction of its value: a test is not read better than this.
 LEAST_WIDTH = 1e-3
+#: Standard deviations that the range of 95 % of a normal distribution reaches from its middle.
+Z_95 = 1.96
+#: Least scatter that is stated: no two places are more alike.
+LEAST_SCATTER = 0.02
 
-Section = tuple[dict[str, float], dict[str, Prior], list[str]]
+Section = tuple[dict[str, float], dict[str, Prior], list[Remark]]
 
 
 def plate_section(fit: PressureSinkageFit, case: Case | None) -> Section:
@@ -33,31 +47,33 @@ def plate_section(fit: PressureSinkageFit, case: Case | None) -> Section:
     """
     kc, kphi = fit.moduli
     values = {"kc": kc, "kphi": kphi, "n": fit.exponent}
-    prior = {"n": _prior("n", fit.exponent, fit.estimates()["n"].place_range)}
+    prior = {"n": _prior("n", fit.exponent, fit.estimates()["n"].another_place_95)}
     widths = widths_of_gears(case)
-    remarks: list[str] = []
+    remarks: list[Remark] = []
     if len(widths) > 1 and fit.several_sizes:
         for name in ("kc", "kphi"):
-            prior[name] = _prior(name, values[name], fit.estimates()[name].place_range)
+            prior[name] = _prior(name, values[name], fit.estimates()[name].another_place_95)
         return values, prior, remarks
     ranges = []
     for width in widths or (fit.sizes[0],):
         k = fit.modulus(width if fit.several_sizes else fit.sizes[0])
-        low, high = k.place_range
+        low, high = k.another_place_95
         if not fit.several_sizes:
             ratio = fit.sizes[0] / width
             low, high = low * min(1.0, ratio), high * max(1.0, ratio)
             if widths and abs(ratio - 1.0) > LEAST_WIDTH:
-                remarks.append(
+                text = (
                     f"the gear is {width:.3g} m wide and the plate {fit.sizes[0]:.3g} m: the range "
                     "of kphi covers all from kc = 0 to kphi = 0"
                 )
+                remarks.append(Remark("another-width", text, ("kphi",)))
         elif low < LEAST_MODULUS * abs(k.value):
             low = LEAST_MODULUS * abs(k.value)
-            remarks.append(
+            text = (
                 f"the plates do not determine k at the width of the gear, {width:.3g} m; its range "
                 "reaches down to a hundredth"
             )
+            remarks.append(Remark("not-identified", text, ("kphi",)))
         ranges.append((low - kc / width, high - kc / width))
     span = min(low for low, _ in ranges), max(high for _, high in ranges)
     prior["kphi"] = _prior("kphi", kphi, span)
@@ -73,13 +89,13 @@ def shear_section(fit: ShearFit, case: Case | None) -> Section:
     """
     modulus = fit.shear_modulus
     values = {"shear_modulus": modulus.value}
-    prior = {"shear_modulus": _prior("shear_modulus", modulus.value, modulus.place_range)}
+    prior = {"shear_modulus": _prior("shear_modulus", modulus.value, modulus.another_place_95)}
     if fit.cohesion is not None and fit.friction_angle is not None:
         for name, estimate in (("cohesion", fit.cohesion), ("friction_angle", fit.friction_angle)):
             values[name] = estimate.value
-            prior[name] = _prior(name, estimate.value, estimate.place_range)
+            prior[name] = _prior(name, estimate.value, estimate.another_place_95)
         return values, prior, []
-    sigma, (low, high) = fit.stresses[0], fit.strength.place_range
+    sigma, (low, high) = fit.stresses[0], fit.strength.another_place_95
     own = case.prior.get("cohesion") if case is not None else None
     lowest, highest = (own.lower, min(own.upper, high)) if own is not None else (0.0, high)
     lowest = min(lowest, highest)
@@ -90,8 +106,8 @@ def shear_section(fit: ShearFit, case: Case | None) -> Section:
     prior["friction_angle"] = _prior("friction_angle", values["friction_angle"], span)
     prior["cohesion"] = _prior("cohesion", c, (lowest, highest))
     whose = "the model file's" if own is not None else "0 to the whole strength"
-    remark = f"the range of cohesion is {whose}, and that of the friction angle what this leaves"
-    return values, prior, [remark]
+    text = f"the range of cohesion is {whose}, and that of the friction angle what this leaves"
+    return values, prior, [Remark("assumed-range", text, ("cohesion", "friction_angle"))]
 
 
 def within_bounds(values: Mapping[str, float]) -> dict[str, float]:
@@ -118,3 +134,85 @@ def _prior(name: str, value: float, span: tuple[float, float]) -> Prior:
     upper = max(min(upper, bounds.upper), lower + least)
     log = 0.0 < LOG_FACTOR * lower <= upper
     return Prior(significant(lower), significant(upper), log=log)
+
+
+def pressure_test(fit: PressureSinkageFit, case: Case | None) -> PlatePressure | None:
+    """The pressure at the reference depth, under the width of the gears or that of the plates.
+
+    At this depth the errors of pressure and exponent are least correlated, so that the pressure and
+    the range of n together say what the tests say of kc, kphi and n. None where plates of one size
+    tell little of a gear of another width.
+    """
+    widths = widths_of_gears(case)
+    if fit.several_sizes:
+        width = widths[0] if len(widths) == 1 else 1.0 / float(np.mean(1.0 / np.array(fit.sizes)))
+    else:
+        width = fit.sizes[0]
+        if any(max(w / width, width / w) > LEAST_SIZE_RATIO for w in widths):
+            return None
+    pressure = fit.pressure_at_depth(width)
+    scatter = _scatter(pressure)
+    if scatter is None:
+        return None
+    return PlatePressure(
+        plate_width=significant(width),
+        sinkage=significant(fit.depth),
+        pressure=significant(pressure.value),
+        scatter=scatter,
+    )
+
+
+def strength_test(fit: ShearFit) -> ShearStrength | None:
+    """The strength under the mean normal stress, where cohesion and friction trade off least."""
+    scatter = _scatter(fit.strength)
+    if scatter is None:
+        return None
+    stress = float(np.mean([test.normal_stress for test in fit.tests]))
+    return ShearStrength(
+        normal_stress=significant(stress),
+        strength=significant(fit.strength.value),
+        scatter=scatter,
+    )
+
+
+def _scatter(estimate: SpreadEstimate) -> float | None:
+    """Standard deviation of the logarithm at another place; None where it may be zero or less."""
+    low, high = estimate.another_place_95
+    if not 0.0 < low < estimate.value < high:
+        return None
+    return significant(max(math.log(high / low) / (2.0 * Z_95), LEAST_SCATTER), 2)
+
+
+def updated_soil(case: Case, result: BevameterResult) -> Case:
+    """The case with the soil of the tests.
+
+    Priors of what they determine, and earlier tests of the same kinds, are replaced.
+    """
+    determined = (BEARING if result.plates else ()) + (SHEARING if result.shear else ())
+    kept = {name: prior for name, prior in case.prior.items() if name not in determined}
+    measured = tuple(
+        test
+        for test in case.soil_tests
+        if not (result.plates if isinstance(test, PlatePressure) else result.shear)
+    )
+    return replace(
+        case.with_values(result.soil),
+        prior={**kept, **result.prior},
+        soil_tests=(*measured, *result.tests),
+    )
+
+
+def model_file_text(result: BevameterResult, case: Case | None, source: str) -> str:
+    """The case with this soil as a model file; without a case, the soil alone.
+
+    The remarks become comments; `source` names the tables.
+    """
+    comments = [f"soil from plate and shear tests: {source}", *texts(result.remarks)]
+    if case is not None:
+        return case_as_toml(updated_soil(case, result), comments)
+    return soil_as_toml(result.soil, result.prior, comments, result.tests)
+
+
+def missing_values(result: BevameterResult) -> list[str]:
+    """Parameters of a soil that the tests did not determine and that have no default."""
+    return [name for name in (*SHEARING, *BEARING) if name not in result.soil]

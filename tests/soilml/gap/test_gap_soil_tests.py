@@ -12,7 +12,7 @@ from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.gap import audit, gap
 from soilml.gap.report.page import page
 from soilml.identification.bevameter import bevameter
-from soilml.identification.bevameter.model_file import updated_soil
+from soilml.identification.bevameter.soil_section import updated_soil
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength

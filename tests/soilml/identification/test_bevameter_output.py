@@ -10,11 +10,12 @@ from soilml.identification.bevameter import (
     bevameter,
     soil_section,
 )
-from soilml.identification.bevameter.estimate import (
+from soilml.identification.bevameter.remarks import plate_remarks, shear_remarks
+from soilml.identification.bevameter.result import save_picture
+from soilml.identification.bevameter.scatter import (
     SpreadEstimate,
 )
-from soilml.identification.bevameter.plot import save_picture
-from soilml.identification.bevameter.remarks import plate_remarks, shear_remarks
+from soilml.remarks import texts
 
 
 def test_priors_of_a_soil_contain_its_value_and_keep_the_bounds():
@@ -38,7 +39,7 @@ def test_priors_of_a_soil_contain_its_value_and_keep_the_bounds():
 
 def test_remarks_name_what_stands_in_the_fits():
     fit = bevameter(plates(repeats=3, scatter=(0.2, 0.05))).plates
-    said = list(plate_remarks(fit))
+    said = texts(plate_remarks(fit))
     pressures = [np.exp(c.log_pressure) for t, c in zip(fit.tests, fit.curves, strict=True)]
     first = max(pressures[:3]) / min(pressures[:3])
     assert any(
@@ -46,33 +47,37 @@ def test_remarks_name_what_stands_in_the_fits():
     )
     assert any("they hold down to 0.08 m, the deepest test" in text for text in said)
     assert not any("no plate test was repeated" in text for text in said)
-    once = list(plate_remarks(bevameter(plates(repeats=1)).plates))
+    once = texts(plate_remarks(bevameter(plates(repeats=1)).plates))
     assert any("no plate test was repeated" in text for text in once)
     assert not any("differ by a factor" in text for text in once)
-    negative = list(plate_remarks(bevameter(plates(kc=-2e4, repeats=4)).plates))
+    negative = texts(plate_remarks(bevameter(plates(kc=-2e4, repeats=4)).plates))
     assert any(t.startswith(("kc is below zero", "kc may be below")) for t in negative)
     fit = bevameter(shear=shear(repeats=2, scatter=0.1)).shear
-    said = list(shear_remarks(fit))
+    said = texts(shear_remarks(fit))
     strengths = [c.strength for c in fit.curves[:2]]
     ratio = max(strengths) / min(strengths)
     assert any(f"2 tests at 5 kPa differ by a factor {ratio:.2f} in strength" in t for t in said)
     assert not any("no shear test was repeated" in text for text in said)
     assert not any("normal stress varies" in text for text in said)
     tests = [replace(t, normal_variation=0.051) for t in fit.tests]
-    varied = list(shear_remarks(replace(fit, tests=tuple(tests))))
+    varied = texts(shear_remarks(replace(fit, tests=tuple(tests))))
     names = ", ".join(t.name for t in tests[:4])
     assert any(f"within {names} and 2 more; its mean is used" in text for text in varied)
     poor = [replace(c, misfit=0.11 if i < 4 else 0.09) for i, c in enumerate(fit.curves)]
-    said = list(shear_remarks(replace(fit, curves=tuple(poor))))
+    said = texts(shear_remarks(replace(fit, curves=tuple(poor))))
     wanted = ", ".join(f"{t.name} (11%)" for t in fit.tests[:4])
     assert f"the law fits poorly, by its relative residual: {wanted}" in said
     peaks = [replace(c, peak=1.11 * c.end) for c in fit.curves]
-    assert any("passes a peak" in t for t in shear_remarks(replace(fit, curves=tuple(peaks))))
+    assert any(
+        "passes a peak" in t for t in texts(shear_remarks(replace(fit, curves=tuple(peaks))))
+    )
     peaks = [replace(c, peak=1.09 * c.end) for c in fit.curves]
-    assert not any("passes a peak" in t for t in shear_remarks(replace(fit, curves=tuple(peaks))))
+    assert not any(
+        "passes a peak" in t for t in texts(shear_remarks(replace(fit, curves=tuple(peaks))))
+    )
     for change in ({"mobilised": 0.89}, {"end": 1.06 * fit.curves[0].strength, "mobilised": 1.0}):
         rising = (replace(fit.curves[0], **change), *fit.curves[1:])
-        said = list(shear_remarks(replace(fit, curves=rising)))
+        said = texts(shear_remarks(replace(fit, curves=rising)))
         assert any(f"still rises at the end of {fit.tests[0].name}:" in t for t in said)
 
 
@@ -90,7 +95,9 @@ def test_json_of_the_result_holds_every_test():
     assert (entry["test"], entry["normal_stress_Pa"]) == ("20000_0", 20e3)
     assert entry["strength_Pa"] == pytest.approx(C + 20e3 * np.tan(PHI), rel=0.01)
     assert entry["shear_modulus_m"] == pytest.approx(K, rel=0.02)
-    assert content["soil"] == found.soil and content["remarks"] == list(found.remarks)
+    assert content["soil"] == found.soil and content["remarks"] == [
+        r.as_json() for r in found.remarks
+    ]
     assert bevameter(plates()).as_json()["shear_tests"] == []
     assert bevameter(shear=shear()).as_json()["plate_tests"] == []
     assert isinstance(found.estimates()["n"], SpreadEstimate)

@@ -9,15 +9,16 @@ from bevameter_tables import plates
 from soilml.errors import TableError
 from soilml.identification.bevameter import (
     bevameter,
-    pressure_sinkage,
-)
-from soilml.identification.bevameter.estimate import (
-    distinct_levels,
-    is_level,
+    plate_tests,
 )
 from soilml.identification.bevameter.plate_tests import PlateTest, read_plate_tests
-from soilml.identification.bevameter.relative_line import relative_line
-from soilml.identification.bevameter.scatter import Scatter, pooled_scatter
+from soilml.identification.bevameter.scatter import (
+    Scatter,
+    distinct_levels,
+    is_level,
+    pooled_scatter,
+    relative_line,
+)
 from soilml.io.table import Table
 
 
@@ -76,9 +77,9 @@ def plate(z, p, name="a", size=0.05):
 def test_one_plate_test_is_fitted_by_least_squares_with_squared_pressures():
     z = np.asarray([0.01, 0.02, 0.04, 0.08])
     p = 1e6 * z**0.8 * np.asarray([1.1, 0.95, 1.02, 0.99])
-    depth = pressure_sinkage._reference_depth([plate(z, p), plate(z, 7.0 * p)])
+    depth = plate_tests._reference_depth([plate(z, p), plate(z, 7.0 * p)])
     assert depth == pytest.approx(np.exp(np.sum(p**2 * np.log(z)) / np.sum(p**2)))
-    curve = pressure_sinkage._fit_curve(plate(z, p), depth)
+    curve = plate_tests._fit_curve(plate(z, p), depth)
     x, y = np.log(z / depth), np.log(p)
     w = p**2 / np.sum(p**2)
     slope = np.sum(w * (x - w @ x) * y) / np.sum(w * (x - w @ x) ** 2)
@@ -92,23 +93,23 @@ def test_halves_of_a_plate_test_are_those_of_its_logarithm_without_the_shallow_t
     z = np.geomspace(0.001, 0.1, 41)
     bend = np.where(z < 0.01, 5.0, np.where(z < np.sqrt(0.001), 0.5, 1.5))
     log_p = np.append(0.0, np.cumsum(bend[1:] * np.diff(np.log(z))))
-    halves = pressure_sinkage._fit_curve(plate(z, 1e3 * np.exp(log_p)), 0.05).halves
+    halves = plate_tests._fit_curve(plate(z, 1e3 * np.exp(log_p)), 0.05).halves
     assert halves[0] == pytest.approx(0.5, abs=0.1) and halves[1] == pytest.approx(1.5, abs=0.02)
     # readings end far before the last one, whose tenth is the shallow part
     gap = np.append(z[z < 0.03], 0.1)
     log_p = np.interp(np.log(gap), np.log(z), log_p)
-    halves = pressure_sinkage._fit_curve(plate(gap, 1e3 * np.exp(log_p)), 0.05).halves
+    halves = plate_tests._fit_curve(plate(gap, 1e3 * np.exp(log_p)), 0.05).halves
     assert np.isnan(halves).all()  # one reading in the deeper half
     beyond = np.append(gap, 0.1001)
     log_p = np.append(log_p, log_p[-1] + 1.5 * np.log(1.001))
-    halves = pressure_sinkage._fit_curve(plate(beyond, 1e3 * np.exp(log_p)), 0.05).halves
+    halves = plate_tests._fit_curve(plate(beyond, 1e3 * np.exp(log_p)), 0.05).halves
     assert halves[0] == pytest.approx(0.5, abs=0.1)
-    few = pressure_sinkage._fit_curve(plate([0.02, 0.03, 0.1], [1.0, 2.0, 3.0]), 0.05)
+    few = plate_tests._fit_curve(plate([0.02, 0.03, 0.1], [1.0, 2.0, 3.0]), 0.05)
     assert np.isnan(few.halves).all() and few.exponent > 0.0  # one point in the deeper half
     curves = [replace(few, halves=h) for h in ((0.4, 1.0), (0.6, 1.4), (np.nan, np.nan))]
-    assert pressure_sinkage._exponent_span(curves, 0.9) == pytest.approx((0.5, 1.2))
-    assert pressure_sinkage._exponent_span(curves, 1.5) == pytest.approx((0.5, 1.5))
-    assert pressure_sinkage._exponent_span(curves[2:], 0.9) == (0.9, 0.9)
+    assert plate_tests._exponent_span(curves, 0.9) == pytest.approx((0.5, 1.2))
+    assert plate_tests._exponent_span(curves, 1.5) == pytest.approx((0.5, 1.5))
+    assert plate_tests._exponent_span(curves[2:], 0.9) == (0.9, 0.9)
 
 
 def test_moduli_and_pressures_of_a_fit_belong_together():
@@ -118,15 +119,15 @@ def test_moduli_and_pressures_of_a_fit_belong_together():
         pressure = fit.pressure_at_depth(b)
         assert pressure.value == pytest.approx((kc / b + kphi) * fit.depth**fit.exponent)
         assert fit.modulus(b).value == pytest.approx(kc / b + kphi)
-        assert pressure.mean_range[0] < pressure.value < pressure.mean_range[1]
-        low, high = fit.modulus(b).place_range
+        assert pressure.mean_95[0] < pressure.value < pressure.mean_95[1]
+        low, high = fit.modulus(b).another_place_95
         assert low < fit.modulus(b).value < high
-        assert pressure.place_range[0] < pressure.mean_range[0]
+        assert pressure.another_place_95[0] < pressure.mean_95[0]
         draws = fit.mean_draws
         k = (draws[:, 0] + draws[:, 1] / b) * fit.depth ** -draws[:, 2]
-        assert fit.modulus(b).mean_range == pytest.approx(np.quantile(k, [0.025, 0.975]))
+        assert fit.modulus(b).mean_95 == pytest.approx(np.quantile(k, [0.025, 0.975]))
     kphi_draws = fit.place_draws[:, 0] * fit.depth ** -fit.place_draws[:, 2]
-    found = fit.estimates()["kphi"].place_range
+    found = fit.estimates()["kphi"].another_place_95
     assert found == pytest.approx(np.quantile(kphi_draws, [0.025, 0.975]))
     assert fit.several_sizes and not bevameter(plates(sizes=(0.05, 0.0545))).plates.several_sizes
     assert bevameter(plates(sizes=(0.05, 0.0555))).plates.several_sizes

@@ -14,7 +14,7 @@ WHEEL = Model(Wheel(radius=0.15, width=0.12))
 
 
 def estimate(value, low, high):
-    return SimpleNamespace(value=value, place_range=(low, high))
+    return SimpleNamespace(value=value, another_place_95=(low, high))
 
 
 def case(cohesion=None, prior=None, gear=WHEEL, **priors):
@@ -58,7 +58,7 @@ def test_one_stress_shares_the_strength_between_cohesion_and_friction(
     assert (low, high) == pytest.approx(c_range, rel=2e-3, abs=1.0)
     found = [math.tan(prior["friction_angle"].lower), math.tan(prior["friction_angle"].upper)]
     assert found == pytest.approx(list(tangents), rel=2e-3, abs=1e-3)
-    assert whose in remark
+    assert remark.code == "assumed-range" and whose in remark.text
 
 
 def plates(sizes=(0.05,), exponent=1.0):
@@ -85,7 +85,8 @@ def test_one_plate_leaves_open_how_the_modulus_varies_with_width():
     assert values == {"kc": 0.0, "kphi": 1e6, "n": 1.0}
     found = prior["kphi"].lower, prior["kphi"].upper
     assert found == pytest.approx((8e5 * 0.05 / 0.12, 1.25e6), rel=2e-3)
-    assert "the gear is 0.12 m wide and the plate 0.05 m" in remark
+    assert "the gear is 0.12 m wide and the plate 0.05 m" in remark.text
+    assert (remark.code, remark.about) == ("another-width", ("kphi",))
     wide = case(gear=Model(Wheel(radius=0.15, width=0.025)))
     found = plate_section(plates(), wide)[1]["kphi"]
     assert (found.lower, found.upper) == pytest.approx((8e5, 2.5e6), rel=2e-3)

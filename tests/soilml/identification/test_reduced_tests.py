@@ -10,13 +10,13 @@ from channel_readings import channel_readings
 from soilml import Operating
 from soilml.fitting import soil_tests
 from soilml.identification import condensing, joint_sample
-from soilml.identification.bevameter import reduced_tests
-from soilml.identification.bevameter.reduced_tests import pressure_test, strength_test
+from soilml.identification.bevameter import soil_section
+from soilml.identification.bevameter.soil_section import pressure_test, strength_test
 from soilml.numerics.importance_sampling import ImportanceSample
 
 
 def spread(value, low, high):
-    return SimpleNamespace(value=value, place_range=(low, high))
+    return SimpleNamespace(value=value, another_place_95=(low, high))
 
 
 def plate_fit(sizes, pressure=None):
@@ -40,7 +40,7 @@ def plate_fit(sizes, pressure=None):
 def widths(monkeypatch):
     """Sets the widths of a case's gears."""
     return lambda *found: monkeypatch.setattr(
-        reduced_tests, "widths_of_gears", lambda case: list(found)
+        soil_section, "widths_of_gears", lambda case: list(found)
     )
 
 
