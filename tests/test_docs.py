@@ -62,9 +62,19 @@ def test_python_blocks_run(page, monkeypatch, tmp_path):
 def test_the_estimates_of_the_readme_are_answered(monkeypatch):
     monkeypatch.chdir(ROOT)
     names: dict = {}
-    exec(blocks("README.md", "python")[0], names)
+    exec(blocks("README.md", "python")[1], names)
     assert names["one"].mean.shape == names["all_"].mean.shape == (3,)
     assert bool(names["one"].in_range) and bool(names["all_"].in_range)
+
+
+def test_the_analyses_of_the_readme_find_the_hidden_effect(monkeypatch):
+    monkeypatch.chdir(ROOT)
+    names: dict = {}
+    exec(blocks("README.md", "python")[0], names)
+    assert names["fit"].names == ("cohesion", "friction_angle", "shear_modulus")
+    assert any(remark.code == "excess-residuals" for remark in names["fit"].warnings)
+    assert names["report"].status == "named"
+    assert names["report"].cause_set == (("slip-sinkage",),)
 
 
 def test_the_model_file_is_valid(tmp_path):
