@@ -10,7 +10,7 @@ import numpy as np
 from faults import Readings
 from scipy.stats import qmc
 
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.monomials import derivative, monomial_terms, monomials
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -30,7 +30,7 @@ def box_points(count: int, seed: int) -> Floats:
     return np.asarray(2.0 * qmc.Sobol(3, rng=seed).random(count) - 1.0)
 
 
-def parameter_values(axes: Sequence[Coordinate], x: Floats) -> Floats:
+def parameter_values(axes: Sequence[PriorAxis], x: Floats) -> Floats:
     """Parameters (n, 3) at coordinates (n, 3)."""
     return np.stack([a.value(x[:, i]) for i, a in enumerate(axes)], axis=1)
 

@@ -35,7 +35,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS
 from soilml.quantities import SHEAR
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.recipe_family import RecipeFamily
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -95,7 +95,7 @@ def shuffled_conditions(sets: int, seed: int) -> Order:
 
 
 def simulate_fault(
-    fault: Fault, case: Case, axes: Sequence[Coordinate], seed: int
+    fault: Fault, case: Case, axes: Sequence[PriorAxis], seed: int
 ) -> FaultSimulation:
     """Simulate soils of the prior with a fault, and fit the models that may explain them."""
     true_case, rng = fault.case(case), np.random.default_rng(seed)
@@ -230,7 +230,7 @@ def measured(
 ) -> dict[tuple[Fault, bool, int], DetectionRates]:
     """Detection rates by fault, channels and set size."""
     case = read_recipe("wheel").case
-    axes = [Coordinate.of(name, case.prior[name]) for name in SHEAR]
+    axes = [PriorAxis.of(name, case.prior[name]) for name in SHEAR]
     estimators, rates = load_files(case, *files), {}
     studied = [Fault("-", "no fault"), *filter(only, faults(case))]
     with progress_bar("simulating", len(studied)) as done:

@@ -96,6 +96,23 @@ def test_public_functions_and_classes_are_described():
                 assert ast.get_docstring(node), f"{file}: {node.name}"
 
 
+def test_no_two_classes_share_a_name():
+    """Private classes of a module apart, a name means one thing in all three packages."""
+    places = {}
+    for file in FILES:
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(str(file.relative_to(ROOT)))
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}
+
+
+def test_no_program_searches_the_words_of_its_own_remarks():
+    """Decisions are made from codes: texts may be reworded without another result."""
+    searching = re.compile(r"in text for text in|in str\(.*(warning|remark)|in (note|remark)\.text")
+    for file in FILES:
+        assert not searching.search(file.read_text()), file
+
+
 def test_nothing_is_unpickled():
     """But for tasks that a dask scheduler hands to its workers: dask has no other form for them."""
     modules = r"\b(pickle|cloudpickle|dill|joblib|marshal|shelve)\b|torch\.(load|save)\("

@@ -18,7 +18,7 @@ from training.onnx_graph.value import (
     shortcut,
     stack_rows,
 )
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.response_surface import Response
@@ -125,7 +125,7 @@ class ModelErrors:
         return slip * growing + constant
 
 
-def _by_log_value(basis: Value, terms: Terms, number: int, axis: Coordinate) -> Value:
+def _by_log_value(basis: Value, terms: Terms, number: int, axis: PriorAxis) -> Value:
     r"""Derivatives (terms, 1) of the monomials by the logarithm of one unknown, at a soil.
 
     .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}

@@ -155,7 +155,7 @@ def _parameters(family: WheelFamily, sample: WeightedSample) -> Value:
 
     .. math:: \theta = \alpha + \delta x + e^{\log \beta + \gamma x}
 
-    as two products with points (1, x), see `Coordinate`.
+    as two products with points (1, x), see `PriorAxis`.
     """
     linear, exponent = np.zeros((2, family.targets, 1 + len(family.axes)))
     for k, axis in enumerate(family.axes[: family.targets]):

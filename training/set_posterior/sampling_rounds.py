@@ -27,7 +27,7 @@ from training.onnx_graph.value import (
     softmax,
     sqrt,
 )
-from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, Coordinate
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, PriorAxis
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
 
@@ -154,7 +154,7 @@ class WeightedRound:
 
 def sample_round(
     residuals: PolynomialResiduals,
-    axes: tuple[Coordinate, ...],
+    axes: tuple[PriorAxis, ...],
     others: Value,
     solved: tuple[Value, Value],
     draws: ProposalDraws,
@@ -174,7 +174,7 @@ def sample_round(
     ----------
     residuals : PolynomialResiduals
         The system of the set.
-    axes : tuple of Coordinate
+    axes : tuple of PriorAxis
         The axes of the family, whose `tilt` is the lambda of their prior.
     others : Value
         1, and the other coordinates, within the box (p, n).

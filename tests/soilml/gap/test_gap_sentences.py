@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 from gap_sets import case_of, remark
+from remarked import remarked
 
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.gap.report.results import GapReduction, GapReport, RemainingDiscrepancy, Suspect
@@ -150,7 +151,7 @@ def test_what_each_status_does_not_support(status, words):
 def test_extrapolation_is_not_supported_where_the_gap_is_hardly_reduced(before, after, hardly):
     region = GapReduction(before, after, {}, 24, "load_N >= 140")
     found = concluded("named", gap=FIGURES | {"held_out_region": region})
-    assert any("on load_N >= 140 the gap is hardly reduced" in text for text in found) == hardly
+    assert remarked(found, "on load_N >= 140 the gap is hardly reduced") == hardly
 
 
 def test_effects_that_cannot_be_tested_are_listed_by_name():

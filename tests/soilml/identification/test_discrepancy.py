@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from remarked import remarked
 
 from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
@@ -50,12 +51,10 @@ def measured(case, truth, rng, error=0.02, noise=0.01):
 
 def test_a_declared_error_widens_the_intervals_and_explains_the_residuals(case):
     case, table = measured(case, TRUTH, np.random.default_rng(4))
-    assert any("times the declared noise" in text for text in texts(identify(case, table).warnings))
+    assert remarked(identify(case, table).warnings, "times the declared noise")
     fit = identify(replace(case, discrepancy=USUAL), table)
-    assert not any("times the declared noise" in text for text in texts(fit.warnings))
-    assert any(
-        "errors of the model are included in std: torque" in text for text in texts(fit.warnings)
-    )
+    assert not remarked(fit.warnings, "times the declared noise")
+    assert remarked(fit.warnings, "errors of the model are included in std: torque")
     noise_only = identify(*measured(case, TRUTH, np.random.default_rng(4), error=0.0))
     assert (fit.std > 1.5 * noise_only.std).all()
     assert (np.abs(fit.values - list(TRUTH.values())) < 3.0 * fit.std).all()

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from remarked import remarked
 from test_identification import TRUTH, measured
 
 from soilml import identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
-from soilml.remarks import texts
 
 
 @pytest.fixture
@@ -32,4 +32,4 @@ def test_residuals_exceed_the_noise_from_two_standard_deviations_of_chi_squared(
         fit = identify(known, table)
         size *= np.sqrt(squares / fit.misfit)
     assert fit.misfit == pytest.approx(squares, rel=1e-2)
-    assert any("times the declared noise" in text for text in texts(fit.warnings)) == excess
+    assert remarked(fit.warnings, "times the declared noise") == excess

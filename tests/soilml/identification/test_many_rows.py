@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from remarked import remarked
 from test_descent import measured, two_gears, with_model
 
 from soilml import identification, identify
@@ -15,7 +16,6 @@ from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import condensing as condensing_rows
 from soilml.identification.condensing import cells_of
 from soilml.io.table import Table
-from soilml.remarks import texts
 from soilml.traction.soil_draws import posterior_draws
 
 ROWS = 2400
@@ -90,7 +90,7 @@ def test_residuals_within_the_cells_count_as_misfit(case, condensing):
     columns = {name: table[name] for name in ("slip", "load_N")} | {"torque_Nm": louder}
     fit = identify(case, Table(columns))
     assert fit.misfit == pytest.approx((0.06**2 + 0.02**2) / 0.02**2, rel=0.1)
-    assert any("times the declared noise" in text for text in texts(fit.warnings))
+    assert remarked(fit.warnings, "times the declared noise")
 
 
 def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condensing):

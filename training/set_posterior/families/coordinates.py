@@ -26,7 +26,7 @@ NORMAL_TRUNCATION = 2.5
 
 
 @dataclass(frozen=True)
-class Coordinate:
+class PriorAxis:
     r"""A parameter's value along its coordinate x, and the density of its prior there.
 
     .. math:: \theta = \alpha + \beta e^{\gamma x} + \delta x, \qquad \log p(x) = \lambda x + const
@@ -44,7 +44,7 @@ class Coordinate:
     tilt: float = 0.0  # lambda of the prior, nil where the prior is uniform in x
 
     @staticmethod
-    def of(name: str, prior: Prior) -> Coordinate:
+    def of(name: str, prior: Prior) -> PriorAxis:
         """The coordinate for a prior, uniform in the value or in its logarithm."""
         if prior.normal_std is not None:
             raise InputError(
@@ -56,12 +56,12 @@ class Coordinate:
         ):
             rate = 0.5 * math.log(upper / lower)
             tilt = 0.0 if prior.log else rate
-            return Coordinate(name, factor=math.sqrt(lower * upper), rate=rate, tilt=tilt)
+            return PriorAxis(name, factor=math.sqrt(lower * upper), rate=rate, tilt=tilt)
         if 0.0 <= lower <= ZERO_SHARE * upper:
             rate, size = 0.5 * math.log(OFFSET_RATIO), (upper - lower) / (OFFSET_RATIO - 1.0)
             factor = size * math.sqrt(OFFSET_RATIO)
-            return Coordinate(name, shift=lower - size, factor=factor, rate=rate, tilt=rate)
-        return Coordinate(name, shift=0.5 * (lower + upper), slope=0.5 * (upper - lower))
+            return PriorAxis(name, shift=lower - size, factor=factor, rate=rate, tilt=rate)
+        return PriorAxis(name, shift=0.5 * (lower + upper), slope=0.5 * (upper - lower))
 
     def value(self, x: Floats) -> Floats:
         """The parameter at coordinates x, of any shape."""

@@ -19,7 +19,7 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, stack_rows
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.dimensionless_sets import (
     BEARING_RANGE,
     COHESION_SHARE,
@@ -64,7 +64,7 @@ class DimensionlessFamily:
     ranges: dict[str, Prior]
     sinkage: tuple[float, float]  # range of sinkage over radius of the designs
     pressure: tuple[float, float]  # range of load / (radius width) of the designs, Pa
-    axes: tuple[Coordinate, ...]
+    axes: tuple[PriorAxis, ...]
     targets: int = 3
     free: int = 3
     degree: tuple[int, int] = (3, 4)
@@ -94,11 +94,11 @@ class DimensionlessFamily:
             (sinkage.lower, sinkage.upper),
             (pressure.lower, pressure.upper),
             (
-                Coordinate.of("cohesion", COHESION_SHARE),
-                Coordinate.of("friction_angle", angle),
-                Coordinate.of("shear_modulus", SHEAR_MODULUS_SHARE),
-                Coordinate.of("log_bearing_deviation", Prior(-BEARING_RANGE, BEARING_RANGE)),
-                Coordinate.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
+                PriorAxis.of("cohesion", COHESION_SHARE),
+                PriorAxis.of("friction_angle", angle),
+                PriorAxis.of("shear_modulus", SHEAR_MODULUS_SHARE),
+                PriorAxis.of("log_bearing_deviation", Prior(-BEARING_RANGE, BEARING_RANGE)),
+                PriorAxis.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
             ),
         )
 

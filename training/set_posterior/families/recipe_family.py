@@ -25,7 +25,7 @@ from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from training.onnx_graph.value import Value, asinh, log, maximum, sqrt, stack_rows
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
     SMALLEST,
@@ -62,7 +62,7 @@ class RecipeFamily:
     """Gear and effects of a recipe on soils of its prior; a design is (slip, load)."""
 
     recipe: Recipe
-    axes: tuple[Coordinate, ...]
+    axes: tuple[PriorAxis, ...]
     targets: int
     free: int
     degree: tuple[int, int]
@@ -93,7 +93,7 @@ class RecipeFamily:
                 "are slip above 0 and torque that depends on slip, load and soil alone; remove "
                 "[set_posterior] from the spec"
             )
-        axes = tuple(Coordinate.of(name, prior[name]) for name in names)
+        axes = tuple(PriorAxis.of(name, prior[name]) for name in names)
         degree = (4, 4) if len(axes) <= FEW_UNKNOWNS else (3, 4)
         family = RecipeFamily(recipe, axes, len(targets), len(axes), degree)
         noise = recipe.case.noise.get(column("torque"), Noise(share=1.0))

@@ -18,7 +18,7 @@ from soilml.onboard.set_contract import LEAST_STD
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 
 Floats = NDArray[np.float64]
 
@@ -132,7 +132,7 @@ class WheelFamily(Protocol):
     """
 
     @property
-    def axes(self) -> tuple[Coordinate, ...]:
+    def axes(self) -> tuple[PriorAxis, ...]:
         """All unknowns."""
         ...
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from remarked import remarked
 
 from soilml.errors import FitError, InputError
 from soilml.numerics.prior import Prior
-from soilml.remarks import texts
 from soilml.systems.climbing import SimulatedRover, Uncertainty, identify_ground, modulus_per_climb
 from soilml.systems.climbing.climb import group_by_slope
 
@@ -53,7 +53,7 @@ def test_friction_angle_and_shear_modulus_are_correlated(true, climbs):
 def test_cohesion_is_reported_as_not_identified(true, climbs):
     ground = identify_ground(true.rover, climbs)
     assert ground.fit.remaining_fraction["cohesion"] > 0.8
-    assert any("cohesion is not identified" in text for text in texts(ground.fit.warnings))
+    assert remarked(ground.fit.warnings, "cohesion is not identified")
 
 
 def test_each_parameter_needs_a_slope_of_its_own(true, climbs):
@@ -71,7 +71,7 @@ def test_repetitions_of_a_slope_are_one_condition(climbs):
 
 def test_one_slope_identifies_the_shear_modulus_with_a_warning(true, climbs):
     ground = identify_ground(true.rover, climbs[:3], fixed=SAND)
-    assert any("one slope" in text for text in texts(ground.fit.warnings))
+    assert remarked(ground.fit.warnings, "one slope")
 
 
 def test_unknown_wheel_loads_give_the_same_soil(true, climbs):

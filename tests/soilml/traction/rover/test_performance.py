@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from remarked import remarked
 
 from soilml import Operating, Wheel, identify, read_case
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
@@ -12,7 +13,6 @@ from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.model import Model
-from soilml.remarks import texts
 from soilml.traction.rover import rover_performance
 from soilml.traction.rover.report import rover_report, with_gravity
 from soilml.traction.soil_draws import SoilDraws
@@ -141,5 +141,5 @@ def test_the_report_knows_what_the_rows_tell(case):
     after = np.quantile(found.performance.steepest_slope, [0.05, 0.95])
     assert np.ptp(after) < 0.8 * np.ptp(before)
     light = rover_report(with_gravity(case, 1.62), table, slopes=SLOPES)
-    assert any("gravity is 1.62" in text for text in texts(light.warnings))
-    assert any("wheels carry" in text for text in texts(light.warnings))
+    assert remarked(light.warnings, "gravity is 1.62")
+    assert remarked(light.warnings, "wheels carry")

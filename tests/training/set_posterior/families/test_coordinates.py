@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from soilml.numerics.prior import Prior
-from training.set_posterior.families.coordinates import Coordinate
+from training.set_posterior.families.coordinates import PriorAxis
 
 PRIORS = {
     "from zero": Prior(0.0, 3000.0),
@@ -17,7 +17,7 @@ PRIORS = {
 
 @pytest.mark.parametrize("prior", PRIORS.values(), ids=PRIORS)
 def test_values_run_from_one_end_of_the_range_to_the_other(prior):
-    axis = Coordinate.of("x", prior)
+    axis = PriorAxis.of("x", prior)
     values = axis.value(np.linspace(-1.0, 1.0, 101))
     assert values[[0, -1]] == pytest.approx([prior.lower, prior.upper], abs=1e-12 * prior.upper)
     assert (np.diff(values) > 0.0).all()
@@ -26,13 +26,13 @@ def test_values_run_from_one_end_of_the_range_to_the_other(prior):
 @pytest.mark.parametrize("prior", PRIORS.values(), ids=PRIORS)
 def test_quantiles_are_those_of_the_prior(prior):
     u = np.linspace(0.0, 1.0, 101)
-    axis = Coordinate.of("x", prior)
+    axis = PriorAxis.of("x", prior)
     assert axis.value(axis.quantile(u)) == pytest.approx(prior.at(u), abs=1e-12 * prior.upper)
 
 
 @pytest.mark.parametrize("prior", PRIORS.values(), ids=PRIORS)
 def test_the_density_is_the_slope_of_the_fraction_below(prior):
-    axis, step = Coordinate.of("x", prior), 1e-6
+    axis, step = PriorAxis.of("x", prior), 1e-6
     u = np.linspace(0.01, 0.99, 31)
     slope = 2.0 * step / (axis.quantile(u + step) - axis.quantile(u - step))
     assert np.log(slope) == pytest.approx(axis.log_density + axis.tilt * axis.quantile(u), abs=1e-6)
