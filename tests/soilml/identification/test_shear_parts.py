@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from bevameter_tables import PHI, C, K, shear
+from remarked import remarked
 
 from soilml.errors import TableError
 from soilml.identification.bevameter import (
@@ -16,7 +17,6 @@ from soilml.identification.bevameter.scatter import (
 )
 from soilml.identification.bevameter.shear_tests import ShearTest, read_shear_tests
 from soilml.io.table import Table
-from soilml.remarks import texts
 
 
 def test_a_spread_is_that_of_the_middle_nineteen_of_twenty_draws():
@@ -111,9 +111,7 @@ def test_a_failure_line_has_relative_scatter_and_goes_above_zero():
     tau = (C + table["normal_stress_Pa"] * np.tan(PHI)) * -np.expm1(-j / modulus)
     grown = bevameter(shear=Table(table.columns | {"shear_stress_Pa": tau}))
     assert grown.shear.modulus_trend == pytest.approx(0.5, abs=0.03)
-    assert any(
-        "K grows with the normal stress: 7.6 to 24 mm" in text for text in texts(grown.remarks)
-    )
+    assert remarked(grown.remarks, "K grows with the normal stress: 7.6 to 24 mm")
     # two stresses that differ by less than scatter are one
     one = bevameter(shear=shear(stresses=(10e3, 11.4e3))).shear
     two = bevameter(shear=shear(stresses=(10e3, 11.6e3))).shear
