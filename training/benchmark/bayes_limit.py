@@ -14,7 +14,7 @@ from datagen.processes import process_map
 from datagen.recipe import Recipe
 from soilml.config.case import Case
 from soilml.errors import FitError
-from soilml.fitting.coordinates import PriorAxis, select_free
+from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.predictions import predict_channels
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
@@ -59,7 +59,7 @@ class ChebyshevSurrogate:
 
 
 def fit_chebyshev_surrogate(
-    case: Case, readings: Readings, free: Sequence[PriorAxis]
+    case: Case, readings: Readings, free: Sequence[Coordinate]
 ) -> ChebyshevSurrogate:
     """Interpolate the model's torques at the Chebyshev nodes of the prior box.
 
