@@ -1,4 +1,4 @@
-"""Whether the bands of `soilml pull` hold what the soil truly gives, and by how much they miss."""
+"""Whether the bands of `soilml pull` cover what the soil truly gives, and by how much they miss."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 from benchmarks_file import ROOT
+from coverage_study import SLIPS, Coverage, coverage
 from scipy.stats import binom
 
 from soilml import Estimator, SlipSinkage, read_case
-from soilml.traction.coverage_study import SLIPS, Coverage, coverage
 
 #: Soils that nothing was settled with; a load among those driven, and one that is not (N).
 SEEDS = range(20_000, 20_200)

@@ -2,13 +2,13 @@
 
 from soilml.experiment_design.candidate_rows import CandidateGrid, CandidateRow, candidate_grid
 from soilml.experiment_design.design import Advice, RatedRow, advise
-from soilml.experiment_design.messages import abstention_message, is_identified
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
     samples_of_moments,
     samples_of_prior,
     samples_of_rows,
 )
+from soilml.experiment_design.presentation import abstention_message, is_identified
 
 __all__ = [
     "Advice",

@@ -14,12 +14,12 @@ from soilml.config.case import Case, take_case
 from soilml.errors import FitError, InputError, SoilmlError
 from soilml.experiment_design.candidate_rows import CandidateGrid, candidate_grid
 from soilml.experiment_design.design import Advice, advise
-from soilml.experiment_design.messages import next_row_remarks
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
     samples_of_moments,
     samples_of_rows,
 )
+from soilml.experiment_design.presentation import next_row_remarks
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.fit import Fit

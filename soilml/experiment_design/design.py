@@ -17,9 +17,14 @@ from soilml.experiment_design.candidate_rows import (
     channel_sets,
     repeated_points,
 )
-from soilml.experiment_design.expected_variance import OUTCOMES, ExpectedVariance, expected_variance
+from soilml.experiment_design.expected_variance import (
+    OUTCOMES,
+    ExpectedVariance,
+    PredictedReadings,
+    expected_variance,
+    predicted_readings,
+)
 from soilml.experiment_design.parameter_samples import ParameterSamples
-from soilml.experiment_design.predicted_readings import PredictedReadings, predicted_readings
 from soilml.physics.operating_point import Operating
 
 Floats = NDArray[np.float64]
@@ -110,7 +115,7 @@ class Advice:
         InputError
             For another number of axes.
         """
-        from soilml.experiment_design.plot import plot_maps
+        from soilml.experiment_design.presentation import plot_maps
 
         return plot_maps(self, measured, ax)
 

@@ -13,8 +13,7 @@ from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
 from soilml.identification.condensing import condensed
-from soilml.identification.posterior import PosteriorSamples, posterior_samples
-from soilml.identification.prior_fractions import prior_fractions
+from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 

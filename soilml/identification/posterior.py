@@ -1,4 +1,4 @@
-"""The posterior of the full model, by importance sampling."""
+"""The prior, and the posterior of the full model by importance sampling, as samples."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.readings import Readings
+from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.identification.fit import Fit, with_warnings
-from soilml.identification.joint_sample import joint_sample, most_probable
-from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.posterior_density import PosteriorDensity, joint_sample, most_probable
 from soilml.numerics.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
     ImportanceSample,
     importance_sample,
 )
 from soilml.numerics.quantiles import chi_squared_quantile
+from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 from soilml.numerics.surface_sampling import surface_sample
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -42,6 +43,8 @@ FEWEST_READINGS = 8
 MANY_ROWS, FIRST_ROWS = 512, 256
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
 SIMILAR_NOISE = 2.0
+#: Draws of the priors from which one is chosen by the tests of the soil.
+CANDIDATES = 64
 
 
 @dataclass(frozen=True)
@@ -261,3 +264,19 @@ def misfit_limit(freedom: int) -> float:
     The 0.999 quantile of chi-squared over its degrees of freedom; infinite without any.
     """
     return chi_squared_quantile(freedom, Z_999) / freedom if freedom >= 1 else np.inf
+
+
+def prior_fractions(
+    free: Sequence[Coordinate], count: int, rng: np.random.Generator, case: Case | None = None
+) -> Floats:
+    """Fractions (count, p) of the priors by Latin hypercube; tests of the case's soil take part.
+
+    With tests, draws are chosen with probabilities in proportion to their density.
+    """
+    if case is None or not case.soil_tests:
+        return latin_hypercube(count, len(free), rng)
+    u = latin_hypercube(CANDIDATES * count, len(free), rng)
+    logs = -0.5 * (SoilTestTerms(case, free).deviation(u) ** 2).sum(axis=1)
+    weights = np.exp(logs - logs.max())
+    chosen = systematic_resampling(weights / weights.sum(), count, rng.random())
+    return np.asarray(u[rng.permutation(chosen)])

@@ -19,8 +19,7 @@ from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import significant
 from soilml.traction.by_load import LoadPrediction
-from soilml.traction.plot import figure_size
-from soilml.traction.report import PullReport
+from soilml.traction.report import PullReport, figure_size
 
 #: The printed curve has every second slip.
 PRINTED_STEP = 2

@@ -1,10 +1,10 @@
-"""Pull and slope from a case and a table of rows, with warnings."""
+"""Pull and slope from a case and a table of rows, with warnings and a picture."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,18 +12,31 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.fitting.operating_points import operating_points
 from soilml.io.read_table import Rows, as_table
+from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.traction.by_load import LoadPrediction, measured_loads, predictions_by_load, slip_grid
-from soilml.traction.measured_soil import measured_soil
-from soilml.traction.messages import MeasuredRange, limitations
-from soilml.traction.pull_and_slope import EXCLUDED_KINDS
-from soilml.traction.pull_discrepancy import draw_pull_discrepancy
-from soilml.traction.soil_draws import prior_draws
+from soilml.report.figure_style import take_axes
+from soilml.traction.by_load import (
+    SAME_LOAD,
+    LoadPrediction,
+    MeasuredRange,
+    limitations,
+    measured_loads,
+    predictions_by_load,
+    slip_grid,
+)
+from soilml.traction.pull_and_slope import EXCLUDED_KINDS, draw_pull_discrepancy
+from soilml.traction.soil_draws import measured_soil, prior_draws
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 
 Floats = NDArray[np.float64]
+
+PRIOR, POSTERIOR, MEASURED = "#d9d9d9", "#005b96", "#cc7a00"
 
 
 @dataclass(frozen=True)
@@ -67,7 +80,7 @@ class PullReport:
         InputError
             For another number of axes.
         """
-        from soilml.traction.plot import plot_pull
+        from soilml.traction.report import plot_pull
 
         return plot_pull(self, ax)
 
@@ -148,3 +161,65 @@ def pull_report(
         measured_pull,
         (*warnings, limitations(None if error is None else error.amplitude)),
     )
+
+
+def figure_size(report: PullReport) -> tuple[float, float]:
+    """Width and height of the figure, inches."""
+    return 1.6 + 3.6 * len(report.by_load), 6.4
+
+
+def plot_pull(report: PullReport, ax: Any = None) -> NDArray[Any]:
+    """Draw a column for each load: pull (N) above and slope (degrees) below; see `take_axes`."""
+    count = len(report.by_load)
+    panels = take_axes(ax, 2, count, figure_size(report))
+    slips, loads, pulls = report.measured_pull
+    for i, prediction in enumerate(report.by_load):
+        posterior, prior = prediction.posterior, prediction.prior
+        top, low = panels[:, i]
+        _bands(top, posterior.slip, quantile_band(prior.pull), quantile_band(posterior.pull))
+        near = np.abs(loads / posterior.load - 1.0) < SAME_LOAD
+        if near.any():
+            top.plot(slips[near], pulls[near], "o", color=MEASURED, ms=5, label="measured pull")
+        degrees = [
+            QuantileBand(*np.rad2deg((b.lower, b.middle, b.upper)))
+            for b in map(quantile_band, (prior.slope, posterior.slope))
+        ]
+        _bands(low, posterior.slip, *degrees)
+        best = quantile_band(np.rad2deg(posterior.steepest_slope))
+        low.set_title(
+            f"steepest {best.middle:.1f}° ({best.lower:.1f} to {best.upper:.1f})", fontsize=10
+        )
+        top.set_title(f"{posterior.load:.3g} N on the wheel", fontsize=11)
+        low.set_xlabel("slip")
+    panels[0, 0].set_ylabel("drawbar pull, N")
+    panels[1, 0].set_ylabel("slope climbed, degrees")
+    for axes in panels.flat:
+        axes.plot(
+            report.measured_range.slip, [0.0, 0.0], color=MEASURED, lw=5, alpha=0.6,
+            label="measured slips", transform=axes.get_xaxis_transform(), solid_capstyle="butt",
+        )  # fmt: skip
+    for row in panels:
+        ends = [end for axes in row for end in axes.get_ylim()]
+        for axes in row:
+            axes.set_ylim(min(ends), max(ends))
+    panels[0, 0].legend(fontsize=9, frameon=False, loc="upper left")
+    return panels
+
+
+def _bands(axes: Axes, slip: Floats, prior: QuantileBand, posterior: QuantileBand) -> None:
+    axes.fill_between(slip, prior.lower, prior.upper, color=PRIOR, lw=0, label="90 %, prior")
+    axes.fill_between(
+        slip,
+        posterior.lower,
+        posterior.upper,
+        color=POSTERIOR,
+        alpha=0.55,
+        lw=0,
+        label="90 %, posterior",
+    )
+    axes.plot(slip, posterior.middle, color=POSTERIOR, lw=1.2)
+    axes.axhline(0.0, color="black", lw=0.6)
+    axes.grid(color="#eeeeee", lw=0.7)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.set_xlim(0.0, 1.03 * float(slip[-1]))

@@ -1,20 +1,40 @@
-"""Equally weighted draws of soil parameters, from the prior or the posterior."""
+"""Equally weighted draws of soil parameters: of the prior, of rows, of a model file's estimate."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.fitting.coordinates import Coordinate
+from soilml.config.compatibility import (
+    check_wheel_size,
+    effect_differences,
+    gear_differences,
+    recipe_case,
+    value_differences,
+)
+from soilml.errors import FitError, InputError
+from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.covariance import ignored_discrepancy
 from soilml.fitting.readings import Readings
+from soilml.fitting.shared_errors import usual_errors
+from soilml.fitting.soil_tests import ignored_soil_tests
+from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.condensing import condensed
-from soilml.identification.posterior import PosteriorSamples, posterior_samples
-from soilml.identification.prior_fractions import prior_fractions
+from soilml.identification.fit import excess_residuals_remark
+from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
+from soilml.identification.trained_estimator import std_with_discrepancy
+from soilml.io.table import Table
+from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.maximum_entropy import moment_matched_weights
+from soilml.numerics.prior import Prior
 from soilml.numerics.resampling import systematic_resampling
+from soilml.onboard.estimator import Estimator
+from soilml.quantities import column
+from soilml.remarks import Remark
 
 Floats = NDArray[np.float64]
 
@@ -64,3 +84,150 @@ def prior_draws(
 def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:
     values = np.stack([f.prior.at(u[:, i]) for i, f in enumerate(free)], axis=1)
     return SoilDraws(tuple(f.path for f in free), values)
+
+
+def estimated_draws(
+    free: Sequence[Coordinate],
+    mean: Floats,
+    covariance: Floats,
+    count: int = DRAWS,
+    seed: int = 0,
+) -> SoilDraws:
+    r"""Draws of the maximum-entropy density in the prior with this mean (p,) and covariance (p, p).
+
+    .. math:: p(u) \propto \exp(\lambda^\top u + u^\top \Lambda u), \quad u \in [0, 1]^p
+
+    A narrow estimate gives a Gaussian, one as wide as the prior the uniform prior itself, which a
+    truncated Gaussian does not. Moments that no density in the range has are met as nearly as
+    samples allow. Priors must be uniform, not logarithmic.
+
+    Raises
+    ------
+    InputError
+        For a covariance that is not positive definite, or a mean outside the range.
+
+    References
+    ----------
+    Jaynes, Phys. Rev. 106, 1957.
+    """
+    low = np.asarray([f.prior.lower for f in free])
+    width = np.asarray([f.prior.upper for f in free]) - low
+    middle, spread = (mean - low) / width, covariance / np.outer(width, width)
+    if not (np.isfinite(spread).all() and np.linalg.eigvalsh(spread).min() > 0.0):
+        raise InputError("the covariance of the estimate is not positive definite")
+    if not ((middle >= 0.0) & (middle <= 1.0)).all():
+        name = free[int(np.argmax(np.abs(middle - 0.5)))].path
+        raise InputError(f"the estimate of {name} lies outside its prior")
+    factor = np.linalg.cholesky(spread)
+
+    def white(u: Floats) -> Floats:
+        return np.asarray(np.linalg.solve(factor, (u - middle).T).T)
+
+    found = importance_sample(lambda u: -0.5 * (white(u) ** 2).sum(axis=1), len(free), seed)
+    weights = moment_matched_weights(found.weights, white(found.u))
+    rows = systematic_resampling(weights, count, np.random.default_rng(seed).random())
+    return SoilDraws(tuple(f.path for f in free), low + width * found.u[rows])
+
+
+def onboard_draws(
+    estimator: Estimator, case: Case, table: Table
+) -> tuple[list[Coordinate], SoilDraws, list[Remark]]:
+    """Parameters that the file estimates with their priors, draws of its estimate, and warnings.
+
+    Raises `InputError` where the file is for another gear or estimates a parameter that the case
+    lacks, and `FitError` where no row has all its readings.
+    """
+    warnings = _check_case(estimator, case)
+    known, prior = case.parameters(), estimator.prior
+    for name in estimator.names:
+        if name not in known:
+            raise InputError(f"{estimator.path} estimates {name}; the model has {', '.join(known)}")
+    free = [
+        Coordinate(name, unit, Prior(float(low), float(high)), float(known[name][1]), assumed=False)
+        for name, unit, low, high in zip(
+            estimator.names, estimator.units, prior.lower, prior.upper, strict=True
+        )
+    ]
+    inputs = {name: table[column(name)] for name in estimator.inputs}
+    complete = np.all([np.isfinite(values) for values in inputs.values()], axis=0)
+    if not complete.any():
+        names = ", ".join(column(name) for name in estimator.inputs)
+        raise FitError(f"{table.source}: no row has all of {names}, which {estimator.path} reads")
+    readings = {name: values[complete] for name, values in inputs.items()}
+    if estimator.sets is None:
+        warnings += ignored_discrepancy(case, estimator.path)
+    elif case.discrepancy:
+        noise = estimator.sets.noise
+        readings |= std_with_discrepancy(case.discrepancy, readings, noise, together=True)
+    warnings += ignored_soil_tests(case)
+    estimate = estimator.run(**readings)
+    if not estimate.in_range:
+        text = (
+            f"the rows are outside the training domain of {estimator.path}, which returns the "
+            "prior, or no soil explains them, which widens its estimate"
+        )
+        warnings.append(Remark("out-of-range", text))
+    return free, estimated_draws(free, estimate.mean, estimate.covariance), warnings
+
+
+def _check_case(estimator: Estimator, case: Case) -> list[Remark]:
+    """Warnings of fixed values and effects that differ; raises `InputError` for another gear."""
+    trained = recipe_case(estimator.metadata["recipe"], estimator.path)
+    if trained is None:
+        return []
+    for difference in gear_differences(case, trained):
+        raise InputError(
+            f"{estimator.path} was trained with {difference}; train a model for this gear"
+        )
+    found = [(text, "soil") for text in value_differences(case, trained)]
+    found += [(text, "model") for text in effect_differences(case, trained)]
+    head = f"{estimator.path} was trained with"
+    return [
+        Remark(f"another-{what}", f"{head} {text}: its estimate is of another {what}")
+        for text, what in found
+    ]
+
+
+@dataclass(frozen=True)
+class MeasuredSoil:
+    """Draws of the soil, the parameters that were unknown, and warnings.
+
+    `noise_scale` is the factor on the declared noise; None for the estimate of a trained file.
+    """
+
+    draws: SoilDraws
+    unknown: Sequence[Coordinate]
+    warnings: tuple[Remark, ...]
+    noise_scale: float | None
+
+
+def measured_soil(
+    case: Case,
+    table: Table,
+    free: Sequence[str] | None = None,
+    estimator: Estimator | None = None,
+    as_usual: bool = False,
+) -> MeasuredSoil:
+    """The soil of the rows of a table; raises as `pull_report` does.
+
+    With `as_usual`, sensors and model have the errors that they usually have.
+    """
+    if estimator is not None:
+        check_wheel_size(case, table)
+        unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
+        return MeasuredSoil(draws, unknown, tuple(notes), None)
+    unknown = select_free(case, free)
+    readings = usable_readings(case, table)
+    if as_usual:
+        errors = usual_errors(case, readings.row_load, [f.path for f in unknown])
+        readings = replace(readings, shared_errors=errors)
+    posterior = posterior_draws(case, readings, unknown)
+    warnings = list(readings.notes)
+    if readings.channels == ("torque",):
+        text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
+        warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
+    if posterior.samples.noise_inflated:
+        scale = posterior.samples.noise_scale
+        consequence = "bands are widened and may be biased"
+        warnings.append(excess_residuals_remark(scale, case, consequence))
+    return MeasuredSoil(posterior.draws, unknown, tuple(warnings), posterior.samples.noise_scale)

@@ -104,7 +104,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case_of_one_gear
     from soilml.experiment_design import advise, candidate_grid, samples_of_prior, samples_of_rows
     from soilml.experiment_design.advice_after_results import mean_covariates
-    from soilml.experiment_design.messages import next_row_remarks
+    from soilml.experiment_design.presentation import next_row_remarks
     from soilml.fitting.coordinates import select_free
     from soilml.fitting.usable_readings import usable_readings
     from soilml.io.read_table import RUNS
@@ -142,7 +142,7 @@ def run(args: argparse.Namespace) -> int:
         known = {} if at is None else mean_covariates(at)
         advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:
-        from soilml.experiment_design.plot import save_maps
+        from soilml.experiment_design.presentation import save_maps
 
         save_maps(args.picture, advice, at)
     if args.all:

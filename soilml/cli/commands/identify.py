@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     need("scipy", "identify")
     need_for_report(args, "identify")
     from soilml.experiment_design.advice_after_results import advice_after_fit
-    from soilml.experiment_design.messages import advice_as_json, next_row_remarks
+    from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.presentation import Identification, identify_report
     from soilml.identification.typical_errors import fit_with_typical_errors

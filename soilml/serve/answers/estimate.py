@@ -11,7 +11,7 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, SoilmlError
 from soilml.experiment_design import Advice
 from soilml.experiment_design.advice_after_results import advice_after_fit
-from soilml.experiment_design.messages import abstention_message, next_row_remarks, row_message
+from soilml.experiment_design.presentation import abstention_message, next_row_remarks, row_message
 from soilml.fitting.coordinates import select_free
 from soilml.identification import Fit, identify
 from soilml.identification.typical_errors import fit_with_typical_errors

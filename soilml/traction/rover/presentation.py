@@ -15,8 +15,7 @@ from soilml.numerics.quantiles import quantile_band
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.traction.presentation import Presentation
-from soilml.traction.rover.plot import SIZE
-from soilml.traction.rover.report import RoverReport
+from soilml.traction.rover.report import SIZE, RoverReport
 
 #: Share of draws that climb a slope below which nothing is said of the slip there.
 FEWEST = 0.5

@@ -1,4 +1,4 @@
-"""A rover's performance on the soil of measured rows, with warnings."""
+"""A rover's performance on the soil of measured rows, with warnings and a picture."""
 
 from __future__ import annotations
 
@@ -14,15 +14,16 @@ from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
+from soilml.numerics.quantiles import quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.traction.by_load import slip_grid
-from soilml.traction.measured_soil import measured_soil
-from soilml.traction.messages import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange
+from soilml.report.figure_style import take_axes
+from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
 from soilml.traction.pull_and_slope import EXCLUDED_KINDS
+from soilml.traction.report import POSTERIOR, PRIOR
 from soilml.traction.rover.performance import LARGEST_SLOPE, RoverPerformance, rover_performance
-from soilml.traction.soil_draws import SoilDraws, prior_draws
+from soilml.traction.soil_draws import SoilDraws, measured_soil, prior_draws
 
 Floats = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ Floats = NDArray[np.float64]
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])
 #: Gravity, m/s^2, and relative difference from it, from which on it is not the Earth's.
 EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
+#: Width and height of the figure, inches.
+SIZE = (10.0, 6.4)
 
 
 @dataclass(frozen=True)
@@ -59,7 +62,7 @@ class RoverReport:
         InputError
             For another number of axes.
         """
-        from soilml.traction.rover.plot import plot_rover
+        from soilml.traction.rover.report import plot_rover
 
         return plot_rover(self, ax)
 
@@ -195,3 +198,38 @@ def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> l
         )
     )
     return remarks
+
+
+def plot_rover(report: RoverReport, ax: Any = None) -> NDArray[Any]:
+    """Draw slip, margin and energy against the slope, and the steepest slope; see `take_axes`."""
+    found = report.performance
+    panels = take_axes(ax, 2, 2, SIZE)
+    degrees = np.rad2deg(found.slope)
+    _band(panels[0, 0], degrees, found.slip, "slip needed")
+    _band(panels[0, 1], degrees, found.margin, "margin of pull, N")
+    panels[0, 1].axhline(0.0, color="#888888", lw=0.8)
+    _band(panels[1, 0], degrees, found.energy, "work of the wheels, J/m")
+    for panel in panels.flat[:3]:
+        panel.set_xlabel("slope, degrees")
+    last = panels[1, 1]
+    known = [np.rad2deg(v[np.isfinite(v)]) for v in (report.prior_steepest, found.steepest_slope)]
+    bins = np.histogram_bin_edges(np.concatenate(known), 40) if any(map(len, known)) else 10
+    for values, color, label in zip(
+        known, (PRIOR, POSTERIOR), ("before the rows", "after"), strict=True
+    ):
+        if len(values):
+            last.hist(values, bins, density=True, color=color, alpha=0.8, label=label)
+    last.set_xlabel("steepest slope, degrees")
+    last.set_yticks([])
+    last.legend(frameon=False)
+    return panels
+
+
+def _band(panel: Any, x: Floats, draws: Floats, label: str) -> None:
+    """Median and 90 % band; slopes that fewer than half of the draws climb have no value."""
+    enough = np.mean(np.isfinite(draws), axis=0) >= 0.5
+    band = quantile_band(draws[:, enough])
+    panel.fill_between(x[enough], band.lower, band.upper, color=POSTERIOR, alpha=0.25, lw=0)
+    panel.plot(x[enough], band.middle, "o-", color=POSTERIOR, ms=4)
+    panel.set_xlim(x[0], max(x[-1], x[0] + 1e-9))
+    panel.set_ylabel(label)

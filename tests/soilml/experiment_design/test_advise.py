@@ -16,7 +16,7 @@ from soilml.experiment_design import (
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.messages import advice_as_json, next_row_remarks
+from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table

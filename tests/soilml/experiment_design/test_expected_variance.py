@@ -7,9 +7,12 @@ import pytest
 
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Noise
-from soilml.experiment_design.expected_variance import expected_variance
+from soilml.experiment_design.expected_variance import (
+    PredictedReadings,
+    expected_variance,
+    predicted_readings,
+)
 from soilml.experiment_design.parameter_samples import ParameterSamples, samples_of_prior
-from soilml.experiment_design.predicted_readings import PredictedReadings, predicted_readings
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.numerics.prior import Prior
 

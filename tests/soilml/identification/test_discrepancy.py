@@ -10,7 +10,7 @@ from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.experiment_design import samples_of_prior
-from soilml.experiment_design.predicted_readings import predicted_readings
+from soilml.experiment_design.expected_variance import predicted_readings
 from soilml.fitting.coordinates import select_free
 from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table

@@ -9,7 +9,7 @@ from channel_readings import channel_readings
 
 from soilml import Operating
 from soilml.fitting import soil_tests
-from soilml.identification import condensing, joint_sample
+from soilml.identification import condensing, posterior_density
 from soilml.identification.bevameter import soil_section
 from soilml.identification.bevameter.soil_section import pressure_test, strength_test
 from soilml.numerics.importance_sampling import ImportanceSample
@@ -111,7 +111,7 @@ def test_samples_lie_within_the_priors():
     density, rng = Density(), np.random.default_rng(0)
     near = rng.uniform([0.0, 0.8], [0.3, 1.0], (512, 2))
     start = ImportanceSample(near, np.full(512, 1.0 / 512), 0.0)
-    found = joint_sample._of_model(density, start)
+    found = posterior_density._of_model(density, start)
     for points in (found.u, density.asked):
         assert len(points) > 1000 and (points > 0.0).all() and (points < 1.0).all()
     mean = found.weights @ found.u

@@ -15,7 +15,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.covariance import sensor_columns
 from soilml.fitting.shared_errors import ModelledErrors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification import joint_sample
+from soilml.identification import posterior_density
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.identification.posterior_density import PosteriorDensity
@@ -246,7 +246,7 @@ def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, mon
         return predict(density, u)
 
     monkeypatch.setattr(PosteriorDensity, "predict", counted)
-    monkeypatch.setattr(joint_sample, "MOST_SOLUTIONS", 150_000)
+    monkeypatch.setattr(posterior_density, "MOST_SOLUTIONS", 150_000)
     fit = identify(case, Table(columns | {"torque_Nm": torque}), None, "posterior", as_usual=True)
     assert fit.misfit > 20.0 and "excess-residuals" in {r.code for r in fit.warnings}
     # a single search, with the noise that the residuals ask for

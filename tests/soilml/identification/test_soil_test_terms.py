@@ -13,8 +13,8 @@ from soilml.experiment_design import samples_of_prior
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.posterior import prior_fractions
 from soilml.identification.posterior_density import PosteriorDensity
-from soilml.identification.prior_fractions import prior_fractions
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
 from soilml.remarks import texts

@@ -14,8 +14,7 @@ from soilml.fitting import starts
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.identification import condensing
-from soilml.identification.joint_sample import normal_start
-from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.posterior_density import PosteriorDensity, normal_start
 from soilml.remarks import texts
 
 # the package has functions of these names

@@ -9,8 +9,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.remarks import texts
 from soilml.traction import SoilDraws, predict_traction, prior_draws, quantile_band
-from soilml.traction.by_load import measured_loads, predictions_by_load, slip_grid
-from soilml.traction.messages import MeasuredRange
+from soilml.traction.by_load import MeasuredRange, measured_loads, predictions_by_load, slip_grid
 
 SLIPS = np.asarray([0.1, 0.3, 0.6])
 EVERYWHERE = MeasuredRange((0.0, 0.99), (1.0, 1e4))

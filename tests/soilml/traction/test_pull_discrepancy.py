@@ -9,8 +9,7 @@ from soilml import Operating, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.io.table import Table
-from soilml.traction.pull_and_slope import predict_traction
-from soilml.traction.pull_discrepancy import draw_pull_discrepancy
+from soilml.traction.pull_and_slope import draw_pull_discrepancy, predict_traction
 from soilml.traction.soil_draws import SoilDraws
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")

@@ -16,9 +16,8 @@ from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
-from soilml.traction.onboard_draws import onboard_draws
 from soilml.traction.pull_and_slope import Traction, predict_traction
-from soilml.traction.soil_draws import DRAWS, SoilDraws, posterior_draws
+from soilml.traction.soil_draws import DRAWS, SoilDraws, onboard_draws, posterior_draws
 
 Floats = NDArray[np.float64]
 
