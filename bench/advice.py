@@ -17,7 +17,7 @@ from soilml.experiment_design import (
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.candidate_rows import SLIPS
+from soilml.experiment_design.design import SLIPS
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.fit import Fit

@@ -75,7 +75,7 @@ def coverage(
             draws = onboard_draws(estimator, case, table)[1]
         else:
             readings = usable_readings(case, table)
-            draws = posterior_draws(case, readings, select_free(case, None), count, seed).draws
+            draws = posterior_draws(case, readings, select_free(case, None), count, seed)[0]
         for load, pairs in found.items():
             made = (
                 predict_traction(case, draws, load, SLIPS),

@@ -1,7 +1,13 @@
 """Experiment design: the next measurement with the least expected posterior variance."""
 
-from soilml.experiment_design.candidate_rows import CandidateGrid, CandidateRow, candidate_grid
-from soilml.experiment_design.design import Advice, RatedRow, advise
+from soilml.experiment_design.design import (
+    Advice,
+    CandidateGrid,
+    CandidateRow,
+    RatedRow,
+    advise,
+    candidate_grid,
+)
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
     samples_of_moments,

@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from soilml.config.case import Case, take_case
 from soilml.errors import FitError, InputError, SoilmlError
-from soilml.experiment_design.candidate_rows import CandidateGrid, candidate_grid
-from soilml.experiment_design.design import Advice, advise
+from soilml.experiment_design.design import Advice, CandidateGrid, advise, candidate_grid
 from soilml.experiment_design.parameter_samples import (
     ParameterSamples,
     samples_of_moments,

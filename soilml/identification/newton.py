@@ -14,7 +14,7 @@ from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit
-from soilml.identification.fixed_parameter import with_fixed_parameter
+from soilml.identification.linear import with_fixed_parameter
 from soilml.numerics.prior import Prior
 from soilml.physics.gears import LinearWheel
 from soilml.physics.soils import Soil

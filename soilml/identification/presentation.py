@@ -1,17 +1,19 @@
-"""The result of `identify` as text, as JSON and as a page."""
+"""The result of `identify`, and that with typical errors beside it, as text, JSON and page."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.errors import FitError
+from soilml.identification import CLOSED_FORM, identify
 from soilml.identification.fit import Fit
-from soilml.identification.typical_errors import TypicalErrorFit
+from soilml.io.table import Table
 from soilml.io.text_tables import format_table
 from soilml.remarks import Remark, about, texts
 from soilml.report import numbers
@@ -29,6 +31,62 @@ from soilml.report.terminal import interval, rounded, shown_unit
 
 #: Most results that the page describes in sentences; more are in its table.
 _MOST_SENTENCES = 4
+
+
+@dataclass(frozen=True)
+class TypicalErrorFit:
+    """The fit with typical errors, and the one that takes the model as exact."""
+
+    exact: Fit
+    typical: Fit
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of `as_usual` in the file."""
+        content = self.typical.as_json()
+        note = self.remark().as_json()
+        return {key: content[key] for key in ("parameters", "misfit")} | {"note": note}
+
+    def remark(self) -> Remark:
+        """Which of the two intervals to use."""
+        if _explains(self.exact):
+            return Remark(
+                "use-typical-errors",
+                "use the interval that includes typical errors, unless this model was verified on "
+                "a known soil: the other takes wheel, soil and sensors to be exactly as in the "
+                "model file",
+            )
+        if _explains(self.typical):
+            return Remark(
+                "use-typical-errors",
+                "the model taken as exact does not explain the rows, with typical errors it does: "
+                "use the interval that includes them",
+            )
+        return Remark(
+            "no-interval-explains",
+            "the rows are explained neither by the model taken as exact nor with typical errors: "
+            "use neither interval, and run soilml gap",
+        )
+
+
+def _explains(fit: Fit) -> bool:
+    return all(remark.code != "excess-residuals" for remark in fit.warnings)
+
+
+def fit_with_typical_errors(
+    case: Case, rows: Table, free: Sequence[str] | None, method: str, exact: Fit
+) -> TypicalErrorFit | None:
+    """The fit with typical errors beside `exact`, or None.
+
+    None for a method that takes the model as exact, where the case states the error of its model,
+    and where no fit is possible with typical errors.
+    """
+    if method in CLOSED_FORM or case.discrepancy:
+        return None
+    try:
+        typical = identify(case, rows, free, method, as_usual=True)
+        return TypicalErrorFit(exact, replace(typical, samples=None))
+    except FitError:
+        return None
 
 
 @dataclass(frozen=True)

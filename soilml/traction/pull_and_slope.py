@@ -18,6 +18,7 @@ from soilml.numerics.smooth_process import process_columns, slip_load_points
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
+from soilml.remarks import Remark
 from soilml.traction.soil_draws import SoilDraws
 
 Floats = NDArray[np.float64]
@@ -84,6 +85,19 @@ class Traction:
         return np.where(np.isfinite(values).any(axis=1), slip, np.nan)
 
 
+def on_a_vehicle(case: Case) -> Case:
+    """The case without the effects of the test rig and its sensors."""
+    own = tuple(e for e in case.model.effects if e.about.kind not in EXCLUDED_KINDS)
+    return replace(case, model=Model(case.model.gear, own))
+
+
+def excluded_effects(case: Case) -> list[Remark]:
+    """A remark on the effects that `on_a_vehicle` leaves out, if there are any."""
+    names = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
+    text = f"effects of rig and sensors are excluded: {', '.join(names)}"
+    return [Remark("effects-excluded", text, tuple(names), "note")] if names else []
+
+
 def predict_traction(
     case: Case,
     draws: SoilDraws,
@@ -124,8 +138,7 @@ def predict_traction(
     ----------
     Wong, Theory of Ground Vehicles, chapter 3.
     """
-    own = [e for e in case.model.effects if e.about.kind not in EXCLUDED_KINDS]
-    case = replace(case, model=Model(case.model.gear, tuple(own)))
+    case = on_a_vehicle(case)
     count = len(draws.values)
     rows, columns = (grid.ravel() for grid in np.indices((count, len(slip))))
     error = np.zeros(rows.size) if pull_error is None else pull_error.ravel()

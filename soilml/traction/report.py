@@ -27,7 +27,7 @@ from soilml.traction.by_load import (
     predictions_by_load,
     slip_grid,
 )
-from soilml.traction.pull_and_slope import EXCLUDED_KINDS, draw_pull_discrepancy
+from soilml.traction.pull_and_slope import draw_pull_discrepancy, excluded_effects
 from soilml.traction.soil_draws import measured_soil, prior_draws
 
 if TYPE_CHECKING:
@@ -131,11 +131,7 @@ def pull_report(
     """
     table = as_table(table)
     soil = measured_soil(case, table, free, estimator, as_usual)
-    draws, unknown, warnings = soil.draws, soil.unknown, list(soil.warnings)
-    excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
-    if excluded:
-        text = f"effects of rig and sensors are excluded: {', '.join(excluded)}"
-        warnings.append(Remark("effects-excluded", text, tuple(excluded), "note"))
+    draws, unknown, warnings = soil.draws, soil.unknown, [*soil.warnings, *excluded_effects(case)]
     table = table.rows(table.answered)
     at = operating_points(table)
     measured_range = MeasuredRange.of(table["slip"], table["load_N"])

@@ -56,22 +56,17 @@ class SoilDraws:
         return case.with_values(kept)
 
 
-@dataclass(frozen=True)
-class PosteriorDraws:
-    """Equally weighted draws of the posterior, and the weighted samples that they come from."""
-
-    draws: SoilDraws
-    samples: PosteriorSamples
-
-
 def posterior_draws(
     case: Case, readings: Readings, free: Sequence[Coordinate], count: int = DRAWS, seed: int = 0
-) -> PosteriorDraws:
-    """Draws of the posterior of the rows; raises `FitError` as the posterior method does."""
+) -> tuple[SoilDraws, PosteriorSamples]:
+    """Draws of the posterior of the rows, and the weighted samples that they come from.
+
+    Raises `FitError` as the posterior method does.
+    """
     found = posterior_samples(case, condensed(case, readings, free), free)
     offset = np.random.default_rng(seed).random()
     rows = systematic_resampling(found.sample.weights, count, offset)
-    return PosteriorDraws(_soil_draws(free, found.sample.u[rows]), found)
+    return _soil_draws(free, found.sample.u[rows]), found
 
 
 def prior_draws(
@@ -221,13 +216,12 @@ def measured_soil(
     if as_usual:
         errors = usual_errors(case, readings.row_load, [f.path for f in unknown])
         readings = replace(readings, shared_errors=errors)
-    posterior = posterior_draws(case, readings, unknown)
+    draws, samples = posterior_draws(case, readings, unknown)
     warnings = list(readings.notes)
     if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
-    if posterior.samples.noise_inflated:
-        scale = posterior.samples.noise_scale
+    if samples.noise_inflated:
         consequence = "bands are widened and may be biased"
-        warnings.append(excess_residuals_remark(scale, case, consequence))
-    return MeasuredSoil(posterior.draws, unknown, tuple(warnings), posterior.samples.noise_scale)
+        warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
+    return MeasuredSoil(draws, unknown, tuple(warnings), samples.noise_scale)

@@ -185,7 +185,7 @@ def _columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, 
     """The table's columns."""
     import numpy as np
 
-    from soilml.experiment_design.candidate_rows import channel_label
+    from soilml.experiment_design.design import channel_label
 
     choices = [choice for _, choice in rows]
     columns: dict[str, Any] = {

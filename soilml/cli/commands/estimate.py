@@ -125,7 +125,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import save_columns, show, tell, write_with_report
     from soilml.cli.tables import print_table_hints, read_rows
     from soilml.config.case import read_case_of_one_gear
-    from soilml.identification.wheel_check import check_table_wheel, estimators_for_case
+    from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.read_table import FILLED, RUNS
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.estimator import Estimator
@@ -288,7 +288,7 @@ def _all_rows(
 ) -> Estimate:
     """An estimate for every row; one that is not usable counts as out of range."""
     from soilml.cli.progress import progress_bar
-    from soilml.identification.wheel_check import readings_with_discrepancy
+    from soilml.identification.trained_estimator import readings_with_discrepancy
     from soilml.onboard import table_estimates
 
     rows = table.rows(usable)
@@ -326,8 +326,7 @@ def _group_estimates(
     import numpy as np
 
     from soilml.experiment_design.advice_after_results import advice_after_estimate
-    from soilml.identification.trained_estimator import narrower_priors
-    from soilml.identification.wheel_check import readings_with_discrepancy
+    from soilml.identification.trained_estimator import narrower_priors, readings_with_discrepancy
     from soilml.io.table import ALL
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.set_contract import MODEL_ERROR_INPUT

@@ -86,8 +86,11 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design.advice_after_results import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
-    from soilml.identification.presentation import Identification, identify_report
-    from soilml.identification.typical_errors import fit_with_typical_errors
+    from soilml.identification.presentation import (
+        Identification,
+        fit_with_typical_errors,
+        identify_report,
+    )
 
     case = read_case(args.model, available_effects(args), with_bias=True)
     table = read_rows(args, RUNS)

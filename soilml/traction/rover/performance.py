@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +12,8 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.numerics.root_finding import rising_root
-from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
-from soilml.traction.pull_and_slope import EXCLUDED_KINDS
+from soilml.traction.pull_and_slope import on_a_vehicle
 from soilml.traction.soil_draws import SoilDraws
 
 Floats = NDArray[np.float64]
@@ -102,8 +101,7 @@ def wheel_curves(
 def _forces(
     case: Case, draws: SoilDraws, load: Floats, slip: Floats, number: int, speed: float | None
 ) -> tuple[Floats, ...]:
-    own = tuple(e for e in case.model.effects if e.about.kind not in EXCLUDED_KINDS)
-    case = replace(case, model=Model(case.model.gear, own))
+    case = on_a_vehicle(case)
     draw, column = (grid.ravel() for grid in np.indices((len(load), len(slip))))
     soils = draws.of(case, draw)
     at = Operating(

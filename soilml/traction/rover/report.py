@@ -20,7 +20,7 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.figure_style import take_axes
 from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
-from soilml.traction.pull_and_slope import EXCLUDED_KINDS
+from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.report import POSTERIOR, PRIOR
 from soilml.traction.rover.performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import SoilDraws, measured_soil, prior_draws
@@ -173,15 +173,7 @@ def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> l
         remarks.append(
             Remark("tipping", f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
         )
-    excluded = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
-    if excluded:
-        remarks.append(
-            Remark(
-                "effects-excluded",
-                f"effects of rig and sensors are excluded: {', '.join(excluded)}",
-                severity="note",
-            )
-        )
+    remarks += excluded_effects(case)
     if case.discrepancy:
         remarks.append(
             Remark(

@@ -18,7 +18,7 @@ from soilml.fitting.shared_errors import (
     USUAL_SENSOR_ERRORS,
     ModelledErrors,
 )
-from soilml.identification.fixed_parameter import SIDES
+from soilml.identification.linear import SIDES
 from soilml.identification.posterior import INTERVAL
 from soilml.identification.trained_estimator import FIXED_ANGLE
 from soilml.physics.soils import Soil

@@ -157,7 +157,7 @@ def test_advice_and_pull_rest_on_condensed_rows(case, condensing, monkeypatch):
     free, found = select_free(case, None), {}
     for name in ("condensed", "all"):
         samples = samples_of_rows(case, data, free)
-        draws = posterior_draws(case, data, free).draws.values
+        draws = posterior_draws(case, data, free)[0].values
         found[name] = samples.remaining_fraction, draws.mean(axis=0), draws.std(axis=0)
         monkeypatch.setattr(condensing_rows, "MOST_ROWS", ROWS)
     (left, mean, std), (all_left, all_mean, all_std) = found.values()

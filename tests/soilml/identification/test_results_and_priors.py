@@ -11,7 +11,7 @@ from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, rates_at, select_free, values_at
 from soilml.identification.fit import Fit, at_prior_bound, with_warnings
-from soilml.identification.fixed_parameter import with_fixed_parameter
+from soilml.identification.linear import with_fixed_parameter
 from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import ImportanceSample

@@ -13,7 +13,7 @@ from conftest import MODEL
 from soilml import Estimator, Table, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.experiment_design.candidate_rows import CandidateRow
+from soilml.experiment_design.design import CandidateRow
 from soilml.gap.report.results import GapReduction, GapReport
 from soilml.numerics.prior import Prior
 from soilml.traction.report import pull_report
