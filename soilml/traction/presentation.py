@@ -78,9 +78,7 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
         ("best_slip", known.best_slip),
         ("steepest_slope_rad", known.steepest_slope),
     ):
-        found = quantile_band(values)
-        for ending, part in zip(("", "_p05", "_p95"), _ends(found), strict=True):
-            columns[name + ending] = np.broadcast_to(part, count)
+        columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
     before = quantile_band(prior.pull), quantile_band(prior.slope)
     for name, found in zip(("drawbar_pull_N", "slope_rad"), before, strict=True):
         columns[f"{name}_prior_p05"], columns[f"{name}_prior_p95"] = found.lower, found.upper
@@ -91,8 +89,10 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
     return columns
 
 
-def _ends(found: QuantileBand) -> tuple[Any, Any, Any]:
-    return found.middle, found.lower, found.upper
+def band_columns(name: str, draws: Any) -> dict[str, Any]:
+    """Columns of the median and the 90 % band of draws along the first axis."""
+    band = quantile_band(draws)
+    return {name: band.middle, f"{name}_p05": band.lower, f"{name}_p95": band.upper}
 
 
 def pull_warnings(report: PullReport) -> list[Remark]:
@@ -152,7 +152,8 @@ def _curve(one: LoadPrediction) -> Iterator[tuple[str, list[str], list[str], lis
     """Slip; middle and ends of pull (N) and of slope (degrees); ends of the prior's pull."""
     known = one.posterior
     pull, slope, before = map(quantile_band, (known.pull, known.slope, one.prior.pull))
-    parts = [known.slip, *_ends(pull), *(DEGREES * v for v in _ends(slope))]
+    parts = [known.slip, pull.middle, pull.lower, pull.upper]
+    parts += [DEGREES * v for v in (slope.middle, slope.lower, slope.upper)]
     for slip, *values in zip(*map(_printed, [*parts, before.lower, before.upper]), strict=True):
         cells = [f"{value:.1f}" for value in values]
         yield f"{slip:.3g}", cells[:3], cells[3:6], cells[6:]

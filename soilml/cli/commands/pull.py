@@ -149,8 +149,8 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
     from soilml.cli.options import parse_numbers
     from soilml.cli.tables import result_by_group
     from soilml.config.wheeled_rover import read_gravity
-    from soilml.traction.rover.presentation import rover_presentation
-    from soilml.traction.rover.report import rover_report, with_gravity
+    from soilml.traction.rover_presentation import rover_presentation
+    from soilml.traction.rover_report import rover_report, with_gravity
 
     if args.gravity is not None:
         case = with_gravity(case, read_gravity(args.gravity))

@@ -26,8 +26,8 @@ from soilml.serve.answers.job_files import Tell, setting_file, write_files
 from soilml.serve.answers.logs import table_summary
 from soilml.traction.by_load import LoadPrediction
 from soilml.traction.report import PullReport, pull_report
-from soilml.traction.rover.presentation import rover_text
-from soilml.traction.rover.report import rover_report
+from soilml.traction.rover_presentation import rover_text
+from soilml.traction.rover_report import rover_report
 
 #: SI unit -> shown unit and its factor.
 SHOWN = {"Pa": ("kPa", 1e-3), "rad": ("°", float(np.rad2deg(1.0))), "m": ("mm", 1e3)}

@@ -14,8 +14,8 @@ from soilml.io.text_tables import format_table
 from soilml.numerics.quantiles import quantile_band
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
-from soilml.traction.presentation import Presentation
-from soilml.traction.rover.report import SIZE, RoverReport
+from soilml.traction.presentation import Presentation, band_columns
+from soilml.traction.rover_report import SIZE, RoverReport
 
 #: Share of draws that climb a slope below which nothing is said of the slip there.
 FEWEST = 0.5
@@ -44,8 +44,7 @@ def rover_columns(report: RoverReport) -> dict[str, Any]:
         ("energy_J_per_m", found.energy),
         ("steepest_slope_rad", found.steepest_slope[:, None] + 0.0 * found.slope),
     ):
-        band = quantile_band(draws)
-        columns |= {name: band.middle, f"{name}_p05": band.lower, f"{name}_p95": band.upper}
+        columns |= band_columns(name, draws)
     for name in found.loads:
         columns[f"load_N_{name}"] = found.loads[name]
         columns[f"torque_Nm_{name}"] = quantile_band(found.torque[name]).middle

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,7 +22,7 @@ from soilml.report.figure_style import take_axes
 from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
 from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.report import POSTERIOR, PRIOR
-from soilml.traction.rover.performance import LARGEST_SLOPE, RoverPerformance, rover_performance
+from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import SoilDraws, measured_soil, prior_draws
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ class RoverReport:
         InputError
             For another number of axes.
         """
-        from soilml.traction.rover.report import plot_rover
+        from soilml.traction.rover_report import plot_rover
 
         return plot_rover(self, ax)
 
@@ -139,57 +139,43 @@ def _steepest_before(case: Case, draws: SoilDraws, slip: Floats, speed: float | 
         return np.full(len(draws.values), np.nan)
 
 
-def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> list[Remark]:
+def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> Iterator[Remark]:
     assert case.rover is not None
-    remarks = []
     loads = np.stack(list(found.loads.values()))
     if loads.max() > LOAD_FACTOR * measured.load[1] or loads.min() < measured.load[0] / LOAD_FACTOR:
-        remarks.append(
-            Remark(
-                "extrapolated",
-                f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
-                f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model, "
-                "whose error is not in the bands",
-            )
+        yield Remark(
+            "extrapolated",
+            f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
+            f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model, "
+            "whose error is not in the bands",
         )
     if found.slip_limit > measured.slip[1] + SLIP_MARGIN:
-        remarks.append(
-            Remark(
-                "extrapolated",
-                f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up "
-                f"to {found.slip_limit:.2g}",
-            )
+        yield Remark(
+            "extrapolated",
+            f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up "
+            f"to {found.slip_limit:.2g}",
         )
     if abs(case.rover.gravity / EARTH - 1.0) > OTHER_GRAVITY:
-        remarks.append(
-            Remark(
-                "other-gravity",
-                f"gravity is {case.rover.gravity:.3g} m/s^2: the soil is taken to have the "
-                "parameters that the rows show",
-            )
+        yield Remark(
+            "other-gravity",
+            f"gravity is {case.rover.gravity:.3g} m/s^2: the soil is taken to have the "
+            "parameters that the rows show",
         )
     tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
     if np.nanmean(found.steepest_slope > tipping - 1e-3) > 0.05:
-        remarks.append(
-            Remark("tipping", f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
-        )
-    remarks += excluded_effects(case)
+        yield Remark("tipping", f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
+    yield from excluded_effects(case)
     if case.discrepancy:
-        remarks.append(
-            Remark(
-                "discrepancy-not-in-bands",
-                "[discrepancy] widens the soil's parameters, not the bands of the rover",
-            )
+        yield Remark(
+            "discrepancy-not-in-bands",
+            "[discrepancy] widens the soil's parameters, not the bands of the rover",
         )
-    remarks.append(
-        Remark(
-            "band-content",
-            "bands include the uncertainty of the soil and the noise, not errors of the model; all "
-            "wheels driven at one slip, loads of equally stiff wheels, no side slope",
-            severity="note",
-        )
+    yield Remark(
+        "band-content",
+        "bands include the uncertainty of the soil and the noise, not errors of the model; all "
+        "wheels driven at one slip, loads of equally stiff wheels, no side slope",
+        severity="note",
     )
-    return remarks
 
 
 def plot_rover(report: RoverReport, ax: Any = None) -> NDArray[Any]:

@@ -13,8 +13,8 @@ from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.model import Model
-from soilml.traction.rover import rover_performance
-from soilml.traction.rover.report import rover_report, with_gravity
+from soilml.traction.rover_performance import rover_performance
+from soilml.traction.rover_report import rover_report, with_gravity
 from soilml.traction.soil_draws import SoilDraws
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
