@@ -12,7 +12,8 @@ Nothing *inside* a batch raises: a row that has no answer carries a `soilml.row_
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 
 class SoilmlError(Exception):
@@ -51,3 +52,21 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     near = get_close_matches(name, list(known), 1, 0.5)
     return f"did you mean {near[0]!r}? " if near else ""
+
+
+@contextmanager
+def solvable(what: str) -> Iterator[None]:
+    """Inside, matrices that cannot be factored raise `FitError` naming what was computed.
+
+    Also a decorator. Such matrices come of readings, noise or parameters many orders of magnitude
+    apart, which no check of single values finds.
+    """
+    import numpy as np
+
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise FitError(
+            f"{what} has no solution for these rows ({error}): check the units of the columns, and "
+            "that the declared noise is that of the sensors"
+        ) from None

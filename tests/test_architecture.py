@@ -22,7 +22,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/fitting/starts.py": {"scipy"},
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},
-    "soilml/numerics/resampling.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/evidence/repeats.py": {"scipy"},

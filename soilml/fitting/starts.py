@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib import resources
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,10 +12,13 @@ from soilml.fitting.coordinates import rates_at, values_at
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.numerics.prior import UNIFORM_PRECISION
-from soilml.numerics.resampling import sobol_points
 
 Floats = NDArray[np.float64]
 
+#: Points of the table of Sobol points, and the most dimensions that it has.
+POINTS, MOST_DIMENSIONS = 64, 8
+#: Seed of their scrambling, and bits of a coordinate.
+SEED, BITS = 7, 30
 #: How many of the best of the Sobol points of the prior are descended from.
 STARTS = 4
 #: Tolerance of a descent; and of those from several starts, which only tell optima apart.
@@ -68,6 +73,24 @@ def _ranked_starts(problem: LeastSquaresProblem) -> tuple[Floats, list[int]]:
     costs = (problem.whitened(problem.predict(starts)) ** 2).sum(axis=1)
     costs += (problem.soil_tests.deviation(starts) ** 2).sum(axis=1)
     return starts, [int(i) for i in np.argsort(costs, kind="stable")]
+
+
+def sobol_points(dimensions: int) -> NDArray[np.float64]:
+    """The first `POINTS` points (64, dimensions) of a scrambled Sobol sequence in [0, 1).
+
+    They are those of ``scipy.stats.qmc.Sobol(dimensions, scramble=True, rng=7)``, which computes
+    them where there are more than eight dimensions. The table `sobol_points.npy` has their integer
+    coordinates (36, 64): one row for the only dimension, then two rows, and so on.
+    """
+    if dimensions > MOST_DIMENSIONS:
+        from scipy.stats import qmc
+
+        return np.asarray(qmc.Sobol(dimensions, scramble=True, rng=SEED).random(POINTS))
+    table = resources.files("soilml.fitting").joinpath("sobol_points.npy")
+    with table.open("rb") as opened:
+        integers = np.load(opened, allow_pickle=False)
+    first = dimensions * (dimensions - 1) // 2
+    return np.asarray(integers[first : first + dimensions].T * 2.0**-BITS)
 
 
 def descend(

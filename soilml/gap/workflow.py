@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
-from soilml.errors import InputError
+from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import (
@@ -71,7 +71,6 @@ from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark, texts
-from soilml.unsolvable import solvable
 
 #: Readings that an analysis may have. Its matrices are of this size squared, and many are held at
 #: a time: 1.1 GB in all.

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
-from soilml.errors import FitError, InputError
+from soilml.errors import FitError, InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
 from soilml.fitting.readings import Readings
@@ -28,7 +28,6 @@ from soilml.identification.posterior import posterior
 from soilml.io.read_table import Rows, as_table
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.remarks import Remark
-from soilml.unsolvable import solvable
 
 Method = Callable[[Case, Readings, Sequence[Coordinate]], Fit]
 

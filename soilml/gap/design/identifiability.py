@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
-from soilml.errors import InputError
+from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
@@ -28,7 +28,6 @@ from soilml.physics.effects import EFFECTS, Effect
 from soilml.quantities import SHEAR
 from soilml.remarks import Remark
 from soilml.report.figure_style import AFTER, UNCHANGED, take_axes
-from soilml.unsolvable import solvable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from measured_rows import measured, two_gears, with_model
 from remarked import remarked
-from test_descent import measured, two_gears, with_model
 
 from soilml import identification, identify
 from soilml.config.measurement_noise import Noise

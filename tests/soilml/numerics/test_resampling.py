@@ -2,15 +2,11 @@
 
 import numpy as np
 import pytest
-from scipy.stats import qmc
 
 from soilml.numerics.quantiles import quantile_band
 from soilml.numerics.resampling import (
-    MOST_DIMENSIONS,
-    POINTS,
     effective_size,
     latin_hypercube,
-    sobol_points,
     systematic_resampling,
     weighted_quantiles,
 )
@@ -49,11 +45,3 @@ def test_a_band_ignores_draws_that_are_not_a_number():
     np.testing.assert_array_equal(band.lower, [5.0, 5.0, np.nan])
     np.testing.assert_array_equal(band.width, [90.0, 90.0, np.nan])
     assert band.middle[0] == 50.0
-
-
-@pytest.mark.parametrize("dimensions", range(1, MOST_DIMENSIONS + 3))
-def test_points_are_those_of_scipy(dimensions):
-    points = sobol_points(dimensions)
-    assert points.shape == (POINTS, dimensions) and points.dtype == np.float64
-    expected = qmc.Sobol(dimensions, scramble=True, rng=7).random(POINTS)
-    np.testing.assert_array_equal(points, expected)

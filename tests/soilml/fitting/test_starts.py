@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import THREE_CHANNEL_MODEL
+from measured_rows import CHANNELS, measured, two_gears, with_model
+from scipy.stats import qmc
 
-from soilml import Operating, identify, read_case
+from soilml import identify
 from soilml.fitting import least_squares, starts
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.predictions import linearise
@@ -16,30 +17,6 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.physics import sinkage_search
 
-CHANNELS = {"torque_Nm": "torque", "drawbar_pull_N": "drawbar_pull", "sinkage_m": "sinkage"}
-
-
-def with_model(tmp_path, text=THREE_CHANNEL_MODEL):
-    path = tmp_path / "model.toml"
-    path.write_text(text)
-    return read_case(path)
-
-
-def measured(case, rng, rows, channels=CHANNELS, gear=None, least_slip=-0.05):
-    """Readings with the noise of the case, of a soil drawn from its priors."""
-    true = case.with_values({n: float(p.at(rng.random())) for n, p in case.prior.items()})
-    slip, load = rng.uniform(least_slip, 0.6, rows), rng.choice([35.0, 60.0, 85.0, 110.0], rows)
-    columns = {"slip": slip, "load_N": load}
-    models = {None: true.model, **true.gears}
-    for key in channels:
-        value = np.empty(rows)
-        for name in np.unique(gear) if gear is not None else [None]:
-            own = slice(None) if gear is None else gear == name
-            at = Operating(slip=slip[own], load=load[own])
-            value[own] = getattr(models[name](true.soil, at), CHANNELS[key])
-        columns[key] = value + case.noise[key].std(value) * rng.standard_normal(rows)
-    return Table(columns if gear is None else {"gear": gear, **columns})
-
 
 def weighted_rows(case, table):
     return WeightedRows.of(case, usable_readings(case, table), select_free(case, None))
@@ -47,12 +24,6 @@ def weighted_rows(case, table):
 
 def problem_of(case, table):
     return weighted_rows(case, table).problem
-
-
-def two_gears(case):
-    wheel = case.model.gear
-    wide = replace(case.model, gear=replace(wheel, width=0.2))
-    return replace(case, gears={"narrow": case.model, "wide": wide})
 
 
 @pytest.mark.parametrize("gears", [1, 2])
@@ -147,3 +118,11 @@ def test_a_descent_that_comes_to_a_known_optimum_ends_there(tmp_path, monkeypatc
     elsewhere = replace(known, x=1.0 - known.x)
     other = starts.descend(problem, np.full(3, 0.3), known=elsewhere)
     assert other.x == pytest.approx(known.x, abs=starts.SAME_OPTIMUM)
+
+
+@pytest.mark.parametrize("dimensions", range(1, starts.MOST_DIMENSIONS + 3))
+def test_points_are_those_of_scipy(dimensions):
+    points = starts.sobol_points(dimensions)
+    assert points.shape == (starts.POINTS, dimensions) and points.dtype == np.float64
+    expected = qmc.Sobol(dimensions, scramble=True, rng=7).random(starts.POINTS)
+    np.testing.assert_array_equal(points, expected)
