@@ -51,24 +51,14 @@ def dask_map(
 
     A task of a worker that dies is done again by another one.
 
-    Parameters
-    ----------
-    function
-        Of the items; picklable, as are the items and the results.
-    items
-        Its arguments.
-    workers
-        Number of local processes where there is no `scheduler`; all usable cores by default.
-    scheduler
-        Address of a running scheduler, such as "tcp://10.0.0.1:8786". None starts one here.
+    function: Of the items; picklable, as are the items and the results.
+    items: Its arguments.
+    workers: Number of local processes where there is no `scheduler`; all usable cores by default.
+    scheduler: Address of a running scheduler, such as "tcp://10.0.0.1:8786". None starts one here.
 
-    Raises
-    ------
-    MissingLibraryError
-        Where dask is not installed.
-    InputError
-        Where no scheduler answers at the address, it has no worker, a task killed several workers,
-        or a worker has other versions of the libraries.
+    Raises `MissingLibraryError` where dask is not installed; `InputError` where no scheduler
+    answers at the address, it has no worker, a task killed several workers, or a worker has other
+    versions of the libraries.
     """
     try:
         from distributed import Client, LocalCluster

@@ -61,29 +61,17 @@ def generate(
 
     The same recipe gives the same bytes on the same machine, whatever the engine and its workers.
 
-    Parameters
-    ----------
-    recipe
-        Gear, soils, operating ranges, noise, number of rows and seed; see `read_recipe`.
-    path
-        The Parquet file. Columns: run, the readings, covariates, the true parameters that vary,
+    recipe: Gear, soils, operating ranges, noise, number of rows and seed; see `read_recipe`.
+    path: The Parquet file. Columns: run, the readings, covariates, the true parameters that vary,
         status; the unit of each is in its metadata, the recipe in that of the file.
-    progress
-        Called with the number of rows written so far.
-    engine
-        Where rows are simulated: `process_map`, on all cores, by default.
+    progress: Called with the number of rows written so far.
+    engine: Where rows are simulated: `process_map`, on all cores, by default.
 
-    Returns
-    -------
-    Generated
-        Number of rows, and of rows without equilibrium. The latter are in the file with blank
-        readings and the reason in `status`.
+    Returns: Number of rows, and of rows without equilibrium. The latter are in the file with blank
+    readings and the reason in `status`.
 
-    Raises
-    ------
-    InputError
-        Where more than half of the rows have no equilibrium, the disk is too small, or the file
-        cannot be written.
+    Raises `InputError` where more than half of the rows have no equilibrium, the disk is too small,
+    or the file cannot be written.
 
     Examples
     --------
@@ -191,19 +179,12 @@ def generate_folder(
     the recipe, seed, versions and rows that it should have, its checksums hold, and its first rows
     are those of a new simulation; otherwise it is written again.
 
-    Parameters
-    ----------
-    recipe, progress, engine
-        As in `generate`. Workers on other machines must see the folder under the same path.
-    path
-        The folder; it is created, but not its parents.
-    rows_per_file
-        A multiple of `datagen.simulation.PIECE`.
+    recipe, progress, engine: As in `generate`. Workers on other machines must see the folder under
+        the same path.
+    path: The folder; it is created, but not its parents.
+    rows_per_file: A multiple of `datagen.simulation.PIECE`.
 
-    Raises
-    ------
-    InputError
-        As in `generate`, and where the folder has Parquet files of other data.
+    Raises `InputError` as in `generate`, and where the folder has Parquet files of other data.
     """
     folder = Path(path).absolute()
     parts = [Part(i, rows) for i, rows in enumerate(pieces(recipe, size=rows_per_file))]

@@ -61,22 +61,13 @@ def process_map(
     Leaving the block, also by an exception, ends all workers; if this process is killed they end
     themselves.
 
-    Parameters
-    ----------
-    function
-        Of the items. Where processes cannot be forked, it must be picklable.
-    items
-        Its arguments, picklable. Results must be, too.
-    workers
-        Number of processes; one for each usable core by default. With 1 the function is called
+    function: Of the items. Where processes cannot be forked, it must be picklable.
+    items: Its arguments, picklable. Results must be, too.
+    workers: Number of processes; one for each usable core by default. With 1 the function is called
         here.
-    start_method
-        "fork" or "spawn"; on Linux "fork" by default, which starts in milliseconds.
+    start_method: "fork" or "spawn"; on Linux "fork" by default, which starts in milliseconds.
 
-    Raises
-    ------
-    InputError
-        Where a worker was killed.
+    Raises `InputError` where a worker was killed.
     """
     count = min(usable_cores() if workers is None else workers, len(items))
     if count <= 1:

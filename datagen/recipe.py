@@ -116,22 +116,14 @@ def read_recipe(
 ) -> Recipe:
     """Read a recipe from a TOML file, or a packaged one by name.
 
-    Parameters
-    ----------
-    path
-        The file, or one of the names of `datagen/recipes`: wheel, wheel_test, wheel_leg, benchmark.
-    effects
-        The effects that [[effect]] may name.
+    path: The file, or one of the names of `datagen/recipes`: wheel, wheel_test, wheel_leg,
+        benchmark.
+    effects: The effects that [[effect]] may name.
 
-    Returns
-    -------
-    Recipe
-        Number of rows and seed can be replaced with `Recipe.sized`.
+    Returns: Number of rows and seed can be replaced with `Recipe.sized`.
 
-    Raises
-    ------
-    InputError
-        Where the file is missing or a key is missing, unknown or has a bad value; names the key.
+    Raises `InputError` where the file is missing or a key is missing, unknown or has a bad value;
+    names the key.
 
     Examples
     --------

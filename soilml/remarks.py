@@ -17,22 +17,13 @@ class Remark:
     """One thing that a reader of a result should know.
 
     Decisions are made from `code` and `about`; no program reads the text.
-
-    Attributes
-    ----------
-    code
-        What is the matter, in words that do not change: `not-identified`.
-    text
-        The same as a sentence for a person.
-    about
-        Names of the parameters, channels, runs or effects that it concerns.
-    severity
-        `warning` where a figure must not be taken at face value, `note` otherwise.
     """
 
-    code: str
-    text: str
+    code: str  # What is the matter, in words that do not change: `not-identified`
+    text: str  # The same as a sentence for a person
+    # Names of the parameters, channels, runs or effects that it concerns
     about: tuple[str, ...] = ()
+    # `warning` where a figure must not be taken at face value, `note` otherwise
     severity: Severity = "warning"
 
     def __str__(self) -> str:

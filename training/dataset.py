@@ -128,12 +128,8 @@ def read_dataset(
 ) -> Dataset:
     """Read a file that `soilml generate` wrote; rows without equilibrium or a reading are dropped.
 
-    Raises
-    ------
-    TableError
-        For a missing column, and for fewer than 200 usable rows.
-    InputError
-        For a target that does not vary, or that has noise.
+    Raises `TableError` for a missing column, and for fewer than 200 usable rows; `InputError` for a
+    target that does not vary, or that has noise.
     """
     inputs = inputs_of(features)
     needed = ["run", *(column(name) for name in (*inputs, *targets))]

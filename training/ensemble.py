@@ -77,21 +77,12 @@ def add_best_linear_fusion(
     .. math:: \mu = \sum_i w_i \mu_i, \qquad
         \sigma^2 = \sum_i \sum_j w_i w_j \sigma_i \sigma_j \rho_{ij}
 
-    Parameters
-    ----------
-    graph : Graph
-        The graph to which nodes are added.
-    means, stds : list of str
-        Names of the m estimates and their standard deviations, (n, q) each.
-    weights : ndarray
-        Weights (m, q).
-    correlation : ndarray
-        Correlation (q, m, m) of the errors.
+    graph: The graph to which nodes are added.
+    means, stds: Names of the m estimates and their standard deviations, (n, q) each.
+    weights: Weights (m, q).
+    correlation: Correlation (q, m, m) of the errors.
 
-    Returns
-    -------
-    tuple of str
-        Names of mean and standard deviation (n, q).
+    Returns: Names of mean and standard deviation (n, q).
     """
     mean, std = (concat(_doubles(graph, values), axis=1) for values in (means, stds))  # (n, m q)
     m, q = weights.shape
@@ -119,19 +110,11 @@ def add_rowwise_fusion(
     inverse-variance and covariance-intersection are :math:`I_i / \sum_j I_j`; the variances are
     :math:`1 / \sum_j I_j` and :math:`m / \sum_j I_j`. Any other rule is the mean of all pairs.
 
-    Parameters
-    ----------
-    rule : str
-        One of `soilml.onboard.fusion_rules.RULES`.
-    graph : Graph
-        The graph to which nodes are added.
-    means, stds : list of str
-        Names of the m estimates and their standard deviations, (n, q) each.
+    rule: One of `soilml.onboard.fusion_rules.RULES`.
+    graph: The graph to which nodes are added.
+    means, stds: Names of the m estimates and their standard deviations, (n, q) each.
 
-    Returns
-    -------
-    tuple of str
-        Names of the fused mean and standard deviation (n, q).
+    Returns: Names of the fused mean and standard deviation (n, q).
     """
     mean_values, std_values = _doubles(graph, means), _doubles(graph, stds)
     axis = mean_values[0].indices([1])

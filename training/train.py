@@ -106,23 +106,16 @@ def train(
     the correlation of their errors is measured; on the second the fused estimate is recalibrated;
     on the third all metrics are measured.
 
-    Parameters
-    ----------
-    spec : Spec
-        From `read_spec`; its regressors are fitted in place.
-    data : Dataset
-        From `read_dataset`, with the features and targets of the spec.
-    progress : callable, optional
-        Called with the name of a stage, the steps done and the total number of steps.
+    spec: From `read_spec`; its regressors are fitted in place.
+    data: From `read_dataset`, with the features and targets of the spec.
+    progress: Called with the name of a stage, the steps done and the total number of steps.
 
     Returns
     -------
     TrainedModel
 
-    Raises
-    ------
-    InputError
-        For too few rows to calibrate intervals on, and where a regressor does not converge.
+    Raises `InputError` for too few rows to calibrate intervals on, and where a regressor does not
+    converge.
 
     Examples
     --------

@@ -83,22 +83,13 @@ class BlindSet:
 def draw_blind_set(plan: Plan) -> BlindSet:
     """Simulate the blind set of a plan; the same plan gives the same set, bit by bit.
 
-    Parameters
-    ----------
-    plan
-        Mechanism, its size, noise, number of runs, soil family, number of free parameters, seed,
+    plan: Mechanism, its size, noise, number of runs, soil family, number of free parameters, seed,
         size of the smooth discrepancy, and design.
 
-    Returns
-    -------
-    BlindSet
-        Runs, held-out region, model text and truth. Every row has an equilibrium with and without
-        the mechanism: soils without one are drawn again.
+    Returns: Runs, held-out region, model text and truth. Every row has an equilibrium with and
+    without the mechanism: soils without one are drawn again.
 
-    Raises
-    ------
-    RuntimeError
-        Where no soil of the family carries all rows.
+    Raises `RuntimeError` where no soil of the family carries all rows.
 
     Examples
     --------

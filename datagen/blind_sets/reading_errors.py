@@ -66,24 +66,14 @@ def draw_discrepancy(
     It is one smooth function of slip and load, the same in all runs: a sum of a few cosines, bumps
     or steps with random positions, directions and correlation lengths.
 
-    Parameters
-    ----------
-    rms
-        Root mean square over the rows of the runs, as a fraction of the largest absolute reading.
-    schedules
-        Runs and region, of n and m rows.
-    true
-        Noise-free readings of the runs, (n,).
+    rms: Root mean square over the rows of the runs, as a fraction of the largest absolute reading.
+    schedules: Runs and region, of n and m rows.
+    true: Noise-free readings of the runs, (n,).
 
-    Returns
-    -------
-    tuple of arrays
-        (n,) and (m,), in the unit of the channel.
+    Returns: (n,) and (m,), in the unit of the channel.
 
-    Raises
-    ------
-    RuntimeError
-        Where no function is found that is at most `MAX_OVER_RMS` times its rms everywhere.
+    Raises `RuntimeError` where no function is found that is at most `MAX_OVER_RMS` times its rms
+    everywhere.
     """
     scale = rms * float(np.max(np.abs(true)))
     for _ in range(ATTEMPTS):

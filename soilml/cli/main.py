@@ -105,11 +105,9 @@ class _Parser(argparse.ArgumentParser):
 def parser(command: str | None = None) -> argparse.ArgumentParser:
     """The parser of the command line.
 
-    Parameters
-    ----------
-    command
-        The first word of a command line. If it is a command, its module alone is imported and its
-        arguments are declared; if it is an option such as --help, or None, those of all commands.
+    command: The first word of a command line. If it is a command, its module alone is imported and
+        its arguments are declared; if it is an option such as --help, or None, those of all
+        commands.
     """
     layout: Any = argparse.RawDescriptionHelpFormatter
     root = _Parser("soilml", description=DESCRIPTION, epilog=EPILOG, formatter_class=layout)
@@ -147,17 +145,11 @@ def _other_commands() -> dict[str, str]:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command of `soilml`.
 
-    Parameters
-    ----------
-    arguments
-        The words after `soilml`; those of the process where None.
+    arguments: The words after `soilml`; those of the process where None.
 
-    Returns
-    -------
-    int
-        Exit status: 0 for success, 2 with one line on standard error for bad input, 128 and the
-        number of the signal for a signal that asks the process to stop. `papers` gives 1 where a
-        number is not reproduced. An output file is complete or absent in every case.
+    Returns: Exit status: 0 for success, 2 with one line on standard error for bad input, 128 and
+    the number of the signal for a signal that asks the process to stop. `papers` gives 1 where a
+    number is not reproduced. An output file is complete or absent in every case.
     """
     try:
         with StopSignals() as signals:

@@ -89,14 +89,9 @@ def write_with_report(
 ) -> None:
     """Write the outputs of a command, and those of --report, as one set.
 
-    Parameters
-    ----------
-    contents
-        What is written to each path; None as a path is an option that was not given.
-    build
-        Gives the report and the result in SI units; called where --report is given.
-    read
-        Input files that no argument names.
+    contents: What is written to each path; None as a path is an option that was not given.
+    build: Gives the report and the result in SI units; called where --report is given.
+    read: Input files that no argument names.
     """
     files = {Path(path): content for path, content in contents.items() if path is not None}
     if args.report is not None:

@@ -215,10 +215,8 @@ def read_case_of_one_gear(
 
     The table [bias] is read with `with_bias`, as by `read_case`.
 
-    Raises
-    ------
-    InputError
-        As `read_case` does, and where the file has several gears and none of this name.
+    Raises `InputError` as `read_case` does, and where the file has several gears and none of this
+    name.
     """
     case = read_case(path, effects, with_bias)
     if not case.gears and gear is None:

@@ -30,25 +30,16 @@ class Discrepancy:
         \operatorname{cov}[\delta(s, W), \delta(s', W')] = a^2
         e^{-(s - s')^2 / (2 l_s^2) - (\ln W - \ln W')^2 / (2 l_W^2)}
 
-    Attributes
-    ----------
-    constant
-        Absolute part of the amplitude a, in the unit of the column.
-    share
-        Relative part of the amplitude, as a fraction of the range of the channel's readings.
-    slip_length
-        Correlation length l_s in slip.
-    log_load_length
-        Correlation length l_W in the natural logarithm of the load.
-
     References
     ----------
     Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
     """
 
-    constant: float = 0.0
+    constant: float = 0.0  # Absolute part of the amplitude a, in the unit of the column
+    # Relative part of the amplitude, as a fraction of the range of the channel's readings
     share: float = 0.0
-    slip_length: float = SLIP_LENGTH
+    slip_length: float = SLIP_LENGTH  # Correlation length l_s in slip
+    # Correlation length l_W in the natural logarithm of the load
     log_load_length: float = LOG_LOAD_LENGTH
 
     def amplitude(self, span: float) -> float:
@@ -97,10 +88,8 @@ def take_discrepancy(settings: Settings) -> dict[str, Discrepancy]:
 def discrepancy_as_settings(discrepancy: dict[str, Discrepancy]) -> dict[str, Any]:
     """The keys of the table [discrepancy]; a default length is not written.
 
-    Raises
-    ------
-    ValueError
-        Where two channels differ in a correlation length, which the table cannot state.
+    Raises `ValueError` where two channels differ in a correlation length, which the table cannot
+    state.
     """
     settings = {key: one.as_setting() for key, one in discrepancy.items()}
     for name, usual in (("slip_length", SLIP_LENGTH), ("log_load_length", LOG_LOAD_LENGTH)):

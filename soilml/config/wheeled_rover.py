@@ -37,17 +37,6 @@ class RoverWheel:
 class WheeledRover:
     """Driven wheels under a rigid body; all rims have one speed, and so all wheels one slip.
 
-    Attributes
-    ----------
-    mass
-        Of the whole rover, kg.
-    centre_of_mass
-        Forward, to the left, and above the ground, m, in the frame of the wheels.
-    wheels
-        By name.
-    gravity
-        m/s^2.
-
     Examples
     --------
     >>> wheels = {"front": RoverWheel(0.5, 0.0), "rear": RoverWheel(-0.5, 0.0)}
@@ -58,10 +47,11 @@ class WheeledRover:
     [38.4, 55.5]
     """
 
-    mass: float
+    mass: float  # Of the whole rover, kg
+    # Forward, to the left, and above the ground, m, in the frame of the wheels
     centre_of_mass: tuple[float, float, float]
-    wheels: Mapping[str, RoverWheel]
-    gravity: float = GRAVITY["earth"]
+    wheels: Mapping[str, RoverWheel]  # By name
+    gravity: float = GRAVITY["earth"]  # m/s^2
 
     @property
     def weight(self) -> float:
@@ -79,10 +69,8 @@ class WheeledRover:
         the loads that balance, those of the least sum of squares: those of equally stiff wheels
         under a rigid body. A suspension that shares the load otherwise is not described.
 
-        Raises
-        ------
-        InputError
-            Where wheels in one line do not carry the moment, or a wheel would leave the ground.
+        Raises `InputError` where wheels in one line do not carry the moment, or a wheel would leave
+        the ground.
         """
         slope = np.asarray(slope, dtype=np.float64)
         x, y, height = self.centre_of_mass

@@ -79,12 +79,9 @@ def squared_residuals_and_log_determinant(
 
     The first form has no cancellation, however small the noise is beside the process.
 
-    Parameters
-    ----------
-    residual, std : array (n, k)
-        Residuals, and standard deviations of the noise; each of the n sets has its own.
-    columns : array (k, q) or (n, k, q)
-        C, the columns of the process.
+    residual, std (n, k): Residuals, and standard deviations of the noise; each of the n sets has
+        its own.
+    columns (k, q) or (n, k, q): C, the columns of the process.
 
     References
     ----------
@@ -114,24 +111,17 @@ class DiscrepancyProcess:
         \delta_c(s, W) = \tau_c u_c \sum_k w_k \psi_k(s, \ln W), \quad w_k \sim N(0, 1), \quad
         \sum_k \psi_k \psi_k' = e^{-(s - s')^2 / (2 l_s^2) - (\ln W - \ln W')^2 / (2 l_W^2)}
 
-    Attributes
-    ----------
-    columns : array (m, q)
-        The functions u_c psi_k at the readings; each is zero outside its channel and gear.
-    channel : array (q,)
-        Channel of each column.
-    usual : array (channels,)
-        u_c, the standard deviation of a usual discrepancy in the unit of the channel. Amplitudes
-        tau_c are in this unit; all gears share them.
-
     References
     ----------
     Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2;
     Brynjarsdottir and O'Hagan, Inverse Problems 30, 2014.
     """
 
+    # (m, q): The functions u_c psi_k at the readings; each is zero outside its channel and gear
     columns: Floats
-    channel: Integers
+    channel: Integers  # (q,): Channel of each column
+    # (channels,): u_c, the standard deviation of a usual discrepancy in the unit of the channel.
+    # Amplitudes tau_c are in this unit; all gears share them.
     usual: Floats
 
 
@@ -143,14 +133,9 @@ def discrepancy_process(
 ) -> DiscrepancyProcess:
     """The process of these readings.
 
-    Parameters
-    ----------
-    declared
-        Model error by column.
-    default
-        That of other columns; a channel whose amplitude is zero has no columns.
-    least_eigenvalue
-        Fraction of the largest eigenvalue below which eigenfunctions are dropped.
+    declared: Model error by column.
+    default: That of other columns; a channel whose amplitude is zero has no columns.
+    least_eigenvalue: Fraction of the largest eigenvalue below which eigenfunctions are dropped.
     """
     gear = gear_numbers(readings.at)
     known: dict[tuple[float, float], Floats] = {}

@@ -43,17 +43,12 @@ MOST_LOG_STEP = 2.0
 class DampedSteps:
     """Steps in the coordinates of a fit: their bounds, priors and curvature.
 
-    Attributes
-    ----------
-    lower, upper : array (p,)
-        Bounds, at which steps end.
-    precision, centre : array (p,)
-        Precision of the normal density of each coordinate, 0 without one, and its middle.
-    offset : array (p,)
-        What is added to a coordinate to obtain a multiple of the parameter, where the parameter
-        moves by ratios; infinite where it moves by differences.
-    tests : SoilTestTerms
-        Tests of the soil, which stand beside the residuals.
+    lower, upper (p,): Bounds, at which steps end.
+    precision, centre (p,): Precision of the normal density of each coordinate, 0 without one, and
+        its middle.
+    offset (p,): What is added to a coordinate to obtain a multiple of the parameter, where the
+        parameter moves by ratios; infinite where it moves by differences.
+    tests: Tests of the soil, which stand beside the residuals.
     """
 
     lower: Floats
@@ -93,16 +88,10 @@ class DampedSteps:
         with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
         and P = P_0 + T^T T.
 
-        Parameters
-        ----------
-        x : array (b, p)
-            The points.
-        residual : array (b, m)
-            Whitened residuals at each point.
-        jacobian : array (m, p)
-            Whitened derivatives of the readings, the same for all points.
-        damping : array (b,)
-            Factor lambda of each step.
+        x (b, p): The points.
+        residual (b, m): Whitened residuals at each point.
+        jacobian (m, p): Whitened derivatives of the readings, the same for all points.
+        damping (b,): Factor lambda of each step.
         """
         of_readings = jacobian.T @ jacobian + np.diag(self.precision)
         moved = np.empty_like(x)
@@ -147,10 +136,7 @@ def _offset(coordinate: Coordinate) -> float:
 def levenberg_marquardt(problem: LeastSquaresProblem, start: Floats) -> Solution:
     """Bounded Levenberg-Marquardt descent from one start (p,); see `descend_together`.
 
-    Raises
-    ------
-    InputError
-        Where the model refuses the coordinates of a trial.
+    Raises `InputError` where the model refuses the coordinates of a trial.
     """
     (fit,) = descend_together([problem], [start])
     if isinstance(fit, InputError):

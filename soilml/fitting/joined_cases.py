@@ -54,12 +54,8 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     The effects are those of all cases, in an order that each case has; an effect that a case lacks
     has its neutral parameters in its rows, and so changes nothing there.
 
-    Raises
-    ------
-    InputError
-        For a value outside its bounds.
-    graphlib.CycleError
-        Where two cases have the same effects in contrary order.
+    Raises `InputError` for a value outside its bounds; `graphlib.CycleError` where two cases have
+    the same effects in contrary order.
     """
     effects = _joined_effects([part.case for part in parts])
     parameters = [part.case.parameters() for part in parts]

@@ -29,24 +29,12 @@ CLEAR_GAP = 4.0
 
 @dataclass(frozen=True)
 class LevelRule:
-    """How far apart the values of a quantity are that count as two levels.
+    """How far apart the values of a quantity are that count as two levels."""
 
-    Attributes
-    ----------
-    gap
-        Smallest gap between two levels, unless repeated values show finer ones.
-    fine_gap
-        Smallest gap between two levels that several runs repeat.
-    scatter
-        Usual standard deviation of the values of one level.
-    step
-        Width of one level where the values cover a range without gaps.
-    """
-
-    gap: float
-    fine_gap: float
-    scatter: float
-    step: float
+    gap: float  # Smallest gap between two levels, unless repeated values show finer ones
+    fine_gap: float  # Smallest gap between two levels that several runs repeat
+    scatter: float  # Usual standard deviation of the values of one level
+    step: float  # Width of one level where the values cover a range without gaps
 
     def with_noise(self, std: float) -> LevelRule:
         """The rule for values with measurement noise of this standard deviation."""

@@ -37,23 +37,12 @@ def gear_numbers(at: Operating) -> NDArray[np.int64]:
 
 @dataclass(frozen=True)
 class GearRows:
-    """The rows that one of several gears drove.
+    """The rows that one of several gears drove."""
 
-    Attributes
-    ----------
-    case
-        The case of this gear alone.
-    rows
-        Positions (k,) of its rows among all.
-    at
-        Their operating points.
-    paths
-        Path in `case` of each parameter of the whole case that acts on this gear.
-    """
-
-    case: Case
-    rows: NDArray[np.int64]
-    at: Operating
+    case: Case  # The case of this gear alone
+    rows: NDArray[np.int64]  # Positions (k,) of its rows among all
+    at: Operating  # Their operating points
+    # Path in `case` of each parameter of the whole case that acts on this gear
     paths: dict[str, str]
 
 

@@ -84,14 +84,9 @@ def usual_errors(case: Case, load: NDArray[np.float64], unknown: Sequence[str]) 
     A sensor that the case declares in [bias], or has as an effect, keeps that error; so does what
     is an unknown or an effect of the model.
 
-    Parameters
-    ----------
-    case
-        Model, soil and bias.
-    load
-        Loads (n,) of the rows, N.
-    unknown
-        Paths of the free parameters.
+    case: Model, soil and bias.
+    load: Loads (n,) of the rows, N.
+    unknown: Paths of the free parameters.
     """
     declared = common_errors(case.bias)
     effects = {
@@ -206,12 +201,8 @@ def with_modelled_errors(
     Fractions of an error are linear in it, unlike those of a normal prior: readings are then nearly
     polynomials of them.
 
-    Parameters
-    ----------
-    errors
-        Standard deviations of the errors that all rows share, by name.
-    load
-        Loads (n,) of the rows, N.
+    errors: Standard deviations of the errors that all rows share, by name.
+    load: Loads (n,) of the rows, N.
     """
     of_model = {f.name for f in fields(ModelledErrors)}
     modelled = {name: std for name, std in errors.items() if name in of_model}

@@ -38,10 +38,7 @@ def global_optimum(problem: LeastSquaresProblem, few: LeastSquaresProblem) -> So
     Descents start without errors that all rows share. `few` is the problem of a few rows, which
     tell good starts from bad ones.
 
-    Raises
-    ------
-    FitError
-        Where no parameters in the prior carry the measured loads.
+    Raises `FitError` where no parameters in the prior carry the measured loads.
     """
     starts, order = _ranked_starts(few)
     found: list[Solution] = []

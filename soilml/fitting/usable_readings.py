@@ -33,12 +33,8 @@ def usable_readings(case: Case, table: Table) -> Readings:
     standard deviation of zero, which a relative noise has at a reading of zero, is replaced by the
     median of the others.
 
-    Raises
-    ------
-    TableError
-        Where the table names another wheel than the case's.
-    FitError
-        Where no row or no reading remains, or all standard deviations of a channel are zero.
+    Raises `TableError` where the table names another wheel than the case's; `FitError` where no row
+    or no reading remains, or all standard deviations of a channel are zero.
     """
     table = with_rover_columns(case, table)
     dropped = int(np.count_nonzero(~table.answered))

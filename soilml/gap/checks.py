@@ -65,12 +65,8 @@ def check_readings(
 ) -> DataCheckResult:
     """Run all data checks.
 
-    Parameters
-    ----------
-    duplicate_rows : int
-        Number of duplicate rows that were removed from `table` before.
-    parameters : int
-        Number of free soil parameters.
+    duplicate_rows: Number of duplicate rows that were removed from `table` before.
+    parameters: Number of free soil parameters.
     """
     data = CheckedData(readings, len(table), duplicate_rows, parameters)
     findings = [finding for check in CHECKS for finding in check(data)]

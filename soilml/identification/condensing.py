@@ -48,17 +48,10 @@ def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Rea
     the cells are kept for the misfit. Rows without equilibrium at :math:`\theta_0`, of which there
     are few where the model holds, stay as they are.
 
-    Parameters
-    ----------
-    case, free
-        The model, and its free parameters.
-    readings
-        Rows (n,); they are returned where there are no more than `MOST_ROWS`.
+    case, free: The model, and its free parameters.
+    readings: Rows (n,); they are returned where there are no more than `MOST_ROWS`.
 
-    Raises
-    ------
-    FitError
-        As `nonlinear` does.
+    Raises `FitError` as `nonlinear` does.
     """
     count = len(readings.row_slip)
     if count <= MOST_ROWS:
@@ -212,14 +205,9 @@ def cells_of(points: Floats, groups: Integers, most: int) -> Integers:
     The cell whose points scatter most, all together, is divided at the mean of the coordinate in
     which they do, until there are `most` cells or the points of each are equal.
 
-    Parameters
-    ----------
-    points
-        Coordinates (n, d), scaled so that their distances compare.
-    groups
-        Rows of different groups (n,) share no cell.
-    most
-        Number of cells, of which there are no more unless there are more groups.
+    points: Coordinates (n, d), scaled so that their distances compare.
+    groups: Rows of different groups (n,) share no cell.
+    most: Number of cells, of which there are no more unless there are more groups.
     """
     waiting: list[tuple[float, int, int, Integers]] = []
     done: list[Integers] = []

@@ -103,26 +103,13 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
 
 @dataclass(frozen=True)
 class WeightedRows:
-    """Readings whose noise depends on what is expected of them, and the case that is fitted.
+    """Readings whose noise depends on what is expected of them, and the case that is fitted."""
 
-    Attributes
-    ----------
-    case
-        With the errors that the model is solved with, where there are any.
-    readings
-        With the standard deviations (m,) that the fit gives them.
-    declared
-        The readings as they were declared.
-    unknown
-        The p free parameters, and behind them these errors.
-    shared
-        Columns (m, e) of errors that all rows share and that act on the readings alone.
-    """
-
-    case: Case
-    readings: Readings
-    declared: Readings
-    unknown: Sequence[Coordinate]
+    case: Case  # With the errors that the model is solved with, where there are any
+    readings: Readings  # With the standard deviations (m,) that the fit gives them
+    declared: Readings  # The readings as they were declared
+    unknown: Sequence[Coordinate]  # The p free parameters, and behind them these errors
+    # Columns (m, e) of errors that all rows share and that act on the readings alone
     shared: Floats
 
     @staticmethod

@@ -52,10 +52,7 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
     cohesion and shear modulus. A prior of kphi becomes the standard deviation of the bearing curve,
     and declared noise replaces the file's own.
 
-    Raises
-    ------
-    InputError
-        Where gear, effects or ranges are not those of the file.
+    Raises `InputError` where gear, effects or ranges are not those of the file.
     """
     gear, soil, prior = case.model.gear, case.soil, case.prior
     if not isinstance(gear, Wheel):
@@ -132,14 +129,10 @@ def std_with_discrepancy(
     combination of the rows, so that the estimate of rows that are taken `together` is wider than
     with the process itself, never narrower. For rows estimated one by one the sum is 1.
 
-    Parameters
-    ----------
-    discrepancy
-        By column name, as in `Case`.
-    readings
-        Inputs of the model file by name, (rows,): slip, load, channels and their `<name>_std`.
-    noise
-        Constant part and share of the noise by name, where there is no `<name>_std`.
+    discrepancy: By column name, as in `Case`.
+    readings: Inputs of the model file by name, (rows,): slip, load, channels and their
+        `<name>_std`.
+    noise: Constant part and share of the noise by name, where there is no `<name>_std`.
     """
     changed = {}
     for name in CHANNELS:
@@ -236,18 +229,11 @@ def estimators_for_case(
 ) -> tuple[list[Estimator], list[Remark]]:
     """The estimators for the wheel and soil of a case, and remarks on what is ignored of it.
 
-    Parameters
-    ----------
-    case, name
-        The case, if there is one, and the name of its file.
-    pooled
-        Whether all rows of a soil are estimated together.
+    case, name: The case, if there is one, and the name of its file.
+    pooled: Whether all rows of a soil are estimated together.
 
-    Raises
-    ------
-    InputError
-        Where a file for wheels of any size has no case, and where the gear or the effects of the
-        case are not those of a file.
+    Raises `InputError` where a file for wheels of any size has no case, and where the gear or the
+    effects of the case are not those of a file.
     """
     given, remarks = [], []
     for estimator in estimators:

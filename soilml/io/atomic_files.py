@@ -294,12 +294,8 @@ def write_files(
 ) -> None:
     """Write files as one set, all or none, as `atomic_outputs` does.
 
-    Parameters
-    ----------
-    contents
-        The text of each file, or a function that writes it to the path that it is given.
-    folders
-        Folders that are created where they are missing.
+    contents: The text of each file, or a function that writes it to the path that it is given.
+    folders: Folders that are created where they are missing.
     """
     with ExitStack() as created:
         for folder in folders:

@@ -33,22 +33,14 @@ def read_csv(
 ) -> tuple[dict[str, Column], NDArray[np.int64]]:
     """The columns of a CSV file by name, and the line of each row.
 
-    Parameters
-    ----------
-    columns
-        The columns to keep, of those in the header; it raises where one of these is not possible.
-    header_hint
-        What the header should be, for the message about an empty file.
-    progress
-        Called with the number of bytes read, after each block of rows.
+    columns: The columns to keep, of those in the header; it raises where one of these is not
+        possible.
+    header_hint: What the header should be, for the message about an empty file.
+    progress: Called with the number of bytes read, after each block of rows.
 
-    Raises
-    ------
-    OSError
-        Where the file cannot be opened or read.
-    TableError
-        For text that is not UTF-8 or no table, a row with another number of cells than the header,
-        and a cell that is not what its column holds.
+    Raises `OSError` where the file cannot be opened or read; `TableError` for text that is not
+    UTF-8 or no table, a row with another number of cells than the header, and a cell that is not
+    what its column holds.
     """
     with file.open(encoding="utf-8-sig") as opened:
         reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)

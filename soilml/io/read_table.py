@@ -258,16 +258,11 @@ def _read_parquet(file: Path, ignore_extra: bool) -> Table:
 def as_table(rows: Rows) -> Table:
     """The table of rows; data frames, columns and tables made of them are checked as files are.
 
-    Parameters
-    ----------
-    rows
-        A `Table`; a data frame of pandas, polars or pyarrow; or a mapping of columns (rows,) by
+    rows: A `Table`; a data frame of pandas, polars or pyarrow; or a mapping of columns (rows,) by
         names such as load_N, numbers and, for runs, text.
 
-    Raises
-    ------
-    TableError
-        For another object, columns of different lengths, and what `read_table` refuses.
+    Raises `TableError` for another object, columns of different lengths, and what `read_table`
+    refuses.
 
     Examples
     --------

@@ -45,12 +45,8 @@ def page(
 ) -> str:
     """The report as HTML.
 
-    Parameters
-    ----------
-    progress
-        Called with a stage, the pictures done and their number.
-    origin
-        The command and its files; by default the call of `import_log` in Python.
+    progress: Called with a stage, the pictures done and their number.
+    origin: The command and its files; by default the call of `import_log` in Python.
     """
     for library in ("jinja2", "matplotlib"):
         need(library, "import")

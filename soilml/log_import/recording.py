@@ -15,36 +15,19 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Recording:
-    """Columns of equal length (n,), as they stand in a file: one table, topic or struct.
+    """Columns of equal length (n,), as they stand in a file: one table, topic or struct."""
 
-    Attributes
-    ----------
-    name
-        Topic, struct or kind of file; "" where a file holds one table.
-    file
-        The file.
-    columns
-        Numbers by column, NaN where a cell is blank or not a number.
-    texts
-        Columns that hold text, such as names of runs and times of day.
-    units
-        Units by column, as the log writes them.
-    clock
-        Time of each sample in s, where the format has one (bags); None where a column has it.
-    about
-        Lines before the header, which may state the radius of the wheel or the sampling rate.
-    notes
-        What the reader repaired or left out.
-    """
-
-    name: str
-    file: Path
-    columns: dict[str, Floats]
+    name: str  # Topic, struct or kind of file; "" where a file holds one table
+    file: Path  # The file
+    columns: dict[str, Floats]  # Numbers by column, NaN where a cell is blank or not a number
+    # Columns that hold text, such as names of runs and times of day
     texts: dict[str, list[str]] = field(default_factory=dict)
-    units: dict[str, str] = field(default_factory=dict)
+    units: dict[str, str] = field(default_factory=dict)  # Units by column, as the log writes them
+    # Time of each sample in s, where the format has one (bags); None where a column has it
     clock: Floats | None = None
+    # Lines before the header, which may state the radius of the wheel or the sampling rate
     about: tuple[str, ...] = ()
-    notes: tuple[Remark, ...] = ()
+    notes: tuple[Remark, ...] = ()  # What the reader repaired or left out
 
     def __len__(self) -> int:
         if self.clock is not None:

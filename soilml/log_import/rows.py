@@ -35,13 +35,9 @@ _MOST_SLIP = 0.995
 class WindowRow:
     """A window: means of the channels, the quantities that follow, and their standard deviations.
 
-    Attributes
-    ----------
-    means
-        Means of the channels by role, from which the quantities follow.
-    values, std
-        Quantities and their independent standard deviations, in SI units; no std where a quantity
-        is a constant of the map.
+    means: Means of the channels by role, from which the quantities follow.
+    values, std: Quantities and their independent standard deviations, in SI units; no std where a
+        quantity is a constant of the map.
     """
 
     window: Stretch
@@ -52,30 +48,14 @@ class WindowRow:
 
 @dataclass(frozen=True)
 class WheelSeries:
-    """The quantities of one wheel in one run over time, and the stretches of the run.
+    """The quantities of one wheel in one run over time, and the stretches of the run."""
 
-    Attributes
-    ----------
-    run
-        Name of the run in the table.
-    drive
-        Name of the run in the log; several wheels share it.
-    time
-        Grid (n,), s.
-    quantities
-        Samples (n,) by name.
-    stretches
-        Steady windows and what is left out.
-    notes
-        What was repaired, tared or doubted in this run.
-    """
-
-    run: str
-    drive: str
-    time: Floats
-    quantities: dict[str, Floats]
-    stretches: tuple[Stretch, ...]
-    notes: tuple[Remark, ...] = ()
+    run: str  # Name of the run in the table
+    drive: str  # Name of the run in the log; several wheels share it
+    time: Floats  # Grid (n,), s
+    quantities: dict[str, Floats]  # Samples (n,) by name
+    stretches: tuple[Stretch, ...]  # Steady windows and what is left out
+    notes: tuple[Remark, ...] = ()  # What was repaired, tared or doubted in this run
 
 
 def means_of(rows: Sequence[WindowRow]) -> dict[str, float | Floats]:

@@ -80,22 +80,14 @@ def importance_sample(
     power of it that enough samples share. Consistent for any density, as every proposal covers the
     cube.
 
-    Parameters
-    ----------
-    log_density
-        Logarithm (n,) of the density at points (n, p); -inf where it vanishes.
-    p
-        Dimension.
-    seed
-        Of the random numbers.
-    least_effective_size
-        Effective sample size at which sampling ends.
-    middle_std
-        Standard deviation of a density about the middle of the cube that is similar to this one.
-        The first round is then drawn from it: in many dimensions hardly any point of a Latin
+    log_density: Logarithm (n,) of the density at points (n, p); -inf where it vanishes.
+    p: Dimension.
+    seed: Of the random numbers.
+    least_effective_size: Effective sample size at which sampling ends.
+    middle_std: Standard deviation of a density about the middle of the cube that is similar to this
+        one. The first round is then drawn from it: in many dimensions hardly any point of a Latin
         hypercube is where the density is.
-    most_samples
-        Number of samples at which sampling ends anyway.
+    most_samples: Number of samples at which sampling ends anyway.
 
     References
     ----------

@@ -37,14 +37,9 @@ def prior_quantiles(prior: Prior, mean: float, std: float, probability: Floats) 
     and equals the prior where mean and std are the prior's. A mean at a bound of the prior with a
     wide std, which no density has, gives the nearest density that was reached.
 
-    Parameters
-    ----------
-    prior
-        Prior of the parameter.
-    mean, std
-        Moments in the parameter's unit.
-    probability
-        Probabilities (...) at which the quantile function is evaluated.
+    prior: Prior of the parameter.
+    mean, std: Moments in the parameter's unit.
+    probability: Probabilities (...) at which the quantile function is evaluated.
 
     References
     ----------
@@ -79,12 +74,9 @@ def moment_matched_weights(weights: Floats, white: Floats) -> Floats:
     Moments that no weights of these samples have are met as nearly as `LEAST_EFFECTIVE_SIZE`
     allows.
 
-    Parameters
-    ----------
-    weights
-        Weights (n,) of the samples, which sum to one.
-    white
-        Samples (n, p), less the wanted mean and divided by the Cholesky factor of the covariance.
+    weights: Weights (n,) of the samples, which sum to one.
+    white: Samples (n, p), less the wanted mean and divided by the Cholesky factor of the
+        covariance.
 
     References
     ----------

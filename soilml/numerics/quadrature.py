@@ -64,12 +64,8 @@ def sine_and_versine(nodes: Nodes, angle: Array) -> tuple[Array, Array]:
     Each sum is the product of a matrix of the nodes with one of the powers of the angles, several
     times faster than the functions themselves; both keep their relative accuracy at small angles.
 
-    Parameters
-    ----------
-    nodes : Nodes
-        The fractions, in [0, 1], from a function of `soilml.numerics.quadrature`.
-    angle : array (parts, batch)
-        Angles (rad) from 0 to pi.
+    nodes: The fractions, in [0, 1], from a function of `soilml.numerics.quadrature`.
+    angle (parts, batch): Angles (rad) from 0 to pi.
 
     Returns
     -------

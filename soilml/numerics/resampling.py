@@ -18,14 +18,9 @@ def systematic_resampling(weights: Floats, count: int, offset: float) -> NDArray
 
     .. math:: i_k = \min\{i : \textstyle\sum_{j \le i} w_j \ge (k + \text{offset}) / N\}
 
-    Parameters
-    ----------
-    weights
-        Weights (n,) that sum to one up to rounding.
-    count
-        Number N of indices.
-    offset
-        Uniform draw from [0, 1) for an unbiased sample; 0.5 for a deterministic one.
+    weights: Weights (n,) that sum to one up to rounding.
+    count: Number N of indices.
+    offset: Uniform draw from [0, 1) for an unbiased sample; 0.5 for a deterministic one.
 
     References
     ----------

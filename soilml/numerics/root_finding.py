@@ -32,21 +32,13 @@ def rising_root(
 ) -> Root:
     """Where `f` rises through zero between `lower` and `upper`, by secant steps inside a bracket.
 
-    Parameters
-    ----------
-    f
-        Function of an array of shape (batch,), element by element, with `f(lower) < 0`.
-    lower, upper
-        The bracket, (batch,).
-    guess, slope
-        Start of the search, and an estimate of df/dx > 0, (batch,).
+    f: Function of an array of shape (batch,), element by element, with `f(lower) < 0`.
+    lower, upper: The bracket, (batch,).
+    guess, slope: Start of the search, and an estimate of df/dx > 0, (batch,).
 
-    Returns
-    -------
-    Root
-        An element with `f(upper) < 0` has `x = upper` and `converged` false, so that a stalled
-        bracket is not mistaken for a root. Where `f` rises, falls and rises again, the root need
-        not be the first: `first_bracket` finds that one.
+    Returns: An element with `f(upper) < 0` has `x = upper` and `converged` false, so that a stalled
+    bracket is not mistaken for a root. Where `f` rises, falls and rises again, the root need not be
+    the first: `first_bracket` finds that one.
     """
     xp = namespace(guess)
     low, high = lower, upper
@@ -89,12 +81,8 @@ def rising_root(
 def first_bracket(f: Callable[[Array], Array], grid: Array) -> tuple[Array, Array, Array, Array]:
     """The first interval of a grid in which `f` rises through zero.
 
-    Parameters
-    ----------
-    f
-        Function of an array of shape (batch,), element by element.
-    grid
-        Points (points, batch), increasing along the first axis.
+    f: Function of an array of shape (batch,), element by element.
+    grid: Points (points, batch), increasing along the first axis.
 
     Returns
     -------

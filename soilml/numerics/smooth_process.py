@@ -35,14 +35,10 @@ def process_columns(
     larger than the exact one, which misses part of the process where points lie many correlation
     lengths apart.
 
-    Parameters
-    ----------
-    points : array (n, d)
-        Coordinates over their correlation lengths, such as slip / 0.3 and ln(load) / 0.6.
-    amplitude : float or array (n,)
-        Standard deviation a of the process, in the unit of the values.
-    least_eigenvalue : float
-        Directions with a smaller fraction of the largest eigenvalue are dropped.
+    points (n, d): Coordinates over their correlation lengths, such as slip / 0.3 and ln(load) /
+        0.6.
+    amplitude (n,): Standard deviation a of the process, in the unit of the values.
+    least_eigenvalue: Directions with a smaller fraction of the largest eigenvalue are dropped.
 
     References
     ----------
@@ -77,10 +73,7 @@ def independent_process_columns(
 
     They are those of `process_columns`; a column is zero at the points of other groups.
 
-    Parameters
-    ----------
-    group : array (n,)
-        Number of the group of each point.
+    group (n,): Number of the group of each point.
     """
     parts = [np.zeros((len(points), 0))]
     for number in np.unique(group):

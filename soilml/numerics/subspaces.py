@@ -25,10 +25,7 @@ def column_space(
     absolute_tolerance : float
         Directions with a singular value at or below this value are dropped as well.
 
-    Returns
-    -------
-    array (m, r)
-        Left singular vectors of the r directions that are kept.
+    Returns (m, r): Left singular vectors of the r directions that are kept.
     """
     u, s, _ = np.linalg.svd(columns, full_matrices=False)
     if s.size == 0:

@@ -67,20 +67,13 @@ def surface_sample(
     polynomials are not accurate enough for the density, they are for a power of it, which gives
     the next region. Sampling ends where they are accurate at new points of the density's region.
 
-    Parameters
-    ----------
-    density
-        The model and the density.
-    p
-        Number of variables.
-    start
-        Samples of a density that is similar and wider.
-    seed
-        Of the random numbers.
-    tempered_rounds
-        Rounds after which polynomials must be accurate enough for the density, not a power of it.
-    most_rounds
-        Rounds after which it ends in any case.
+    density: The model and the density.
+    p: Number of variables.
+    start: Samples of a density that is similar and wider.
+    seed: Of the random numbers.
+    tempered_rounds: Rounds after which polynomials must be accurate enough for the density, not a
+        power of it.
+    most_rounds: Rounds after which it ends in any case.
 
     Returns
     -------

@@ -75,14 +75,9 @@ def fit_surface(
 
     with the diagonal h of the projection on the monomials.
 
-    Parameters
-    ----------
-    scaling
-        Of the variables.
-    degree
-        Total degree; there must be more points than monomials.
-    u, y
-        Points (n, p) and outputs (n, k).
+    scaling: Of the variables.
+    degree: Total degree; there must be more points than monomials.
+    u, y: Points (n, p) and outputs (n, k).
 
     References
     ----------

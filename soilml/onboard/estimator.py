@@ -314,12 +314,8 @@ class Estimator:
 def run_rows(session: Session, rows: Mapping[str, Floats]) -> dict[str, NDArray[Any]]:
     """Mean and std (m, q), covariance (m, q, q), float64, and the flag in_range (m,).
 
-    Parameters
-    ----------
-    session : InferenceSession
-        Of the file.
-    rows : mapping of str to ndarray
-        Readings (m,) by input name.
+    session: Of the file.
+    rows: Readings (m,) by input name.
     """
     with np.errstate(over="ignore", under="ignore"):  # beyond float32 is out of range
         feed = dict(zip(rows, np.array(list(rows.values()), np.float32), strict=True))

@@ -43,12 +43,8 @@ def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = Non
 
     Not for correlated errors, whose variance it understates.
 
-    Parameters
-    ----------
-    mean, std
-        Estimates and standard deviations (m, ...).
-    correlation
-        Not used.
+    mean, std: Estimates and standard deviations (m, ...).
+    correlation: Not used.
 
     References
     ----------
@@ -96,12 +92,8 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
     nearly collinear estimators would have, amplify differences that are mostly noise. The effort
     grows as 2^m: for up to six estimators.
 
-    Parameters
-    ----------
-    mean, std
-        Estimates and standard deviations (m, ...).
-    correlation
-        Correlation R (m, m) of the errors; the identity by default.
+    mean, std: Estimates and standard deviations (m, ...).
+    correlation: Correlation R (m, m) of the errors; the identity by default.
 
     References
     ----------

@@ -255,20 +255,12 @@ def pool_run(
 ) -> Estimate:
     """Pool the single-row estimates (m,) of a run of one soil into one estimate.
 
-    Parameters
-    ----------
-    single : Estimate
-        Estimates of the m rows, each by itself.
-    measured : mapping of str to ndarray, shape (m,)
-        The readings, among them the operating conditions of the calibration.
-    calibration : PoolingCalibration
-        Calibration from held-out runs.
+    single: Estimates of the m rows, each by itself.
+    measured (m,): The readings, among them the operating conditions of the calibration.
+    calibration: Calibration from held-out runs.
 
-    Returns
-    -------
-    Estimate
-        The prior, with the reason, where more than a tenth of the rows are out of range, or where
-        the rows are less consistent with each other than rows of one soil hardly ever are.
+    Returns: The prior, with the reason, where more than a tenth of the rows are out of range, or
+    where the rows are less consistent with each other than rows of one soil hardly ever are.
     """
     valid = single.in_range
     head = single.names, single.units, single.prior

@@ -28,26 +28,19 @@ class HeldOutErrors:
     Two files that were trained from the same data have the same rows: from them follows how far
     their errors are correlated. Two objects are equal where they come from the same file.
 
-    Attributes
-    ----------
-    rows : ndarray of int, shape (n,)
-        Number of each row in the data file, rising.
-    truth, mean, std : ndarray, shape (n, q)
-        True values and the file's estimates, in SI units.
-    average_rows : ndarray of int, shape (g,)
-        Number of the first row of each run of `repeats[-1]` readings of one soil at one slip and
-        load, rising; empty where the data have no such runs.
-    average_truth, average_mean, average_std : ndarray, shape (g, q)
-        Their true values, and the averages of the file's estimates and standard deviations.
-    repeats : ndarray of int, shape (k,)
-        Numbers of readings of one soil at one slip and load, from 1.
-    repeat_std : ndarray, shape (k, q)
-        Standard deviation of the error of their mean, over that of one: the square root of
-        c + (1 - c) / m for m readings that have the share c of their error variance in common.
-    repeat_coverage_factor : ndarray, shape (k, q)
-        Half-width of the 90 % interval of their mean, in its own standard deviations.
-    key : str
-        Checksum of all of these.
+    rows (n,): Number of each row in the data file, rising.
+    truth, mean, std (n, q): True values and the file's estimates, in SI units.
+    average_rows (g,): Number of the first row of each run of `repeats[-1]` readings of one soil at
+        one slip and load, rising; empty where the data have no such runs.
+    average_truth, average_mean, average_std (g, q): Their true values, and the averages of the
+        file's estimates and standard deviations.
+    repeats (k,): Numbers of readings of one soil at one slip and load, from 1.
+    repeat_std (k, q): Standard deviation of the error of their mean, over that of one: the square
+        root of c + (1 - c) / m for m readings that have the share c of their error variance in
+        common.
+    repeat_coverage_factor (k, q): Half-width of the 90 % interval of their mean, in its own
+        standard deviations.
+    key: Checksum of all of these.
     """
 
     rows: NDArray[np.int64]

@@ -35,24 +35,19 @@ class JointErrors:
     standardised errors. What a common soil does to two sensors, and the common prior, are part of
     these errors.
 
-    Attributes
-    ----------
-    correlation : ndarray, shape (m, m)
-        R, about zero.
-    alone : int or None
-        The file that is better alone than the combination; None where the combination is better.
-    centre, gain : float
-        The combination's distance from the centre is multiplied by the gain: each estimate is drawn
-        towards the mean of the prior, and the combination of two is drawn too far.
-    std_scale : float
-        Factor on the fused standard deviation, so that squared standardised errors average to 1.
-    middles, low, high : ndarray, shape (bins,)
-        Fused means, and the 5 % and 95 % quantiles of true value minus mean there, in fused
-        standard deviations.
-    repeats, repeat_std, repeat_interval : float
-        Number of repeated readings of each sensor, and the factors that their averages need on the
-        fused standard deviation and on the interval; between 1 and this number the factors are
-        interpolated in its logarithm. 1 where the data have no repeated readings.
+    correlation (m, m): R, about zero.
+    alone: The file that is better alone than the combination; None where the combination is better.
+    centre, gain: The combination's distance from the centre is multiplied by the gain: each
+        estimate is drawn towards the mean of the prior, and the combination of two is drawn too
+        far.
+    std_scale: Factor on the fused standard deviation, so that squared standardised errors average
+        to 1.
+    middles, low, high (bins,): Fused means, and the 5 % and 95 % quantiles of true value minus mean
+        there, in fused standard deviations.
+    repeats, repeat_std, repeat_interval: Number of repeated readings of each sensor, and the
+        factors that their averages need on the fused standard deviation and on the interval;
+        between 1 and this number the factors are interpolated in its logarithm. 1 where the data
+        have no repeated readings.
 
     References
     ----------
@@ -77,15 +72,10 @@ class JointErrors:
     ) -> tuple[Floats, Floats, Floats]:
         """Fused mean and standard deviation, and disagreement, (n,), of estimates (m, n).
 
-        Parameters
-        ----------
-        mean, std : ndarray, shape (m, n)
-            Estimates, or averages of the estimates of repeated readings.
-        ratio : ndarray, shape (m,)
-            Standard deviation of each over that of a single reading: what independent noise loses
-            by repetition, the correlation of the rest gains.
-        count : float
-            Number of readings in an average; the geometric mean where it differs.
+        mean, std (m, n): Estimates, or averages of the estimates of repeated readings.
+        ratio (m,): Standard deviation of each over that of a single reading: what independent noise
+            loses by repetition, the correlation of the rest gains.
+        count: Number of readings in an average; the geometric mean where it differs.
         """
         correlation = self.correlation
         if (ratio != 1.0).any():

@@ -94,11 +94,8 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     metadata : dict of str to str
         All metadata of the file.
 
-    Raises
-    ------
-    ModelFileError
-        For a file that cannot be read, was not written by `soilml train`, has another format, or
-        is damaged.
+    Raises `ModelFileError` for a file that cannot be read, was not written by `soilml train`, has
+    another format, or is damaged.
     """
     file = find_model(path)
     content = _read_content(file)

@@ -28,14 +28,9 @@ LEAST_MASS = 1e-4
 class BoxMoments:
     """Of a distribution of q quantities in a box: moments, 90 % interval, and its mass.
 
-    Attributes
-    ----------
-    mean, std, low, high
-        (q,).
-    covariance
-        (q, q).
-    mass
-        Probability of the box before the distribution was cut.
+    mean, std, low, high: (q,).
+    covariance: (q, q).
+    mass: Probability of the box before the distribution was cut.
     """
 
     mean: Floats
@@ -119,14 +114,9 @@ def within_box(
     prior. Cut to the prior it should give the estimate back; the difference, which stems from an
     estimate that is not normal, is carried over to the cut by the box.
 
-    Parameters
-    ----------
-    mean, covariance
-        Estimate, (q,) and (q, q).
-    interval
-        Ends of its 90 % interval, (2, q).
-    prior, box
-        Ends of the uniform prior of the estimate, and of the narrower one; (q,) each.
+    mean, covariance: Estimate, (q,) and (q, q).
+    interval: Ends of its 90 % interval, (2, q).
+    prior, box: Ends of the uniform prior of the estimate, and of the narrower one; (q,) each.
     """
     width = prior[1] - prior[0]
     readings_mean, readings_covariance = _without_prior(mean, covariance, *prior)

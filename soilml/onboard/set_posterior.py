@@ -67,21 +67,13 @@ POSITIVE_STD = 1e-300
 class SetPosterior:
     """The part of a model file's graph that estimates from sets of rows.
 
-    Parameters
-    ----------
-    terms : int
-        Number of monomials.
-    noise : dict
-        Noise model by name: constant part, and share of the reading.
-    context_ranges : dict
-        Least and largest value of each context input, which holds for a whole set.
-    context_values : dict
-        Values of the context inputs that were set.
-    sets_only : bool
-        Whether the file has no regressors of single rows.
-    common_errors : dict
-        Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`; none in a file
-        of an earlier version. They have `error_columns` columns in the residual system.
+    terms: Number of monomials.
+    noise: Noise model by name: constant part, and share of the reading.
+    context_ranges: Least and largest value of each context input, which holds for a whole set.
+    context_values: Values of the context inputs that were set.
+    sets_only: Whether the file has no regressors of single rows.
+    common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`; none
+        in a file of an earlier version. They have `error_columns` columns in the residual system.
     """
 
     terms: int
@@ -119,10 +111,7 @@ class SetPosterior:
     def with_context(self, context: Mapping[str, Any], noise: Mapping[str, Any]) -> SetPosterior:
         """A copy with context inputs (wheel, bearing values, prior) and noise set.
 
-        Raises
-        ------
-        InputError
-            If a name is not known, or a value is out of the range of the file.
+        Raises `InputError` if a name is not known, or a value is out of the range of the file.
         """
         parts = {name: _noise_parts(name, value) for name, value in _items("noise", noise)}
         for name in OPERATING_NOISE:
@@ -153,16 +142,11 @@ class SetPosterior:
     def rows(self, measured: Mapping[str, Any]) -> dict[str, Floats]:
         """Row inputs of the graph (m,) from readings, checked and completed.
 
-        Parameters
-        ----------
-        measured : mapping
-            Slip, torque and load; optionally sinkage and drawbar pull, NaN where they were not
-            measured, and standard deviations. Numbers or arrays that broadcast to one shape.
+        measured: Slip, torque and load; optionally sinkage and drawbar pull, NaN where they were
+            not measured, and standard deviations. Numbers or arrays that broadcast to one shape.
 
-        Raises
-        ------
-        InputError
-            If a reading is missing, not finite, out of its physical range, or not an input.
+        Raises `InputError` if a reading is missing, not finite, out of its physical range, or not
+        an input.
         """
         for name in measured:
             if name not in KNOWN:
@@ -307,10 +291,8 @@ def error_columns(metadata: Mapping[str, Any]) -> int:
 def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> dict[str, float]:
     """The errors that a file assumes, with those among the given values that a user sets.
 
-    Raises
-    ------
-    InputError
-        If a value is negative or not finite, or if the file takes what has this error as exact.
+    Raises `InputError` if a value is negative or not finite, or if the file takes what has this
+    error as exact.
     """
     own = {name: float(given[name]) for name in COMMON_ERROR_INPUTS if name in given}
     for name, value in own.items():
@@ -343,14 +325,9 @@ def estimate_of_set(
 ) -> Estimate:
     """The estimate with its reason.
 
-    Parameters
-    ----------
-    names, units, prior
-        As in `Estimate`.
-    outputs : sequence
-        Outputs of the graph in the order of `SET_OUTPUTS`.
-    memory : Memory
-        The memory with these rows.
+    names, units, prior: As in `Estimate`.
+    outputs: Outputs of the graph in the order of `SET_OUTPUTS`.
+    memory: The memory with these rows.
     """
     mean, std, covariance, low, high = (x.astype(np.float64) for x in outputs[:5])
     in_range, (_, rows, rows_used) = bool(outputs[5][0]), memory.counts.tolist()

@@ -70,14 +70,9 @@ def estimates_of_rows(
 ) -> Estimate:
     """An estimate for every row of a table; one that is not usable counts as out of range.
 
-    Parameters
-    ----------
-    readings
-        Inputs (usable rows,) by name.
-    usable
-        Rows (rows,) that have all readings.
-    done
-        Is given the number of rows that are estimated, after each block.
+    readings: Inputs (usable rows,) by name.
+    usable: Rows (rows,) that have all readings.
+    done: Is given the number of rows that are estimated, after each block.
     """
     result, index = estimator.prior_estimate(len(usable)), np.flatnonzero(usable)
     for first in range(0, index.size, ROWS_PER_CALL):

@@ -32,17 +32,10 @@ def current_device() -> str | None:
 def computing_on(device: str) -> Iterator[None]:
     """Within it, models solve numpy rows by torch on a device, and give numpy arrays back.
 
-    Parameters
-    ----------
-    device
-        As torch names it: "cuda", "cuda:1"; "cpu" solves by torch on this processor.
+    device: As torch names it: "cuda", "cuda:1"; "cpu" solves by torch on this processor.
 
-    Raises
-    ------
-    InputError
-        Where torch has no such device or it lacks float64, or its memory does not suffice.
-    MissingLibraryError
-        Where torch is not installed.
+    Raises `InputError` where torch has no such device or it lacks float64, or its memory does not
+    suffice; `MissingLibraryError` where torch is not installed.
     """
     try:
         import torch

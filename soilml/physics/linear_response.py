@@ -43,20 +43,12 @@ def linear_response(
     row, and W_0 the load to be carried. Effects on readings act on the result. Second-order terms
     are left out; at a base row, where the differences vanish, the readings are exact.
 
-    Parameters
-    ----------
-    load_case : LoadCase
-        Parameters of shape () or (batch,), from `soilml.physics.model.flattened`.
-    base : array (batch,)
-        Index of the base row of each row; that of a base row is its own.
-    estimate : SinkageEstimate, optional
-        Of the base rows, in increasing order of their index.
+    load_case: Parameters of shape () or (batch,), from `soilml.physics.model.flattened`.
+    base (batch,): Index of the base row of each row; that of a base row is its own.
+    estimate: Of the base rows, in increasing order of their index.
 
-    Returns
-    -------
-    LinearResponse
-        NaN in rows whose base row has no equilibrium, or where the load carried does not rise
-        with sinkage there.
+    Returns: NaN in rows whose base row has no equilibrium, or where the load carried does not rise
+    with sinkage there.
 
     References
     ----------

@@ -25,20 +25,12 @@ def load_effects(path: str | os.PathLike[str]) -> dict[str, type[Effect]]:
     whose names begin with an underscore are ignored. The file may do all that Python may: load only
     what you would run.
 
-    Parameters
-    ----------
-    path
-        The Python file.
+    path: The Python file.
 
-    Returns
-    -------
-    dict
-        Effect class by name, in order of definition.
+    Returns: Effect class by name, in order of definition.
 
-    Raises
-    ------
-    InputError
-        One line, for a file that does not run and for a class that is not a valid effect.
+    Raises `InputError`: One line, for a file that does not run and for a class that is not a valid
+    effect.
     """
     module = _run(Path(path))
     effects: dict[str, type[Effect]] = {}

@@ -87,18 +87,11 @@ def short_label(text: str) -> str:
 def take_axes(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> NDArray[Any]:
     """The axes (rows, columns) that a `plot` method draws into.
 
-    Parameters
-    ----------
-    ax
-        Axes of matplotlib, or a sequence or array of rows times columns of them; None for a new
+    ax: Axes of matplotlib, or a sequence or array of rows times columns of them; None for a new
         figure of pyplot.
-    size
-        Width and height of a new figure, inches.
+    size: Width and height of a new figure, inches.
 
-    Raises
-    ------
-    InputError
-        For another number of axes.
+    Raises `InputError` for another number of axes.
     """
     if ax is None:
         from matplotlib import pyplot

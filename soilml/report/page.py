@@ -103,25 +103,15 @@ class ReportPicture:
 class Report:
     """What a page says.
 
-    Attributes
-    ----------
-    kind
-        The command that made it.
-    title
-        What was asked, in words.
-    badge, meaning
-        The verdict in a word or two, and the rest of that sentence.
-    answer
-        Sentences with units and intervals, the main one first.
-    tone
-        Colour of the verdict: `named` (blue), `no-gap` (green), `suspected` (yellow) or `bad-data`
-        (red), or another status of the gap analysis.
-    warnings
-        Flags, abstentions and limits.
-    next_steps
-        What to do next.
-    notation
-        Terms of the footer, with their meaning.
+    kind: The command that made it.
+    title: What was asked, in words.
+    badge, meaning: The verdict in a word or two, and the rest of that sentence.
+    answer: Sentences with units and intervals, the main one first.
+    tone: Colour of the verdict: `named` (blue), `no-gap` (green), `suspected` (yellow) or
+        `bad-data` (red), or another status of the gap analysis.
+    warnings: Flags, abstentions and limits.
+    next_steps: What to do next.
+    notation: Terms of the footer, with their meaning.
     """
 
     kind: str
@@ -159,12 +149,8 @@ def page(report: Report, origin: Provenance) -> str:
 def render(template: str, package: str, command: str, **content: Any) -> str:
     """A template that extends `report.html.j2`, from the folder of its package, as HTML.
 
-    Parameters
-    ----------
-    command
-        The command that is named where jinja2 is missing.
-    content
-        Variables of the template; `page` is a `Report`, `origin` a `Provenance`.
+    command: The command that is named where jinja2 is missing.
+    content: Variables of the template; `page` is a `Report`, `origin` a `Provenance`.
     """
     need("jinja2", command)
     return _environment(package).get_template(template).render(**content)

@@ -29,16 +29,10 @@ _LONG = 41
 class ParameterIntervals:
     """Estimates of p parameters in g results, in SI units.
 
-    Attributes
-    ----------
-    names, units
-        Of the parameters (p,).
-    labels
-        Of the results (g,).
-    values, low, high
-        Estimates and ends of their 90 % intervals, (g, p); NaN where there is none.
-    prior_low, prior_high
-        Ends of what was known before, (p,); NaN where that is not stated.
+    names, units: Of the parameters (p,).
+    labels: Of the results (g,).
+    values, low, high: Estimates and ends of their 90 % intervals, (g, p); NaN where there is none.
+    prior_low, prior_high: Ends of what was known before, (p,); NaN where that is not stated.
     """
 
     names: Sequence[str]

@@ -65,15 +65,9 @@ def goals(results: Sequence[PairedResult]) -> list[Goal]:
     - the Bayes limit itself: 88 to 92 % coverage of 90 % highest-density regions;
     - the prior, analytic methods and linear regression are baselines without a goal.
 
-    Parameters
-    ----------
-    results
-        What `benchmark` returns; it must contain the results of the Bayes limit.
+    results: What `benchmark` returns; it must contain the results of the Bayes limit.
 
-    Returns
-    -------
-    list of Goal
-        First the check of the limit, then the goals by method.
+    Returns: First the check of the limit, then the goals by method.
     """
     modelled = [r for r in results if not r.effect]
     limit = [r for r in modelled if r.kind is MethodKind.BAYES_LIMIT]

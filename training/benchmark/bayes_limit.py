@@ -104,20 +104,13 @@ def exact_posterior(
 ) -> PosteriorSummary:
     """The posterior of one set's torques, by the sampler of the `posterior` method.
 
-    Parameters
-    ----------
-    case
-        Model, priors and noise of the simulation.
-    table
-        Slips, loads (N) and torques (N m) of one soil.
-    truth
-        True values (q,) of the parameters.
-    names
-        The parameters.
-    inflate_noise
-        Treat a flagged set as the `posterior` method does: with a noise standard deviation that is
-        larger by the root of the reduced chi-square. False for the Bayes limit itself, because the
-        noise level is known there: large residuals are rare noise.
+    case: Model, priors and noise of the simulation.
+    table: Slips, loads (N) and torques (N m) of one soil.
+    truth: True values (q,) of the parameters.
+    names: The parameters.
+    inflate_noise: Treat a flagged set as the `posterior` method does: with a noise standard
+        deviation that is larger by the root of the reduced chi-square. False for the Bayes limit
+        itself, because the noise level is known there: large residuals are rare noise.
 
     Notes
     -----

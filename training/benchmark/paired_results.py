@@ -211,11 +211,9 @@ def jackknife_rmse_ratio_std(squares: Floats, reference_squares: Floats) -> Floa
 
     with r_(i) the ratio of the RMSE values without set i. One set alone has none: NaN.
 
-    Parameters
-    ----------
-    squares, reference_squares
-        Squared errors (n, q) of the method and of its reference. They are paired: because both
-        errors are correlated, the standard error is smaller than that of either RMSE alone.
+    squares, reference_squares: Squared errors (n, q) of the method and of its reference. They are
+        paired: because both errors are correlated, the standard error is smaller than that of
+        either RMSE alone.
 
     References
     ----------

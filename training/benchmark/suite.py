@@ -79,34 +79,21 @@ def benchmark(
 ) -> list[PairedResult]:
     """Score methods on the fixed sets of the packaged recipe, next to their Bayes limit.
 
-    Parameters
-    ----------
-    estimators
-        Model files by label, on the wheel of the recipe (see `for_simulated_case`).
-    functions
-        Methods of the caller by label: slips (1), torques (N m) and loads (N) of one soil, each
-        (rows,), to the mean (3,) and the standard deviation (3,) or covariance (3, 3) of cohesion
-        (Pa), friction angle (rad) and shear modulus (m). A `FitError` counts as a failed set.
-    max_sets
-        Number of sets of each design, in order; all where it is None.
-    limit
-        File of `soilml compare --limit`; the packaged one where it is None.
-    progress
-        Called with a description, the number of estimates done, and their total.
-    analytic
-        Names of the analytic methods.
+    estimators: Model files by label, on the wheel of the recipe (see `for_simulated_case`).
+    functions: Methods of the caller by label: slips (1), torques (N m) and loads (N) of one soil,
+        each (rows,), to the mean (3,) and the standard deviation (3,) or covariance (3, 3) of
+        cohesion (Pa), friction angle (rad) and shear modulus (m). A `FitError` counts as a failed
+        set.
+    max_sets: Number of sets of each design, in order; all where it is None.
+    limit: File of `soilml compare --limit`; the packaged one where it is None.
+    progress: Called with a description, the number of estimates done, and their total.
+    analytic: Names of the analytic methods.
 
-    Returns
-    -------
-    list of PairedResult
-        For each design, without and with unmodelled effects: the Bayes limit first (with an effect,
-        `analytic posterior`), then all methods.
+    Returns: For each design, without and with unmodelled effects: the Bayes limit first (with an
+    effect, `analytic posterior`), then all methods.
 
-    Raises
-    ------
-    InputError
-        Where `limit` lacks a set or is stale, an estimator has other parameters, or two methods
-        have one label.
+    Raises `InputError` where `limit` lacks a set or is stale, an estimator has other parameters, or
+    two methods have one label.
 
     Examples
     --------

@@ -47,27 +47,16 @@ def check_same_provenance(
 
     Test data and estimators without a recipe are not checked.
 
-    Parameters
-    ----------
-    case
-        The model file.
-    table
-        The test data, with their recipe in its metadata.
-    estimators
-        Estimators by label, each with the recipe of its training data in its metadata.
-    names
-        The parameters compared, whose priors must agree.
+    case: The model file.
+    table: The test data, with their recipe in its metadata.
+    estimators: Estimators by label, each with the recipe of its training data in its metadata.
+    names: The parameters compared, whose priors must agree.
 
-    Returns
-    -------
-    list of Remark
-        A note `trained-otherwise` for each difference in soil, effects or prior between the case
-        and the training data of an estimator: such an estimator is compared nevertheless.
+    Returns: A note `trained-otherwise` for each difference in soil, effects or prior between the
+    case and the training data of an estimator: such an estimator is compared nevertheless.
 
-    Raises
-    ------
-    InputError
-        Where the test data differ from the case, or an estimator is of another wheel.
+    Raises `InputError` where the test data differ from the case, or an estimator is of another
+    wheel.
     """
     test = recipe_case(table.metadata.get("soilml_recipe", "{}"), table.source)
     trained = {label: recipe_case(e.metadata["recipe"], e.path) for label, e in estimators.items()}
@@ -101,19 +90,13 @@ class MethodScores(list[MethodResult]):
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the RMSE over the prior's standard deviation, and the coverage of 90 % intervals.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib, two for each of q parameters; a new figure where None.
+        ax: Axes of matplotlib, two for each of q parameters; a new figure where None.
 
         Returns
         -------
         ndarray of Axes, shape (2, q)
 
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        Raises `InputError` for another number of axes.
         """
         from training.benchmark.user_report import plot_comparison
 
@@ -133,29 +116,16 @@ def compare(
     lists them in `MethodResult.inputs`. Estimates outside the prior are clipped to it, and a failed
     fit counts as the prior's median.
 
-    Parameters
-    ----------
-    case
-        Model, priors and noise that the analytic methods use.
-    table
-        Test data with the true soil in columns; runs of equal length are the sets.
-    estimators
-        Model files by label; all must estimate the same soil parameters.
-    progress
-        Called with a description, the number of estimates done, and their total.
-    analytic_sets
-        Number of sets of each size for the analytic methods.
+    case: Model, priors and noise that the analytic methods use.
+    table: Test data with the true soil in columns; runs of equal length are the sets.
+    estimators: Model files by label; all must estimate the same soil parameters.
+    progress: Called with a description, the number of estimates done, and their total.
+    analytic_sets: Number of sets of each size for the analytic methods.
 
-    Returns
-    -------
-    MethodScores
-        A list of `MethodResult`, by size of set, then by method; its `plot` draws it.
+    Returns: A list of `MethodResult`, by size of set, then by method; its `plot` draws it.
 
-    Raises
-    ------
-    InputError
-        Where estimators differ in their parameters, a parameter is not a soil parameter, or the
-        table lacks a column of true values.
+    Raises `InputError` where estimators differ in their parameters, a parameter is not a soil
+    parameter, or the table lacks a column of true values.
     """
     first = next(iter(estimators.values()))
     names = first.names

@@ -58,16 +58,10 @@ def measure_held_out(
     Rows that are out of range are left out: the file then answers with the prior. Repeats are runs
     at one slip and load; without `LEAST_GROUPS` of them, repeated readings count as one.
 
-    Parameters
-    ----------
-    predict : callable
-        The file's estimator.
-    data : Dataset
-        Rows that it was neither trained nor scored on.
-    conditions : RunConditions
-        From the training rows.
-    coverage_factor : ndarray, shape (q,)
-        Half-width of the 90 % interval of one reading, in standard deviations.
+    predict: The file's estimator.
+    data: Rows that it was neither trained nor scored on.
+    conditions: From the training rows.
+    coverage_factor (q,): Half-width of the 90 % interval of one reading, in standard deviations.
     """
     mean, std, inside = predict(data.features)
     first = np.asarray([run[0] for run in data.runs()])

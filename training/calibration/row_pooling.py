@@ -59,16 +59,11 @@ def calibrate_pooling(
     the largest likelihood is taken, with the factors that give the intervals their coverage. For a
     pattern with too few runs, pooling does not reduce the uncertainty.
 
-    Parameters
-    ----------
-    mean, covariance : ndarray, shapes (n, q) and (n, q, q)
-        Estimates of the rows of `data`, which were not fitted to.
-    data : Dataset
-        Held-out rows with true values.
-    prior : PriorSummary
-        Prior of the targets.
-    conditions : RunConditions
-        From the training rows.
+    mean, covariance (n, q) and (n, q, q): Estimates of the rows of `data`, which were not fitted
+        to.
+    data: Held-out rows with true values.
+    prior: Prior of the targets.
+    conditions: From the training rows.
     """
     rows = row_groups(data.runs(), 1)
     truth = data.targets[rows[:, 0]]

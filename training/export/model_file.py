@@ -234,24 +234,17 @@ def export_model(
 ) -> dict[str, str]:
     """Write a model file; its bytes depend on the spec and the data only.
 
-    Parameters
-    ----------
-    trained : TrainedModel
-        From `train`.
-    path : str or PathLike
-        The file to write.
-    data_path : str or PathLike
-        The data that it was trained on; their checksum is part of the metadata.
+    trained: From `train`.
+    path: The file to write.
+    data_path: The data that it was trained on; their checksum is part of the metadata.
 
     Returns
     -------
     dict of str to str
         The metadata of the file.
 
-    Raises
-    ------
-    SoilmlError
-        Where the float32 file differs from the float64 original by more than `TOLERANCE`.
+    Raises `SoilmlError` where the float32 file differs from the float64 original by more than
+    `TOLERANCE`.
     """
     model = build_graph(trained)
     parity = _parity(trained, model)

@@ -29,19 +29,12 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
     begins as zeros, and after each step the caller replaces the outgoing state by its triangular
     factor.
 
-    Parameters
-    ----------
-    model
-        An `onnx.ModelProto` with a set posterior.
-    name
-        The model file, for messages.
-    rows
-        Rows of one step.
+    model: An `onnx.ModelProto` with a set posterior.
+    name: The model file, for messages.
+    rows: Rows of one step.
 
-    Raises
-    ------
-    InputError
-        For a file without a set posterior, or one whose shapes depend on more than rows and state.
+    Raises `InputError` for a file without a set posterior, or one whose shapes depend on more than
+    rows and state.
     """
     import onnx
 

@@ -53,23 +53,13 @@ def write_c(
 ) -> CFile:
     """Translate a model file.
 
-    Parameters
-    ----------
-    model : onnx.ModelProto
-        The model with its graph.
-    metadata : mapping of str to str
-        The metadata of the file.
-    name : str
-        Prefix of all C names that a user sees.
-    origin : str
-        Name of the model file, for the comment at the head.
-    rows : int
-        Rows that one step takes at most.
+    model: The model with its graph.
+    metadata: The metadata of the file.
+    name: Prefix of all C names that a user sees.
+    origin: Name of the model file, for the comment at the head.
+    rows: Rows that one step takes at most.
 
-    Raises
-    ------
-    ModelFileError
-        For a graph with an operator, a type or a shape that is not known.
+    Raises `ModelFileError` for a graph with an operator, a type or a shape that is not known.
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 

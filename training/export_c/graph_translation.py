@@ -24,21 +24,12 @@ def translate_graph(
     Nodes whose inputs are constant are computed now, a branch by a constant condition is chosen
     now, and nodes that the outputs do not need are left out.
 
-    Parameters
-    ----------
-    model : onnx.ModelProto
-        The model; its graph may have If nodes.
-    program : Program
-        Receives the statements.
-    inputs : mapping of str to Tensor
-        Inputs of the graph by name: constants, or tensors that the C function is given.
-    outputs : sequence of str
-        Outputs that are computed.
+    model: The model; its graph may have If nodes.
+    program: Receives the statements.
+    inputs: Inputs of the graph by name: constants, or tensors that the C function is given.
+    outputs: Outputs that are computed.
 
-    Raises
-    ------
-    ModelFileError
-        For an operator, or a form of it, that is not known.
+    Raises `ModelFileError` for an operator, or a form of it, that is not known.
     """
     from onnx import numpy_helper
 
@@ -63,11 +54,8 @@ def rows_are_apart(model: Any) -> bool:
 
     They can then be computed without it, and without the answer.
 
-    Raises
-    ------
-    ModelFileError
-        Unless the state is passed on with further rows below it: packed rows are added to a
-        factor in double precision, and earlier ones cannot be changed.
+    Raises `ModelFileError` unless the state is passed on with further rows below it: packed rows
+    are added to a factor in double precision, and earlier ones cannot be changed.
     """
     switch = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_), SET_SWITCH)}
     state, grown = MEMORY_INPUTS[0], MEMORY_OUTPUTS[0]

@@ -55,12 +55,8 @@ class SharedParts:
 class Program:
     """One function of the C file.
 
-    Parameters
-    ----------
-    shared : SharedParts
-        Constants and kernels of the file.
-    bounds : dict of str to int
-        Largest value of each count that sizes depend on.
+    shared: Constants and kernels of the file.
+    bounds: Largest value of each count that sizes depend on.
     """
 
     def __init__(self, shared: SharedParts, bounds: dict[str, int]) -> None:
@@ -198,12 +194,8 @@ class MemoryPlan:
 def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
     """Place every tensor of a program, each as low as its neighbours in time allow.
 
-    Parameters
-    ----------
-    program : Program
-        Statements with the tensors that they touch.
-    kept : frozenset of str
-        Names that are needed after the last statement.
+    program: Statements with the tensors that they touch.
+    kept: Names that are needed after the last statement.
     """
     first: dict[str, int] = {}
     last: dict[str, int] = {}

@@ -38,10 +38,7 @@ IR_VERSION = 9
 class Graph:
     """Nodes and constants of a graph under construction.
 
-    Parameters
-    ----------
-    prefix : str
-        Prefix of the names of all its nodes and constants; branches of one graph need different
+    prefix: Prefix of the names of all its nodes and constants; branches of one graph need different
         ones.
     """
 
@@ -106,10 +103,7 @@ class Graph:
     def rename_last(self, name: str, new: str) -> None:
         """Rename the output of the node that was added last, which nothing reads yet.
 
-        Raises
-        ------
-        ValueError
-            If `name` is not the first output of that node.
+        Raises `ValueError` if `name` is not the first output of that node.
         """
         if not self._nodes or self._nodes[-1].output[0] != name:
             raise ValueError(f"{name} is not the output of the last node; name it right away")
@@ -229,12 +223,8 @@ class Graph:
     ) -> Any:
         """The finished and checked ONNX model.
 
-        Parameters
-        ----------
-        inputs : sequence or mapping
-            Names of float32 inputs of shape [rows], or name -> shape. `SET_SWITCH` is boolean.
-        outputs : mapping
-            Name -> element type and shape.
+        inputs: Names of float32 inputs of shape [rows], or name -> shape. `SET_SWITCH` is boolean.
+        outputs: Name -> element type and shape.
         """
         from onnx import checker, helper
 

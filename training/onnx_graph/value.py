@@ -277,19 +277,12 @@ def cholesky_columns(matrix: Value, count: int) -> Value:
 
     .. math:: l_k = \frac{M^{(k)} e_k}{\sqrt{M^{(k)}_{kk}}}, \qquad M^{(k+1)} = M^{(k)} - l_k l_k^T
 
-    Parameters
-    ----------
-    matrix : Value
-        Second moments (p, p) of points whose first coordinate is 1, so that its first entry is 1,
-        and the first column needs no square root. That column of the factor is the mean of the
+    matrix: Second moments (p, p) of points whose first coordinate is 1, so that its first entry is
+        1, and the first column needs no square root. That column of the factor is the mean of the
         points, and the other columns are the Cholesky factor of their covariance.
-    count : int
-        Number of columns.
+    count: Number of columns.
 
-    Returns
-    -------
-    Value
-        The columns (p, count).
+    Returns: The columns (p, count).
 
     References
     ----------

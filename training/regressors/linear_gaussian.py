@@ -17,10 +17,7 @@ Floats = NDArray[np.float64]
 class LinearGaussian(GaussianRegressor):
     """Mean and log-variance linear in X, by ridge regression.
 
-    Parameters
-    ----------
-    ridge : float
-        Penalty on the weights of standardised inputs, per row.
+    ridge: Penalty on the weights of standardised inputs, per row.
 
     Notes
     -----

@@ -21,14 +21,9 @@ PREDICTED_AT_A_TIME = 4_000_000
 
 
 class KernelExpansion(GaussianRegressor):
-    r"""Prediction and export of regressors of the form :math:`\sum_j \alpha_j k(x, c_j) + b`.
+    r"""Prediction and export of regressors of the form :math:`\sum_j \alpha_j k(x, c_j) + b`."""
 
-    Attributes
-    ----------
-    expansion_ : Expansion
-        Centres, width and weights in standardised units, and how they were selected.
-    """
-
+    # Centres, width and weights in standardised units, and how they were selected
     expansion_: Expansion
 
     @abstractmethod
@@ -100,14 +95,9 @@ class FixedSizeLSSVM(KernelExpansion):
 
     Rows are read in parts: time is proportional to their number, memory hardly depends on it.
 
-    Parameters
-    ----------
-    centres : int
-        Size of the subset, and of the exported model.
-    gamma, width : float or None
-        As for `LSSVM`.
-    random_state : int
-        Seed of the selection of centres.
+    centres: Size of the subset, and of the exported model.
+    gamma, width: As for `LSSVM`.
+    random_state: Seed of the selection of centres.
 
     Notes
     -----
@@ -147,21 +137,15 @@ MOST_EXACT_ROWS = 20_000
 class LSSVM(KernelExpansion):
     """Least squares support vector regression with bias, Gaussian kernel, any number of outputs.
 
-    Parameters
-    ----------
-    solution : {"by-rows", "exact", "fixed-size"}
-        "exact" has a prototype for each row; its time grows with the cube of the number of rows and
-        its memory with the square. "fixed-size" has `centres` prototypes, see `FixedSizeLSSVM`;
-        its time is proportional to the number of rows. "by-rows" is exact up to 20 000 rows.
-    centres : int
-        Prototypes of the fixed-size solution.
-    gamma : float or None
-        Weight of the errors against smoothness; selected if None, by the error on validation rows,
-        or where there are too few by closed-form leave-one-out.
-    width : float or None
-        Kernel width in standardised inputs; selected in the same way if None.
-    random_state : int
-        Seed of the rows on which they are selected, and of the prototypes.
+    solution ({"by-rows", "exact", "fixed-size"}): "exact" has a prototype for each row; its time
+        grows with the cube of the number of rows and its memory with the square. "fixed-size" has
+        `centres` prototypes, see `FixedSizeLSSVM`; its time is proportional to the number of rows.
+        "by-rows" is exact up to 20 000 rows.
+    centres: Prototypes of the fixed-size solution.
+    gamma: Weight of the errors against smoothness; selected if None, by the error on validation
+        rows, or where there are too few by closed-form leave-one-out.
+    width: Kernel width in standardised inputs; selected in the same way if None.
+    random_state: Seed of the rows on which they are selected, and of the prototypes.
 
     Notes
     -----

@@ -22,14 +22,9 @@ FIRST_DECAY, SECOND_DECAY, EPSILON = 0.9, 0.999, 1e-8
 class TanhNetwork:
     r"""Layers :math:`h \mapsto \tanh(h W + b)`, the last without tanh, in single precision.
 
-    Parameters
-    ----------
-    sizes : sequence of int
-        Number of inputs, of units of each hidden layer, and of outputs.
-    generator : numpy.random.Generator
-        Of the first weights, uniform in Glorot's range.
-    last_share : float
-        Share of that range for the last layer.
+    sizes: Number of inputs, of units of each hidden layer, and of outputs.
+    generator: Of the first weights, uniform in Glorot's range.
+    last_share: Share of that range for the last layer.
 
     References
     ----------

@@ -101,14 +101,9 @@ def add_importance_sampler(
     All draws are constants of the graph that are shifted and scaled: the same set gives the same
     answer.
 
-    Parameters
-    ----------
-    family, response : WheelFamily, Response
-        Axes with their priors, and the monomials of the system.
-    context : ContextValues
-        Standard deviations of nearly known axes.
-    system_at : callable
-        Residuals (m, terms) with errors of sensors integrated out.
+    family, response: Axes with their priors, and the monomials of the system.
+    context: Standard deviations of nearly known axes.
+    system_at: Residuals (m, terms) with errors of sensors integrated out.
 
     References
     ----------

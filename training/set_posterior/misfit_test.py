@@ -42,14 +42,9 @@ def add_consistency(counts: Value, limits: MisfitLimits, unknowns: int) -> Consi
 
     The limit is linear in the logarithm of the number of readings between the calibrated numbers.
 
-    Parameters
-    ----------
-    counts : Value
-        Readings in the system, rows, and rows in range, (3,).
-    limits : MisfitLimits
-        The limits.
-    unknowns : int
-        Number of estimated unknowns.
+    counts: Readings in the system, rows, and rows in range, (3,).
+    limits: The limits.
+    unknowns: Number of estimated unknowns.
     """
     readings, rows, rows_in_range = counts.split([1, 1, 1], axis=0)
     knots = np.log(limits.readings)

@@ -54,15 +54,10 @@ class ModelErrors:
         A scale of torque without load changes with the logarithm of torque itself in addition.
         They are zero where the model is right, and then not computed.
 
-        Parameters
-        ----------
-        slopes : Value
-            Derivatives of the channels by log slip and log load, at the same soil,
-            (2, channels, rows).
-        coefficients : Value
-            Coefficients of the channels (terms, readings).
-        basis : Value
-            Monomials (terms, 1) of the soil.
+        slopes: Derivatives of the channels by log slip and log load, at the same soil, (2,
+            channels, rows).
+        coefficients: Coefficients of the channels (terms, readings).
+        basis: Monomials (terms, 1) of the soil.
         """
         size, errors = self.readings[MODEL_ERROR_INPUT], len(MODEL_ERROR_COLUMNS)
         row = coefficients.split([1, len(self.response.terms) - 1], axis=0)[0]

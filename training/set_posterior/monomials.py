@@ -21,14 +21,10 @@ def monomial_terms(
 ) -> Terms:
     """All monomials of some coordinates up to a total degree.
 
-    Parameters
-    ----------
-    coordinates : int
-        Number of coordinates.
-    degree : int
-        Largest total degree of a monomial of any coordinates.
-    leading, leading_degree : int
-        Monomials of the first `leading` coordinates alone are included up to this degree.
+    coordinates: Number of coordinates.
+    degree: Largest total degree of a monomial of any coordinates.
+    leading, leading_degree: Monomials of the first `leading` coordinates alone are included up to
+        this degree.
 
     Returns
     -------

@@ -104,10 +104,7 @@ def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, V
     with r the residuals and r' their derivative (m, n), and the damping :math:`\sigma_0`.
     Steps stay within the box.
 
-    Returns
-    -------
-    tuple of Value
-        The new s and the precision kappa of its conditional posterior, (1, n) each.
+    Returns: The new s and the precision kappa of its conditional posterior, (1, n) each.
     """
     precision = slope.sum_of_squares(axis=0, keepdims=True) + DAMPING_STD**-2
     gradient = (residual * slope).sum(axis=0, keepdims=True)

@@ -47,16 +47,10 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
     A quantile off the grid is at its end. ONNX has no weighted quantile, and sorting each
     parameter's samples would take longer than the rest of the graph.
 
-    Parameters
-    ----------
-    deviations : Value
-        Deviations from the mean, (q, n).
-    std : Value
-        Their standard deviations, (q, 1).
-    weights : Value
-        Weights (1, n) with sum 1.
-    count : int
-        n.
+    deviations: Deviations from the mean, (q, n).
+    std: Their standard deviations, (q, 1).
+    weights: Weights (1, n) with sum 1.
+    count: n.
     """
     segments = len(DISTANCES) - 1
     grid = np.concatenate([-DISTANCES[::-1], DISTANCES]) / SPACING

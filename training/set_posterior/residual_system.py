@@ -75,10 +75,7 @@ class ResidualRows:
         weighted residuals with one standard deviation of such an error, their covariance is
         :math:`I + \sum d d^T`, by which the row is whitened.
 
-        Parameters
-        ----------
-        basis : Value or None
-            Monomials (terms, 1) of the soil at which the residuals' derivatives by slip and load
+        basis: Monomials (terms, 1) of the soil at which the residuals' derivatives by slip and load
             and the other errors are taken; None is the middle of the prior's range, and the system
             is then without columns of errors of the model.
         """

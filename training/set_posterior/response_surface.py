@@ -179,10 +179,8 @@ class Response:
 def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:
     """The response surface of a family, with that of the changes by another contact if it has one.
 
-    Raises
-    ------
-    InputError
-        If fewer than half of the designs carry their load on all soils of the prior.
+    Raises `InputError` if fewer than half of the designs carry their load on all soils of the
+    prior.
     """
     response = _fit(family, family.responses, settings, progress)
     if family.model_errors()["contact"] == 0.0:

@@ -84,14 +84,9 @@ def complete_inputs(
     - A reading that was not measured becomes one with a standard deviation that gives it no weight;
       a larger one than any sensor gives is limited.
 
-    Parameters
-    ----------
-    inputs : mapping of str to Value
-        All inputs of the graph.
-    context : sequence of str
-        Names of those of a whole set.
-    noise : FileNoise
-        Noise of the file.
+    inputs: All inputs of the graph.
+    context: Names of those of a whole set.
+    noise: Noise of the file.
     """
     complete = dict(inputs)
     by_row = [inputs[name] for name in ROWS]

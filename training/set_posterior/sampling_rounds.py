@@ -170,20 +170,12 @@ def sample_round(
     up to constants, with t a draw of the t distribution and c the scale of the proposal. The last
     sum is there if the other coordinates are hyperbolic tangents of the draws z.
 
-    Parameters
-    ----------
-    residuals : PolynomialResiduals
-        The system of the set.
-    axes : tuple of PriorAxis
-        The axes of the family, whose `tilt` is the lambda of their prior.
-    others : Value
-        1, and the other coordinates, within the box (p, n).
-    solved : tuple of Value
-        Mode and precision of the solved coordinate given the others, (1, n) each.
-    draws : ProposalDraws
-        The draws t of the round, and the log density of all draws.
-    log_jacobian : Value, optional
-        log(1 - x_i^2) of the other coordinates (p - 1, n).
+    residuals: The system of the set.
+    axes: The axes of the family, whose `tilt` is the lambda of their prior.
+    others: 1, and the other coordinates, within the box (p, n).
+    solved: Mode and precision of the solved coordinate given the others, (1, n) each.
+    draws: The draws t of the round, and the log density of all draws.
+    log_jacobian: log(1 - x_i^2) of the other coordinates (p - 1, n).
     """
     mode, precision = solved
     proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)

@@ -75,16 +75,10 @@ def add_sensor_errors(
     :math:`(f_1' + 1) e`, :math:`f_2' e` and :math:`(f_3' + f_3) e`, with f' the derivatives by the
     logarithm of load.
 
-    Parameters
-    ----------
-    context : ContextValues
-        How the torque scale depends on load.
-    readings : dict
-        Standard deviations by input name.
-    operating : OperatingReadings
-        Slip and load of the rows.
-    y : Value
-        Readings on the scales of the channels, (channels, rows).
+    context: How the torque scale depends on load.
+    readings: Standard deviations by input name.
+    operating: Slip and load of the rows.
+    y: Readings on the scales of the channels, (channels, rows).
     """
     torque, pull = np.zeros((2, 2, CHANNELS, 1))
     torque[1, 0], pull[1, 2] = context.torque_by_load, 1.0
@@ -142,12 +136,8 @@ def integrate_out_errors(system: Value, terms: int, errors: int) -> Value:
 
     As `whiten_rows`, with all readings in place of the channels of one row.
 
-    Parameters
-    ----------
-    system : Value
-        Rows (w a, w g), (m, terms + errors).
-    terms, errors : int
-        Number of monomials, and of errors.
+    system: Rows (w a, w g), (m, terms + errors).
+    terms, errors: Number of monomials, and of errors.
     """
     one = constant(system.graph, np.ones((1, 1)))
     for last in range(terms + errors - 1, terms - 1, -1):

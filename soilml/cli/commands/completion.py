@@ -91,12 +91,9 @@ def candidates(
 ) -> list[str]:
     """What the last word may become, after the words before it.
 
-    Parameters
-    ----------
-    make_parser
-        Gives the parser of a command, and of all without one; see `soilml.cli.main.parser`.
-    words
-        Those after `soilml`; the last one is being typed, and may be empty.
+    make_parser: Gives the parser of a command, and of all without one; see
+        `soilml.cli.main.parser`.
+    words: Those after `soilml`; the last one is being typed, and may be empty.
     """
     *before, typed = words
     if not before:

@@ -202,12 +202,8 @@ def _write_results(
 ) -> None:
     """Write --out, --picture and --report as one set; then text, or CSV into a pipe.
 
-    Parameters
-    ----------
-    found
-        Results by group of --by; one under "" without groups.
-    failed
-        Why other groups have none.
+    found: Results by group of --by; one under "" without groups.
+    failed: Why other groups have none.
     """
     import numpy as np
 

@@ -154,15 +154,10 @@ def estimate_covariance(
         -2 \ln p = \ln|V| + \ln|X^T V^{-1} X| + r^T P r + \text{prior}, \quad
         V = D_\rho + \sum_k \tau_k^2 J_k J_k^T
 
-    Parameters
-    ----------
-    columns : array (m, 2)
-        J, from `run_effect_columns`.
-    residual : array (m,)
-        r, the residuals of any fit.
-    space : array (m, q)
-        X, all that soil, effects and smooth functions could explain: the fixed effects. Only the
-        component of the residuals outside its span contributes to the estimate.
+    columns (m, 2): J, from `run_effect_columns`.
+    residual (m,): r, the residuals of any fit.
+    space (m, q): X, all that soil, effects and smooth functions could explain: the fixed effects.
+        Only the component of the residuals outside its span contributes to the estimate.
 
     References
     ----------

@@ -201,10 +201,7 @@ class HoldoutSplit:
 def split_holdout(table: Table, holdout: str | None, seed: int) -> HoldoutSplit:
     """Split a table by `run` (a quarter of the runs, at random) or by `COLUMN=VALUE`.
 
-    Raises
-    ------
-    InputError
-        For another text, for too few runs, or where no row remains to analyse.
+    Raises `InputError` for another text, for too few runs, or where no row remains to analyse.
     """
     if holdout is None:
         return HoldoutSplit(table)

@@ -114,13 +114,9 @@ class DiscrepancyModel:
         with the residual r, the Jacobian X and the priors' precision P. The second term is the
         improvement by a step to the optimum under V, where the fit was made under another one.
 
-        Parameters
-        ----------
-        start : array (channels,), optional
-            Amplitudes at which the search begins.
-        extra : array (m, k), optional
-            Signatures of further effects, in the readings' unit per reference size, which are
-            treated as linear.
+        start (channels,): Amplitudes at which the search begins.
+        extra (m, k): Signatures of further effects, in the readings' unit per reference size, which
+            are treated as linear.
 
         References
         ----------
@@ -232,10 +228,8 @@ def outside_bounds(fit: Solution, gradient: Floats, curvature: Floats) -> float:
     coordinates free. Correlations of these integrals are neglected. An explanation that presses
     the soil against its priors counts for less.
 
-    Parameters
-    ----------
-    gradient, curvature : arrays (p,), (p, p)
-        Of ln p at the fit, with further effects after the fit's own coordinates.
+    gradient, curvature (p,), (p, p): Of ln p at the fit, with further effects after the fit's own
+        coordinates.
     """
     low = np.asarray([c.lower for c in fit.coordinates])
     high = np.asarray([c.upper for c in fit.coordinates])

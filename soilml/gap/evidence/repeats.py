@@ -28,16 +28,11 @@ MIN_FRACTION_FOR_PERCENT = 0.1
 class RepeatComparison:
     """How the readings of one channel differ between replicate rows.
 
-    Attributes
-    ----------
-    channel
-        Name of the channel, such as ``torque``.
-    chi_square, degrees_of_freedom
-        Squared differences in units of their covariance, and their number.
-    p_value
-        Probability of a chi-square as large by chance.
-    sentence
-        The pair that differs most in standard deviations, in words and units.
+    channel: Name of the channel, such as ``torque``.
+    chi_square, degrees_of_freedom: Squared differences in units of their covariance, and their
+        number.
+    p_value: Probability of a chi-square as large by chance.
+    sentence: The pair that differs most in standard deviations, in words and units.
     """
 
     channel: str
@@ -61,20 +56,14 @@ def repeat_disagreement(
 
     where the rows of C subtract the first reading of each group of repeats from its others.
 
-    Parameters
-    ----------
-    readings : Readings
-        m readings.
-    covariance : array (m, m), optional
-        V, of the readings: declared noise and usual scatter from run to run. The declared noise
-        alone by default. Noise that was scaled up to fit the residuals would hide a disagreement.
-    expected : array (m,), optional
-        Predictions, whose small differences within the tolerance of a repeat are subtracted.
+    readings: m readings.
+    covariance (m, m): V, of the readings: declared noise and usual scatter from run to run. The
+        declared noise alone by default. Noise that was scaled up to fit the residuals would hide a
+        disagreement.
+    expected (m,): Predictions, whose small differences within the tolerance of a repeat are
+        subtracted.
 
-    Returns
-    -------
-    list of RepeatComparison
-        Of the channels with repeats, the least probable first.
+    Returns: Of the channels with repeats, the least probable first.
 
     References
     ----------

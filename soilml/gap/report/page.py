@@ -37,12 +37,8 @@ from soilml.report.page import Provenance, Report, render
 def page(report: GapReport, model: str, runs: str, origin: Provenance | None = None) -> str:
     """The report as HTML.
 
-    Parameters
-    ----------
-    model, runs : str
-        Names of the analysed files.
-    origin : Provenance, optional
-        The command and its files; by default the call of `soilml.gap.gap` in Python.
+    model, runs: Names of the analysed files.
+    origin: The command and its files; by default the call of `soilml.gap.gap` in Python.
     """
     for library in ("jinja2", "matplotlib"):
         need(library, "gap")

@@ -23,10 +23,7 @@ NOTABLE_DISCREPANCY = 0.3
 def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
     """The verdict in words.
 
-    Parameters
-    ----------
-    model_effects : sequence of str
-        Names of the effects that the model had before the analysis.
+    model_effects: Names of the effects that the model had before the analysis.
     """
     names = " + ".join(
         f"{e.name} (the model has it at another size)" if e.name in model_effects else e.name

@@ -118,12 +118,8 @@ def posterior(
 ) -> Posterior:
     """Posterior probabilities of the candidates and of effects that were not fitted in full.
 
-    Parameters
-    ----------
-    predicted : mapping
-        Predicted decrease of the objective by each single effect.
-    none : Explanation
-        The soil alone.
+    predicted: Predicted decrease of the objective by each single effect.
+    none: The soil alone.
     """
     objectives = {c.names: c.objective for c in candidates}
     for name, gain in predicted.items():

@@ -118,12 +118,8 @@ def effects_to_fit(
     the law of the cause may be another one. Several predictions are therefore made, and the best of
     each are selected, together with those that were within reach of the best in an earlier search.
 
-    Parameters
-    ----------
-    none, soil : Explanation, Solution
-        The soil alone, beside a discrepancy and under noise alone.
-    gains : mapping
-        Predicted decrease of the objective by each effect.
+    none, soil: The soil alone, beside a discrepancy and under noise alone.
+    gains: Predicted decrease of the objective by each effect.
     """
     selected = _largest_gains(gains)
     ranked = [_first(free_law_gains(problem, none, f, signatures)) for f in (none.fit, soil)]

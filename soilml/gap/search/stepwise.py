@@ -124,14 +124,9 @@ def search(
     close to the best, with free shapes too. Sets within reach of the best are extended by one
     effect while that increases the evidence.
 
-    Parameters
-    ----------
-    soil : Solution
-        The soil alone, fitted under noise and scatter without discrepancy.
-    starts : mapping
-        Candidates of an earlier search.
-    progress : callable
-        Called with the share of the search that is done, from 0 to 1.
+    soil: The soil alone, fitted under noise and scatter without discrepancy.
+    starts: Candidates of an earlier search.
+    progress: Called with the share of the search that is done, from 0 to 1.
     """
     starts = starts or {}
     signatures, untestable = effect_signatures(soil.fitted(), problem.readings, problem.effects)

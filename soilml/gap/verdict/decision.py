@@ -67,12 +67,8 @@ def decide(
 ) -> Decision:
     """The status of a report; see `soilml.gap.report.results.STATUSES`.
 
-    Parameters
-    ----------
-    naming_obstacles : sequence of Remark
-        Why these runs cannot identify a cause.
-    disagreements : sequence of Remark
-        Measurements that disagree with each other, which forbid a verdict without a gap.
+    naming_obstacles: Why these runs cannot identify a cause.
+    disagreements: Measurements that disagree with each other, which forbid a verdict without a gap.
     """
     if not result.has_gap:
         return Decision("undecided" if disagreements else "no-gap", (), None)

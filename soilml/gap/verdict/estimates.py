@@ -130,10 +130,8 @@ def equivalent_std(offset: Floats, std: Floats, weight: Floats) -> float:
     A mixture's own standard deviation depends on its tails: where an unlikely component lies far
     away, 1.645 of them hold far more than 90 %.
 
-    Parameters
-    ----------
-    offset, std, weight : arrays (n,)
-        Mean, standard deviation and weight of each component; weights need not sum to one.
+    offset, std, weight (n,): Mean, standard deviation and weight of each component; weights need
+        not sum to one.
     """
     from scipy.special import ndtr
 

@@ -37,40 +37,23 @@ _EFFORT = 0.1
 
 @dataclass
 class Inputs:
-    """Samples of the channels of one wheel.
+    """Samples of the channels of one wheel."""
 
-    Attributes
-    ----------
-    time
-        Grid (n,), s after the start of the run.
-    values
-        Samples (n,) by role, as the sensors see them: before gearboxes.
-    places
-        Roles that were given as angle or place, of which `values` has the rates under
-        `wheel_speed` and `ground_speed`; here as they were given.
-    intervals
-        Sampling interval of the places in the log, s, by role; on the grid they are interpolated.
-    constants
-        Roles that do not vary, with their value.
-    rest
-        Mean at rest and its standard error by role; empty where the wheel never rests.
-    tare
-        What was subtracted by role.
-    tare_error
-        Standard error of the tare by role.
-    notes
-        What was tared, and what could not be.
-    """
-
-    time: Floats
+    time: Floats  # Grid (n,), s after the start of the run
+    # Samples (n,) by role, as the sensors see them: before gearboxes
     values: dict[str, Floats] = field(default_factory=dict)
+    # Roles that were given as angle or place, of which `values` has the rates under `wheel_speed`
+    # and `ground_speed`; here as they were given
     places: dict[str, Floats] = field(default_factory=dict)
+    # Sampling interval of the places in the log, s, by role; on the grid they are interpolated
     intervals: dict[str, float] = field(default_factory=dict)
+    # Roles that do not vary, with their value
     constants: dict[str, float] = field(default_factory=dict)
+    # Mean at rest and its standard error by role; empty where the wheel never rests
     rest: dict[str, tuple[float, float]] = field(default_factory=dict)
-    tare: dict[str, float] = field(default_factory=dict)
-    tare_error: dict[str, float] = field(default_factory=dict)
-    notes: list[Remark] = field(default_factory=list)
+    tare: dict[str, float] = field(default_factory=dict)  # What was subtracted by role
+    tare_error: dict[str, float] = field(default_factory=dict)  # Standard error of the tare by role
+    notes: list[Remark] = field(default_factory=list)  # What was tared, and what could not be
 
     @property
     def step(self) -> float:

@@ -51,19 +51,12 @@ def wheel_quantities(
 ) -> dict[str, Any]:
     """Quantities (...) of a wheel from its channels (...), in SI units.
 
-    Parameters
-    ----------
-    values
-        Channels by role, as their sensors see them; `wheel_speed` and `ground_speed` are rates.
-    constants
-        Values of `constants_of`.
+    values: Channels by role, as their sensors see them; `wheel_speed` and `ground_speed` are rates.
+    constants: Values of `constants_of`.
 
-    Returns
-    -------
-    dict
-        `rim_speed` and `speed` (m/s), `slip`, `torque`, `load`, `drawbar_pull`, `sinkage`, as far
-        as the channels give them. In reverse, torque and drawbar pull are positive along the
-        travel and the speed is below zero.
+    Returns: `rim_speed` and `speed` (m/s), `slip`, `torque`, `load`, `drawbar_pull`, `sinkage`, as
+    far as the channels give them. In reverse, torque and drawbar pull are positive along the travel
+    and the speed is below zero.
     """
 
     def read(role: str) -> Any:

@@ -33,11 +33,8 @@ _TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
 def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> list[Remark]:
     """What says that the map of a wheel is wrong.
 
-    Parameters
-    ----------
-    windows
-        Means of the windows (windows,) by quantity: `rim_speed` and `speed` in the sensors' own
-        direction, `slip`, `torque`, `load`, `slope`.
+    windows: Means of the windows (windows,) by quantity: `rim_speed` and `speed` in the sensors'
+        own direction, `slip`, `torque`, `load`, `slope`.
     """
     of = f" of wheel {wheel.name}" if wheel.name else ""
     # the load follows from the slope, and T / (W r) from the load: causes come before consequences

@@ -39,12 +39,8 @@ _TOO_SMALL = (
 def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) -> list[Remark]:
     """Hints at columns in a wrong unit or with a wrong sign, most important first.
 
-    Parameters
-    ----------
-    columns
-        Columns (rows,) of a table of runs by name: `slip`, `load_N`, `torque_Nm`, ...
-    radius
-        Radius of the wheel of all rows or of each row (rows,), m; None where it is not known.
+    columns: Columns (rows,) of a table of runs by name: `slip`, `load_N`, `torque_Nm`, ...
+    radius: Radius of the wheel of all rows or of each row (rows,), m; None where it is not known.
 
     Examples
     --------

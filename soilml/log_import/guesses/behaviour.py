@@ -18,20 +18,13 @@ _DAYS = (25_000.0, 80_000.0, 1.2e-4)
 class Behaviour:
     """Numbers that describe a column.
 
-    Attributes
-    ----------
-    count
-        Samples that are numbers.
-    low, high, middle
-        1st and 99th percentile, and median.
-    rising
-        Share of the steps that are above zero, among those that are not zero.
-    constant
-        Whether all samples are equal.
-    wraps_at
-        Range of an angle or a counter that starts again; 0 where it does not.
-    travel
-        Net change, a share of the sum of all changes: 1 for a monotone column, 0 for a single step.
+    count: Samples that are numbers.
+    low, high, middle: 1st and 99th percentile, and median.
+    rising: Share of the steps that are above zero, among those that are not zero.
+    constant: Whether all samples are equal.
+    wraps_at: Range of an angle or a counter that starts again; 0 where it does not.
+    travel: Net change, a share of the sum of all changes: 1 for a monotone column, 0 for a single
+        step.
     """
 
     count: int

@@ -107,17 +107,11 @@ def stated_radius(stated: dict[str, tuple[str, str]]) -> float:
 
 @dataclass(frozen=True)
 class StatedConstants:
-    """Constants that logs state in the lines before their headers, by name.
+    """Constants that logs state in the lines before their headers, by name."""
 
-    Attributes
-    ----------
-    common
-        Those that all logs state alike: as they would be written in a map, and the line.
-    of_each
-        Those that differ: a pattern for the number in the line, its unit, and the numbers.
-    """
-
+    # Those that all logs state alike: as they would be written in a map, and the line
     common: dict[str, tuple[str, str]]
+    # Those that differ: a pattern for the number in the line, its unit, and the numbers
     of_each: dict[str, tuple[str, str, list[str]]]
 
 

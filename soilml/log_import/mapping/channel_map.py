@@ -45,33 +45,23 @@ _NEEDED = "a number, '2 %' of the reading, or '2 % + 0.05'"
 class ChannelMap:
     """A channel of a map.
 
-    Attributes
-    ----------
-    role
-        Key of `ROLES`.
-    columns
-        Columns of the log; empty for a constant and for a number in the name of the file.
-    scale
-        What samples are multiplied by to be in the unit of soilml, with sign.
-    tare
-        Stretch in which the sensor should read zero: (from, until) in s after the start of a run,
+    role: Key of `ROLES`.
+    columns: Columns of the log; empty for a constant and for a number in the name of the file.
+    scale: What samples are multiplied by to be in the unit of soilml, with sign.
+    tare: Stretch in which the sensor should read zero: (from, until) in s after the start of a run,
         or "rest" for the time before the wheel starts; None where it is not tared.
-    bias, noise
-        Errors that all rows share, and errors of each row beside its scatter.
-    value
-        A constant; None where it is measured.
-    name_pattern, head_pattern
-        Regular expression whose group 1 is the number in the name of the file or run; in a line
-        before the header of the file.
-    gear_ratio, efficiency, torque_constant, idle_current
-        What stands between motor and wheel; the ratio is turns of the motor for one of the wheel.
-    unwrap
-        Range of an angle or counter that starts again at 0, in the log's unit; 0 where it does not.
-    std_column, std_scale, std_is_share
-        Column with the standard error of each row, where each row is a steady run; what its values
-        are multiplied by to be in the unit of soilml, or to be shares of the reading.
-    definition
-        What a slip that the log has is: one of `SLIP_DEFINITIONS`.
+    bias, noise: Errors that all rows share, and errors of each row beside its scatter.
+    value: A constant; None where it is measured.
+    name_pattern, head_pattern: Regular expression whose group 1 is the number in the name of the
+        file or run; in a line before the header of the file.
+    gear_ratio, efficiency, torque_constant, idle_current: What stands between motor and wheel; the
+        ratio is turns of the motor for one of the wheel.
+    unwrap: Range of an angle or counter that starts again at 0, in the log's unit; 0 where it does
+        not.
+    std_column, std_scale, std_is_share: Column with the standard error of each row, where each row
+        is a steady run; what its values are multiplied by to be in the unit of soilml, or to be
+        shares of the reading.
+    definition: What a slip that the log has is: one of `SLIP_DEFINITIONS`.
     """
 
     role: str

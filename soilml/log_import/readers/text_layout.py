@@ -86,18 +86,11 @@ def decode_text(data: bytes, file: Path) -> tuple[str, str]:
 class TextLayout:
     """How a text log is written.
 
-    Attributes
-    ----------
-    separator
-        One character; " " for any white space.
-    decimal_comma
-        Numbers are written as 0,25.
-    names, units
-        Header and units, one for each column; units are "" where not stated.
-    first
-        Index of the first line of samples.
-    about
-        Lines before the header.
+    separator: One character; " " for any white space.
+    decimal_comma: Numbers are written as 0,25.
+    names, units: Header and units, one for each column; units are "" where not stated.
+    first: Index of the first line of samples.
+    about: Lines before the header.
     """
 
     separator: str

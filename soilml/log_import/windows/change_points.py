@@ -29,14 +29,9 @@ def change_points(values: Floats, penalty: float, shortest: int = 1) -> list[int
     algorithm for optimal partitioning of data on an interval", IEEE Signal Process. Lett. 12
     (2005), equation 2.
 
-    Parameters
-    ----------
-    values
-        Channels in units of their noise.
-    penalty
-        Cost of a piece; for a change in all channels, about (channels + 2) ln n.
-    shortest
-        Fewest values of a piece.
+    values: Channels in units of their noise.
+    penalty: Cost of a piece; for a change in all channels, about (channels + 2) ln n.
+    shortest: Fewest values of a piece.
     """
     n = len(values)
     total = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0)])

@@ -50,16 +50,10 @@ def steady_windows(
 ) -> list[Stretch]:
     """Divide a run into steady windows and stretches that are left out, in order of time.
 
-    Parameters
-    ----------
-    time
-        Uniform grid (n,), s.
-    quantities
-        Samples (n,) by name: `rim_speed`, `speed`, `torque`, ...
-    settings
-        How steady and how long windows are.
-    left_out
-        Stretches that the user leaves out of this run.
+    time: Uniform grid (n,), s.
+    quantities: Samples (n,) by name: `rim_speed`, `speed`, `torque`, ...
+    settings: How steady and how long windows are.
+    left_out: Stretches that the user leaves out of this run.
     """
     search = _Search(time, quantities, settings)
     found: list[Stretch] = []

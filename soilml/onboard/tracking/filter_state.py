@@ -40,14 +40,9 @@ class RowWindow:
     All rows of a window have the same weight, as in the likelihood. With weights that fade
     exponentially, the posterior would claim twice the variance that the estimate has.
 
-    Parameters
-    ----------
-    blocks : tuple of Memory
-        Consecutive rows, the oldest first; the last grows.
-    memory : Memory
-        All rows of the blocks, packed.
-    rows_per_block : int
-        Rows after which another block begins.
+    blocks: Consecutive rows, the oldest first; the last grows.
+    memory: All rows of the blocks, packed.
+    rows_per_block: Rows after which another block begins.
     """
 
     blocks: tuple[Memory, ...]
@@ -95,14 +90,9 @@ def join(memories: Sequence[Memory]) -> Memory:
 class RowsInQuestion:
     """The last rows since the first of them that disagreed with those before.
 
-    Parameters
-    ----------
-    rows : tuple of Rows
-        At most `MOST_ROWS` rows.
-    disagree : tuple of bool
-        Whether each of them disagrees; the first does.
-    in_succession : int
-        Rows without one that agrees, up to now.
+    rows: At most `MOST_ROWS` rows.
+    disagree: Whether each of them disagrees; the first does.
+    in_succession: Rows without one that agrees, up to now.
     """
 
     rows: tuple[Rows, ...] = ()
@@ -192,20 +182,12 @@ def _measured(row: Rows, name: str) -> bool:
 class FilterState:
     """State of a tracker after a row.
 
-    Parameters
-    ----------
-    window : RowWindow
-        The rows that the estimate rests on.
-    question : RowsInQuestion
-        Rows that may be of another soil.
-    repeated : RepeatedReadings
-        Which readings repeat.
-    increases : tuple of float
-        What each of the last rows added to the misfit, over its median for sound rows.
-    rows_since_change : int
-        Rows used since the soil changed.
-    rows_since_drift : int
-        Rows used since a drift was last found; -1: never, on this soil.
+    window: The rows that the estimate rests on.
+    question: Rows that may be of another soil.
+    repeated: Which readings repeat.
+    increases: What each of the last rows added to the misfit, over its median for sound rows.
+    rows_since_change: Rows used since the soil changed.
+    rows_since_drift: Rows used since a drift was last found; -1: never, on this soil.
     """
 
     window: RowWindow

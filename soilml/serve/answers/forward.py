@@ -146,16 +146,10 @@ def _short(value: float) -> float:
 def forward(request: dict[str, Any]) -> dict[str, Any]:
     """Curves of torque (N m), pull (N) and sinkage (mm) over slip, and the stresses (kPa).
 
-    Parameters
-    ----------
-    request
-        `wheel`, `soil` or `model` as in `forward_case`, and `values` in SI units by path, with
+    request: `wheel`, `soil` or `model` as in `forward_case`, and `values` in SI units by path, with
         `slip` and `load`.
 
-    Raises
-    ------
-    InputError
-        For a value outside its bounds; the line begins with its path.
+    Raises `InputError` for a value outside its bounds; the line begins with its path.
     """
     case, at = with_sliders(forward_case(request), request)
     slip, load = at.get("slip", 0.3), at.get("load", 60.0)

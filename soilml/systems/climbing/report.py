@@ -110,19 +110,13 @@ class ClimbingReport:
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw pull (N) and slope (degrees) against slip with 90 % bands, and the climbs.
 
-        Parameters
-        ----------
-        ax
-            Two axes of matplotlib; a new figure where None.
+        ax: Two axes of matplotlib; a new figure where None.
 
         Returns
         -------
         ndarray of Axes, shape (2,)
 
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        Raises `InputError` for another number of axes.
         """
         left, right = axes = take_axes(ax, 1, 2, FIGURE_SIZE)[0]
         slip = self.ability.slip

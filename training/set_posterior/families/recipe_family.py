@@ -72,11 +72,8 @@ class RecipeFamily:
     def of(recipe: Recipe, targets: Sequence[str]) -> RecipeFamily:
         """The family of a recipe.
 
-        Raises
-        ------
-        InputError
-            If the recipe has braking, covariates, stick-slip, too many unknowns, or no prior of a
-            target.
+        Raises `InputError` if the recipe has braking, covariates, stick-slip, too many unknowns, or
+        no prior of a target.
         """
         prior = recipe.case.prior
         names = [*targets, *(name for name in prior if name not in targets)]

@@ -228,12 +228,8 @@ def typical_contact() -> ExitAngle:
 def typical_model_errors(unknown: Sequence[str], model: Model) -> dict[str, float]:
     """The typical errors, without those that the model has as unknowns or as effects.
 
-    Parameters
-    ----------
-    unknown : sequence of str
-        Unknowns by their dotted paths.
-    model : Model
-        Gear, which need not be a rigid wheel, and effects.
+    unknown: Unknowns by their dotted paths.
+    model: Gear, which need not be a rigid wheel, and effects.
     """
     nil = without_errors(unknown, {effect.name for effect in model.effects}, [model.gear])
     if "cohesion" not in unknown:  # the change with the bearing modulus is not known then
