@@ -63,8 +63,7 @@ def fuse_members(members: list[CalibratedRegressor], rule: str, data: Dataset) -
         [shrink_correlation(np.corrcoef(z[:, :, k]).reshape(m, m)) for k in range(q)]
     )
     weights = np.stack(
-        [best_linear(rmse[:, k], rmse[:, k], correlation[k]).weights for k in range(q)],
-        axis=1,
+        [best_linear(rmse[:, k], rmse[:, k], correlation[k]).weights for k in range(q)], axis=1
     )
     return Ensemble(tuple(members), rule, correlation, weights)
 

@@ -26,13 +26,7 @@ from training.set_posterior.response_surface import ResponseSettings
 
 #: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
 REGRESSORS: dict[str, type[GaussianRegressor]] = {
-    cls.type_name: cls
-    for cls in (
-        LSSVM,
-        FixedSizeLSSVM,
-        GaussianMLP,
-        LinearGaussian,
-    )
+    cls.type_name: cls for cls in (LSSVM, FixedSizeLSSVM, GaussianMLP, LinearGaussian)
 }
 
 #: Allowed seeds: those of the random generators of all libraries.

@@ -160,11 +160,7 @@ def sensors(level: float) -> dict[str, Sensor]:
 
 
 def simulate_readings(
-    true: Floats,
-    sensor: Sensor,
-    run: NDArray[np.int64],
-    tier: str,
-    generator: np.random.Generator,
+    true: Floats, sensor: Sensor, run: NDArray[np.int64], tier: str, generator: np.random.Generator
 ) -> Floats:
     """Readings (n,) of true values; `run` numbers the run of each row, in the order of sampling.
 

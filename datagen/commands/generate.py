@@ -9,12 +9,7 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    InputFile,
-    add_effects_option,
-    add_workers_option,
-    whole_number,
-)
+from soilml.cli.options import InputFile, add_effects_option, add_workers_option, whole_number
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 
@@ -77,9 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rows", type=whole_number, help="number of rows (default: that of the recipe)"
     )
     parser.add_argument(
-        "--seed",
-        type=whole_number,
-        help="seed of the random numbers (default: that of the recipe)",
+        "--seed", type=whole_number, help="seed of the random numbers (default: that of the recipe)"
     )
     add_workers_option(parser)
     parser.add_argument(

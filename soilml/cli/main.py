@@ -121,10 +121,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             continue
         module = importlib.import_module(path)
         sub = commands.add_parser(
-            name,
-            help=module.HELP,
-            description=module.DESCRIPTION,
-            formatter_class=layout,
+            name, help=module.HELP, description=module.DESCRIPTION, formatter_class=layout
         )
         module.add_arguments(sub)
         if command == name:

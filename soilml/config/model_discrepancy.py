@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.config.measurement_noise import (
-    share_and_constant_as_setting,
-    take_share_and_constant,
-)
+from soilml.config.measurement_noise import share_and_constant_as_setting, take_share_and_constant
 from soilml.io.toml_settings import Settings
 from soilml.quantities import CHANNELS, column
 

@@ -72,10 +72,7 @@ def advice_after_fit(
 
 
 def advice_after_estimate(
-    estimator: Estimator,
-    mean: Floats,
-    covariance: Floats,
-    readings: Mapping[str, Floats],
+    estimator: Estimator, mean: Floats, covariance: Floats, readings: Mapping[str, Floats]
 ) -> list[Remark]:
     """Remarks on the next measurement after an estimate, (q,) and (q, q), of readings (rows,).
 

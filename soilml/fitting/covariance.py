@@ -183,10 +183,7 @@ def ignored_discrepancy(
 
 
 def noise_of_operation(
-    case: Case,
-    readings: Readings,
-    coordinates: Sequence[Coordinate] = (),
-    x: Floats | None = None,
+    case: Case, readings: Readings, coordinates: Sequence[Coordinate] = (), x: Floats | None = None
 ) -> Floats:
     r"""Standard deviation (m,) of readings by the declared noise of slip s and load W.
 
@@ -201,10 +198,7 @@ def noise_of_operation(
     slip, load = readings.row_slip, readings.row_load
     x = np.zeros(0) if x is None else x
     total = np.zeros(len(readings))
-    for name, values, std in (
-        ("slip", slip, readings.slip_std),
-        ("load", load, readings.load_std),
-    ):
+    for name, values, std in (("slip", slip, readings.slip_std), ("load", load, readings.load_std)):
         if np.any(std > 0.0):
             ends = [_moved(readings, name, values + sign * 0.5 * std) for sign in (-1.0, 1.0)]
             low, high = (predict(case, coordinates, x[None, :], end)[0] for end in ends)

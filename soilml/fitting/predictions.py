@@ -263,8 +263,7 @@ def _joined_linearisations(
 
 
 def _answered(
-    requests: Sequence[PredictionRequest],
-    answer: Callable[[Sequence[PredictionRequest]], list[T]],
+    requests: Sequence[PredictionRequest], answer: Callable[[Sequence[PredictionRequest]], list[T]]
 ) -> list[T | InputError]:
     """Answers to all requests, those that can be joined together; else one by one."""
     groups: dict[object, list[int]] = {}

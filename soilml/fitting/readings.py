@@ -13,11 +13,7 @@ from numpy.typing import NDArray
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.levels import Levels, load_levels, replicate_rows, slip_levels
-from soilml.fitting.operating_points import (
-    gear_numbers,
-    operating_points,
-    operating_points_of_rows,
-)
+from soilml.fitting.operating_points import gear_numbers, operating_points, operating_points_of_rows
 from soilml.fitting.shared_errors import declared_errors
 from soilml.io.table import Table
 from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip

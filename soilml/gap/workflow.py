@@ -12,10 +12,7 @@ from soilml.config.compatibility import check_wheel_size
 from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.operating_points import with_rover_columns
-from soilml.fitting.readings import (
-    Readings,
-    stack_readings,
-)
+from soilml.fitting.readings import Readings, stack_readings
 from soilml.gap.candidate_effects import candidate_effects, effect_names
 from soilml.gap.checks import (
     DataCheckResult,

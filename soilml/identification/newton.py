@@ -99,9 +99,7 @@ def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     values, rate = values_at(unknowns, u), rates_at(unknowns, u)
     warnings = [
         Remark(
-            "not-identified",
-            f"{f.path} is not identified by the Newton-Raphson method",
-            (f.path,),
+            "not-identified", f"{f.path} is not identified by the Newton-Raphson method", (f.path,)
         )
         for f in free
         if f.path not in ("cohesion", *(unknown.path for unknown in unknowns))

@@ -213,13 +213,7 @@ def _fit(
         channels=tuple(column(name) for name in readings.channels),
     )
     return with_warnings(
-        fit,
-        case,
-        readings,
-        free,
-        x[:p],
-        excess_residuals=excess,
-        undeclared=undeclared,
+        fit, case, readings, free, x[:p], excess_residuals=excess, undeclared=undeclared
     )
 
 

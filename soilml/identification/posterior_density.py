@@ -61,11 +61,7 @@ class PosteriorDensity:
     """
 
     def __init__(
-        self,
-        case: Case,
-        readings: Readings,
-        free: Sequence[Coordinate],
-        noise_scale: float = 1.0,
+        self, case: Case, readings: Readings, free: Sequence[Coordinate], noise_scale: float = 1.0
     ) -> None:
         if undeclared := readings.undeclared:
             lines = ", ".join(f"{name} = '3 %'" for name in undeclared)

@@ -90,11 +90,7 @@ def quantities_of(
 
 
 def window_row(
-    window: Stretch,
-    inputs: Inputs,
-    series: Mapping[str, Floats],
-    log_map: LogMap,
-    wheel: WheelMap,
+    window: Stretch, inputs: Inputs, series: Mapping[str, Floats], log_map: LogMap, wheel: WheelMap
 ) -> WindowRow:
     """The row of a window; `series` are the quantities over time."""
     rows = np.asarray((inputs.time >= window.start) & (inputs.time <= window.stop))

@@ -22,9 +22,7 @@ SAME_POINT_DECIMALS = 6
 
 
 def process_columns(
-    points: Floats,
-    amplitude: float | Floats = 1.0,
-    least_eigenvalue: float = LEAST_EIGENVALUE,
+    points: Floats, amplitude: float | Floats = 1.0, least_eigenvalue: float = LEAST_EIGENVALUE
 ) -> Floats:
     r"""Columns C (n, q) of a process of zero mean, with C C^T its covariance at n points.
 

@@ -31,13 +31,7 @@ OPERATING_STD_INPUTS = ("slip_std", "load_std")
 OPERATING_NOISE = ("slip", "load")
 #: Standard deviations of errors of the sensors that all rows of a set share: offset of slip,
 #: relative errors of load and torque, offsets of sinkage and drawbar pull.
-SENSOR_ERROR_INPUTS = (
-    "slip_bias",
-    "load_gain",
-    "torque_gain",
-    "sinkage_bias",
-    "drawbar_pull_bias",
-)
+SENSOR_ERROR_INPUTS = ("slip_bias", "load_gain", "torque_gain", "sinkage_bias", "drawbar_pull_bias")
 #: Size of the errors of the model, as a multiple of their usual size; 0: the model is right. Files
 #: of interface 2 and earlier lack it.
 MODEL_ERROR_INPUT = "model_error"

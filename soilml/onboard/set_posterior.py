@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.features import (
-    READABLE,
-    as_number,
-    as_numbers,
-    flatten_readings,
-    parts_of_rows,
-)
+from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings, parts_of_rows
 from soilml.onboard.gaussian_pooling import LEAST_SHARE_IN_RANGE
 from soilml.onboard.memory import Memory
 from soilml.onboard.model_file import Session

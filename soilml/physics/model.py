@@ -12,12 +12,7 @@ import numpy as np
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import check, mapped, values
-from soilml.physics.computing_device import (
-    DEVICE_CHUNK,
-    current_device,
-    from_device,
-    to_device,
-)
+from soilml.physics.computing_device import DEVICE_CHUNK, current_device, from_device, to_device
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import Effect, apply_stage
 from soilml.physics.equilibrium import equilibrium_forces, sensor_readings

@@ -12,13 +12,7 @@ from dataclasses import dataclass, fields, replace
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import Force
 from soilml.physics.forces import forces_at_sinkage, load_at_sinkage
-from soilml.physics.load_case import (
-    LoadCase,
-    merge_rows,
-    merged_position,
-    rows,
-    single_precision,
-)
+from soilml.physics.load_case import LoadCase, merge_rows, merged_position, rows, single_precision
 from soilml.row_status import Status
 
 #: Most evaluations of the load. The last step is not evaluated.

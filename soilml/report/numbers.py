@@ -16,11 +16,7 @@ _DISPLAY_UNITS = {
     "N/m^3": (1e-3, "kN/m^3"),
 }
 _VARIANCE_COMPONENTS = {
-    "friction_angle_std": (
-        "friction angle from run to run, std",
-        180.0 / math.pi,
-        "°",
-    ),
+    "friction_angle_std": ("friction angle from run to run, std", 180.0 / math.pi, "°"),
     "bearing_std": ("bearing strength from run to run, std", 100.0, " %"),
     "autocorrelation": ("correlation of neighbouring samples", 1.0, ""),
 }

@@ -162,11 +162,7 @@ class RoverPerformance:
 
 
 def rover_performance(
-    case: Case,
-    draws: SoilDraws,
-    slopes: Floats,
-    slip: Floats,
-    speed: float | None = None,
+    case: Case, draws: SoilDraws, slopes: Floats, slip: Floats, speed: float | None = None
 ) -> RoverPerformance:
     r"""Slip, margin, energy, torque and sinkage on slopes, and the steepest slope.
 

@@ -136,10 +136,7 @@ def rover_presentation(rover: WheeledRover) -> Presentation[RoverReport]:
 
 
 def rover_page(
-    rover: WheeledRover,
-    found: Mapping[str, RoverReport],
-    by: str | None,
-    files: tuple[str, str],
+    rover: WheeledRover, found: Mapping[str, RoverReport], by: str | None, files: tuple[str, str]
 ) -> Report:
     """The page of `pull` for a whole rover: performance by group; model file and table."""
     heads = {name: f"{by} {name}: " if by else "" for name in found}

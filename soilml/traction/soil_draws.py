@@ -82,11 +82,7 @@ def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:
 
 
 def estimated_draws(
-    free: Sequence[Coordinate],
-    mean: Floats,
-    covariance: Floats,
-    count: int = DRAWS,
-    seed: int = 0,
+    free: Sequence[Coordinate], mean: Floats, covariance: Floats, count: int = DRAWS, seed: int = 0
 ) -> SoilDraws:
     r"""Draws of the maximum-entropy density in the prior with this mean (p,) and covariance (p, p).
 

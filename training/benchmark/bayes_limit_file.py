@@ -98,9 +98,7 @@ def packaged_limit() -> Path:
 
 
 def save_limit(
-    path: str | os.PathLike[str],
-    sets: Sequence[StoredSet],
-    summaries: Sequence[PosteriorSummary],
+    path: str | os.PathLike[str], sets: Sequence[StoredSet], summaries: Sequence[PosteriorSummary]
 ) -> None:
     """Write one row per set, as float32; the file is replaced atomically."""
     import pyarrow as pa

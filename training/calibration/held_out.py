@@ -12,12 +12,7 @@ from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.quantities import Z_90
 from training.calibration.recalibration import Metrics, compute_metrics
-from training.calibration.row_pooling import (
-    LEAST_GROUPS,
-    Rows,
-    row_groups,
-    runs_with_pattern,
-)
+from training.calibration.row_pooling import LEAST_GROUPS, Rows, row_groups, runs_with_pattern
 from training.dataset import Dataset
 
 Floats = NDArray[np.float64]
@@ -33,11 +28,7 @@ SAME_TARGET = 0.01
 
 
 def carry_errors(
-    predict: Predict,
-    pooling: PoolingCalibration,
-    data: Dataset,
-    scored: Dataset,
-    prior_std: Floats,
+    predict: Predict, pooling: PoolingCalibration, data: Dataset, scored: Dataset, prior_std: Floats
 ) -> tuple[PoolingCalibration, dict[int, Metrics]]:
     """The pooling calibration with held-out errors, and metrics of repeated readings.
 

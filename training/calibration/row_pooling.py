@@ -47,11 +47,7 @@ def run_conditions(data: Dataset) -> RunConditions:
 
 
 def calibrate_pooling(
-    mean: Floats,
-    covariance: Floats,
-    data: Dataset,
-    prior: PriorSummary,
-    conditions: RunConditions,
+    mean: Floats, covariance: Floats, data: Dataset, prior: PriorSummary, conditions: RunConditions
 ) -> PoolingCalibration:
     """Calibrate the pooling of several rows, by the operating conditions that the run varied.
 
@@ -92,11 +88,7 @@ def calibrate_pooling(
 
 
 def calibrate_single_rows(
-    mean: Floats,
-    covariance: Floats,
-    data: Dataset,
-    prior: PriorSummary,
-    conditions: RunConditions,
+    mean: Floats, covariance: Floats, data: Dataset, prior: PriorSummary, conditions: RunConditions
 ) -> PoolingCalibration:
     """The same for rows that are not pooled: they have targets of their own, or a set posterior."""
     rows = row_groups(data.runs(), 1)[:, 0]

@@ -150,10 +150,7 @@ def _run_benchmark(args: argparse.Namespace) -> int:
         progress("drawing the report", 0, 1)
         columns = report.csv_columns(results)
         found = goals(results)
-        content = {
-            "columns": columns,
-            "goals": [vars(goal) for goal in found],
-        }
+        content = {"columns": columns, "goals": [vars(goal) for goal in found]}
         draw = partial(save_png, partial(plot_benchmark, results), 4, 3, SIZE)
         page = report.benchmark_report(results)
         _write(

@@ -7,10 +7,7 @@ import re
 import sys
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    whole_number_from,
-)
+from soilml.cli.options import InputFile, whole_number_from
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 

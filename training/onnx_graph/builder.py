@@ -217,9 +217,7 @@ class Graph:
         return nodes, [one for one in self._constants if one.name in wanted]
 
     def model(
-        self,
-        inputs: Sequence[str] | Mapping[str, list[Any]],
-        outputs: Mapping[str, Output],
+        self, inputs: Sequence[str] | Mapping[str, list[Any]], outputs: Mapping[str, Output]
     ) -> Any:
         """The finished and checked ONNX model.
 

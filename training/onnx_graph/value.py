@@ -18,12 +18,7 @@ from numpy.typing import NDArray
 from training.onnx_graph.builder import BOOL, FLOAT, Graph
 
 #: ONNX's numbers of element types (onnx.TensorProto.DataType).
-_ELEMENT_TYPES: dict[type, int] = {
-    np.float32: FLOAT,
-    np.int32: 6,
-    np.bool_: BOOL,
-    np.float64: 11,
-}
+_ELEMENT_TYPES: dict[type, int] = {np.float32: FLOAT, np.int32: 6, np.bool_: BOOL, np.float64: 11}
 
 
 @dataclass(frozen=True, eq=False)

@@ -206,10 +206,7 @@ class FeatureSubset:
         return features if self.columns is None else features[:, list(self.columns)]
 
     def fit(
-        self,
-        training: tuple[Floats, Floats],
-        validation: tuple[Floats, Floats],
-        progress: Progress,
+        self, training: tuple[Floats, Floats], validation: tuple[Floats, Floats], progress: Progress
     ) -> None:
         """Fit the regressor to features and targets, with others for early stopping."""
         subset = (self.select(validation[0]), validation[1])

@@ -30,10 +30,7 @@ from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
-from training.set_posterior.sensor_errors import (
-    integrate_out_if_any,
-    integrate_out_sensor_errors,
-)
+from training.set_posterior.sensor_errors import integrate_out_if_any, integrate_out_sensor_errors
 
 #: Inputs of the graph with a value for each row.
 ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)

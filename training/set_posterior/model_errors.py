@@ -8,16 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
-from training.onnx_graph.value import (
-    Value,
-    concat,
-    exp,
-    gemm,
-    log,
-    maximum,
-    shortcut,
-    stack_rows,
-)
+from training.onnx_graph.value import Value, concat, exp, gemm, log, maximum, shortcut, stack_rows
 from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
 from training.set_posterior.monomials import ONE, Terms, derivative

@@ -39,10 +39,7 @@ class PolynomialResiduals:
 
     @staticmethod
     def of(
-        family: WheelFamily,
-        response: Response,
-        nearly_known: NearlyKnown | None,
-        system: Value,
+        family: WheelFamily, response: Response, nearly_known: NearlyKnown | None, system: Value
     ) -> PolynomialResiduals:
         """Of a system (m, terms); solved for the friction angle if it is unknown.
 

@@ -6,11 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.onboard.set_contract import (
-    OPERATING_NOISE,
-    OPERATING_STD_INPUTS,
-    RESPONSE_CHANNELS,
-)
+from soilml.onboard.set_contract import OPERATING_NOISE, OPERATING_STD_INPUTS, RESPONSE_CHANNELS
 from training.onnx_graph.value import (
     Value,
     absolute,

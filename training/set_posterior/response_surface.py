@@ -250,11 +250,7 @@ def _fit_polynomials(
             found.append(result)
     progress("simulating", len(designs), len(designs))
     coefficients, squared_error, feasible = zip(*found, strict=True)
-    return (
-        np.concatenate(coefficients),
-        np.concatenate(squared_error),
-        np.concatenate(feasible),
-    )
+    return (np.concatenate(coefficients), np.concatenate(squared_error), np.concatenate(feasible))
 
 
 def _fit_some(

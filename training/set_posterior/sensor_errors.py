@@ -12,15 +12,7 @@ from soilml.onboard.set_contract import (
     RESPONSE_CHANNELS,
     SENSOR_ERROR_COLUMNS,
 )
-from training.onnx_graph.value import (
-    Value,
-    concat,
-    constant,
-    gemm,
-    shortcut,
-    sqrt,
-    stack_rows,
-)
+from training.onnx_graph.value import Value, concat, constant, gemm, shortcut, sqrt, stack_rows
 from training.set_posterior.families.wheel_family import ContextValues
 
 CHANNELS = len(RESPONSE_CHANNELS)
@@ -62,10 +54,7 @@ class SensorErrors:
 
 
 def add_sensor_errors(
-    context: ContextValues,
-    readings: dict[str, Value],
-    operating: OperatingReadings,
-    y: Value,
+    context: ContextValues, readings: dict[str, Value], operating: OperatingReadings, y: Value
 ) -> SensorErrors:
     r"""How residuals change with errors of slip and load.
 

@@ -317,11 +317,7 @@ class RestrictedLikelihood:
 
 
 def restricted_likelihood(
-    readings: Readings,
-    columns: Floats,
-    residual: Floats,
-    basis: Floats,
-    autocorrelation: float,
+    readings: Readings, columns: Floats, residual: Floats, basis: Floats, autocorrelation: float
 ) -> RestrictedLikelihood:
     """The restricted likelihood of residuals (m,) with fixed effects `basis` (m, q).
 

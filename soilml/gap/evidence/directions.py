@@ -13,11 +13,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate, size_coordinate
 from soilml.fitting.levels import Levels, covariate_levels
-from soilml.fitting.predictions import (
-    PredictionRequest,
-    linearise_many,
-    predict_many,
-)
+from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
 from soilml.fitting.readings import Readings
 from soilml.gap.candidate_effects import gears_differ, with_effect
 from soilml.physics.effects.base import Effect

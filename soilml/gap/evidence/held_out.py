@@ -13,11 +13,7 @@ from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import (
-    Covariance,
-    assemble_covariance,
-    run_effect_columns,
-)
+from soilml.gap.evidence.covariance import Covariance, assemble_covariance, run_effect_columns
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.report.results import BeforeAfter, GapReduction
 from soilml.io.table import Table
@@ -160,11 +156,7 @@ def _predict_folds(
 
 
 def predict_held_out(
-    problem: FitProblem,
-    soil: Solution,
-    after: Solution,
-    readings: Readings,
-    description: str,
+    problem: FitProblem, soil: Solution, after: Solution, readings: Readings, description: str
 ) -> GapReduction:
     """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
     old = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]

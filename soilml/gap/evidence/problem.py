@@ -216,9 +216,7 @@ class MarginalFit:
 
 
 def fit_marginal(
-    problem: FitProblem,
-    requests: Sequence[tuple[StartedFit, Floats]],
-    lowest: float = float("inf"),
+    problem: FitProblem, requests: Sequence[tuple[StartedFit, Floats]], lowest: float = float("inf")
 ) -> list[MarginalFit | None]:
     """Fits and their evidence; None where the model refuses the fit.
 

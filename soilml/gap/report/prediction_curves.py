@@ -12,14 +12,7 @@ from numpy.typing import NDArray
 from soilml.fitting.levels import load_levels
 from soilml.gap.report.results import ReadingsAndPredictions
 from soilml.quantities import Z_90
-from soilml.report.figure_style import (
-    AFTER,
-    BEFORE,
-    SvgImage,
-    new_figure,
-    report_style,
-    svg_image,
-)
+from soilml.report.figure_style import AFTER, BEFORE, SvgImage, new_figure, report_style, svg_image
 from soilml.report.numbers import channel_name, channel_unit, format_number, with_unit
 
 if TYPE_CHECKING:
@@ -101,10 +94,7 @@ def select_runs(curves: ReadingsAndPredictions) -> list[ShownRun]:
 
 
 def _channel_figure(
-    curves: ReadingsAndPredictions,
-    number: int,
-    runs: Sequence[ShownRun],
-    changed: bool,
+    curves: ReadingsAndPredictions, number: int, runs: Sequence[ShownRun], changed: bool
 ) -> SvgImage:
     """One channel: readings and predictions over slip, and below them the residuals, in sigma."""
     column = curves.channels[number]
@@ -188,9 +178,4 @@ def _plot_residuals(
 
 def _legend_entry(run: ShownRun) -> dict[str, str]:
     load = f"{format_number(run.load)}\N{NO-BREAK SPACE}N"
-    return {
-        "path": _MARKER_PATHS[run.marker],
-        "colour": run.colour,
-        "run": run.run,
-        "load": load,
-    }
+    return {"path": _MARKER_PATHS[run.marker], "colour": run.colour, "run": run.run, "load": load}

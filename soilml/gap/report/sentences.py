@@ -144,9 +144,7 @@ _NOT_SUPPORTED_BY = {
             "which of the effects is present; model.toml contains the one that fits best",
         )
     ],
-    "unknown": [
-        ("cause", "any cause: model.toml contains the refitted soil and no new effect"),
-    ],
+    "unknown": [("cause", "any cause: model.toml contains the refitted soil and no new effect")],
     "suspected": [
         (
             "cause",

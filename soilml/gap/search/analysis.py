@@ -136,10 +136,7 @@ def _have_converged(last: VarianceComponents, new: VarianceComponents) -> bool:
 
 
 def _reestimate_covariance(
-    problem: FitProblem,
-    fit: Solution,
-    readings: Readings,
-    signatures: Sequence[Signature],
+    problem: FitProblem, fit: Solution, readings: Readings, signatures: Sequence[Signature]
 ) -> tuple[FitProblem, list[tuple[str, int]]]:
     """The problem with covariance estimated from a fit's residuals, outliers excluded.
 

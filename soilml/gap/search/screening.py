@@ -29,10 +29,7 @@ def predicted_with_and_without(
 
 
 def predicted_gains(
-    problem: FitProblem,
-    candidate: Explanation,
-    objective: float,
-    signatures: Sequence[Signature],
+    problem: FitProblem, candidate: Explanation, objective: float, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """Decrease of an objective by one more effect, linearised at a candidate, by effect name.
 

@@ -169,9 +169,7 @@ def strength_test(fit: ShearFit) -> ShearStrength | None:
         return None
     stress = float(np.mean([test.normal_stress for test in fit.tests]))
     return ShearStrength(
-        normal_stress=significant(stress),
-        strength=significant(fit.strength.value),
-        scatter=scatter,
+        normal_stress=significant(stress), strength=significant(fit.strength.value), scatter=scatter
     )
 
 

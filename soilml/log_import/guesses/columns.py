@@ -185,8 +185,7 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
 def liveliest(runs: Sequence[Run]) -> Run:
     """The run with the most columns that vary: one in which no sensor is dead."""
     return max(
-        runs,
-        key=lambda run: sum(not c.about.constant for c in candidates_of(run.recordings)),
+        runs, key=lambda run: sum(not c.about.constant for c in candidates_of(run.recordings))
     )
 
 

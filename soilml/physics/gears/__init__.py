@@ -7,14 +7,6 @@ from soilml.physics.gears.wheel import Wheel
 from soilml.physics.gears.wheel_leg_foot import Midstance
 
 #: Gear by the name that `[gear] type` takes in a model file.
-GEARS: dict[str, type[Gear]] = {
-    gear.name: gear
-    for gear in (
-        Wheel,
-        LinearWheel,
-        Midstance,
-        Track,
-    )
-}
+GEARS: dict[str, type[Gear]] = {gear.name: gear for gear in (Wheel, LinearWheel, Midstance, Track)}
 
 __all__ = ["GEARS", "Gear", "LinearWheel", "Midstance", "Track", "Wheel"]

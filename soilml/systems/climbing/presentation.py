@@ -59,9 +59,7 @@ def climb_report(report: ClimbingReport, files: tuple[str, str]) -> Report:
         tables=[
             parameter_table({"": lines}, None),
             ReportTable(
-                "Pull and slope over slip",
-                ["slip", "pull, N", "90 %", "slope, °", "90 %"],
-                rows,
+                "Pull and slope over slip", ["slip", "pull, N", "90 %", "slope, °", "90 %"], rows
             ),
         ],
         warnings=report.warnings,

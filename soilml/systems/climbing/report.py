@@ -120,10 +120,7 @@ class ClimbingReport:
         """
         left, right = axes = take_axes(ax, 1, 2, FIGURE_SIZE)[0]
         slip = self.ability.slip
-        for panel, band, factor in (
-            (left, self.pull, 1.0),
-            (right, self.slope, np.rad2deg(1.0)),
-        ):
+        for panel, band, factor in ((left, self.pull, 1.0), (right, self.slope, np.rad2deg(1.0))):
             panel.fill_between(
                 slip, factor * band.lower, factor * band.upper, color=AFTER, alpha=0.3, lw=0,
                 label="90 %",
@@ -204,11 +201,7 @@ def climbing_report(
     cohesion, friction, _ = ground.shear
     by_speed_error = {
         error: modulus_per_climb(
-            file.rover,
-            data.climbs,
-            cohesion=cohesion,
-            friction_angle=friction,
-            speed_error=error,
+            file.rover, data.climbs, cohesion=cohesion, friction_angle=friction, speed_error=error
         )
         for error in (-SPEED_ERROR, 0.0, SPEED_ERROR)
     }

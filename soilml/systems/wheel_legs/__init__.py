@@ -17,16 +17,8 @@ from soilml.systems.wheel_legs.slip_models import (
     TorqueSlip,
     VibrationSlip,
 )
-from soilml.systems.wheel_legs.soil_from_slip import (
-    LegSoil,
-    soil_from_torque,
-    soil_from_vibration,
-)
-from soilml.systems.wheel_legs.stances import (
-    SpringLeg,
-    simulate_stance,
-    vibration_amplitude,
-)
+from soilml.systems.wheel_legs.soil_from_slip import LegSoil, soil_from_torque, soil_from_vibration
+from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
 from soilml.systems.wheel_legs.walk import Walk, walk
 
 __all__ = [

@@ -13,11 +13,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 
 from soilml.arrays import Array
-from soilml.systems.wheel_legs.ground_reaction import (
-    GroundReaction,
-    PlateBatch,
-    ground_reaction,
-)
+from soilml.systems.wheel_legs.ground_reaction import GroundReaction, PlateBatch, ground_reaction
 
 GRAVITY = 9.81
 #: Speed below which the direction of motion is regularised, as a fraction of the speed of the leg's

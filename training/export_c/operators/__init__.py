@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-from training.export_c.operators import (
-    elementwise,
-    products,
-    rearrangement,
-    reductions,
-)
+from training.export_c.operators import elementwise, products, rearrangement, reductions
 from training.export_c.program import Translation
 
 OPERATORS: dict[str, Translation] = {

@@ -128,11 +128,7 @@ def _measure(
         "sinkage": SINKAGE_NOISE * values["sinkage"],
         "drawbar_pull": PULL_NOISE * load,
     }
-    readings = {
-        "slip": designs[..., SLIP],
-        "load": load,
-        "torque_bias": bias * values["torque"],
-    }
+    readings = {"slip": designs[..., SLIP], "load": load, "torque_bias": bias * values["torque"]}
     for name, value in values.items():
         measured = all_channels | (name == "torque")
         noisy = value + stds[name] * rng.standard_normal(value.shape)

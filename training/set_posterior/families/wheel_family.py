@@ -9,11 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.fitting.shared_errors import (
-    USUAL_MODEL_ERRORS,
-    USUAL_SENSOR_ERRORS,
-    without_errors,
-)
+from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, USUAL_SENSOR_ERRORS, without_errors
 from soilml.onboard.set_contract import LEAST_STD
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.model import Model
