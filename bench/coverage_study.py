@@ -17,7 +17,7 @@ from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from soilml.traction.pull_and_slope import Traction, predict_traction
-from soilml.traction.soil_draws import DRAWS, SoilDraws, onboard_draws, posterior_draws
+from soilml.traction.soil_draws import DRAWS, SoilDraws, estimated_soil, posterior_draws
 
 Floats = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def coverage(
         true = SoilDraws(tuple(truth), np.stack(list(truth.values()), axis=1))
         table = _simulated_rows(case, world or case, true, rng)
         if estimator is not None:
-            draws = onboard_draws(estimator, case, table)[1]
+            draws = estimated_soil(estimator, case, table).draws
         else:
             readings = usable_readings(case, table)
             draws = posterior_draws(case, readings, select_free(case, None), count, seed)[0]

@@ -228,7 +228,6 @@ def advise(
     parameters: Sequence[str] | None = None,
     current_fraction: Floats | None = None,
     outcome_count: int = OUTCOMES,
-    seed: int = 0,
 ) -> Advice:
     """Rate every slip, load and set of channels by the variance expected to remain after a row.
 
@@ -259,8 +258,6 @@ def advise(
         samples.
     outcome_count
         Number of simulated readings of each candidate.
-    seed
-        Of the simulated noise.
 
     Raises
     ------
@@ -276,7 +273,7 @@ def advise(
     rating = _rating(case, samples, grid, measured, covariates or {}, parameters, current_fraction)
     predicted = rating.predicted.channels
     sets = channel_sets([c for c in predicted if channels is None or c in channels])
-    outcomes = expected_variance(samples, len(predicted), outcome_count, seed)
+    outcomes = expected_variance(samples, len(predicted), outcome_count)
     first = rating.rate(grid.candidates(sets[:1]), outcomes)
     if not first:
         raise FitError(
@@ -287,10 +284,10 @@ def advise(
     for step in range(1, count):
         log_likelihood = rating.log_likelihood(sequence[-1].candidate, outcomes)
         earlier = log_likelihood if earlier is None else earlier + log_likelihood
-        outcomes = outcomes.with_noise(seed + step)
+        outcomes = outcomes.with_noise(step)
         after = rating.rate([c.candidate for c in first], outcomes, earlier)
         sequence.append(best_row(after, rating.names, None))
-    outcomes = outcomes.with_noise(seed)
+    outcomes = outcomes.with_noise(0)
     repetitions = [] if measured is None else repeated_points(measured, sets[0])
     return Advice(
         names=rating.names,

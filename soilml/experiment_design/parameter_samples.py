@@ -15,7 +15,7 @@ from soilml.fitting.readings import Readings
 from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
 from soilml.numerics.maximum_entropy import prior_quantiles
-from soilml.numerics.resampling import latin_hypercube, systematic_resampling
+from soilml.numerics.resampling import latin_hypercube
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +66,6 @@ def samples_of_rows(
     readings: Readings,
     free: Sequence[Coordinate],
     count: int = SAMPLES,
-    seed: int = 0,
     found: PosteriorSamples | None = None,
 ) -> ParameterSamples:
     """Samples of the exact posterior of rows; raises `FitError` as the posterior method does.
@@ -75,9 +74,7 @@ def samples_of_rows(
     """
     if found is None:
         found = posterior_samples(case, condensed(case, readings, free), free)
-    offset = np.random.default_rng(seed).random()
-    drawn = systematic_resampling(found.sample.weights, count, offset)
-    index, multiplicity = np.unique(drawn, return_counts=True)
+    index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()
     return ParameterSamples(tuple(free), found.sample.u[index], weights, found.noise_scale)
 
@@ -88,7 +85,6 @@ def samples_of_moments(
     mean: Floats,
     covariance: Floats,
     count: int = SAMPLES,
-    seed: int = 0,
 ) -> ParameterSamples:
     """Samples with a mean (q,) and covariance (q, q) of the parameters `names`, inside the priors.
 
@@ -96,7 +92,7 @@ def samples_of_moments(
     parameters that are not named have their prior. An approximation: moments do not determine a
     posterior that is far from Gaussian.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     u = latin_hypercube(count, len(free), rng)
     std = np.sqrt(np.diag(covariance))
     correlation = covariance / np.outer(std, std)

@@ -63,6 +63,11 @@ class PosteriorSamples:
         """Whether the residuals exceed the declared noise."""
         return self.noise_scale > 1.0
 
+    def equally_weighted(self, count: int, seed: int = 0) -> NDArray[np.int64]:
+        """Rows (count,) of the samples, as often as their weights say."""
+        offset = np.random.default_rng(seed).random()
+        return systematic_resampling(self.sample.weights, count, offset)
+
 
 def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     r"""Mean, covariance and 90 % interval of the exact posterior.

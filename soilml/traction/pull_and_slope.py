@@ -195,7 +195,6 @@ def draw_pull_discrepancy(
     slip: Floats,
     *,
     noise_scale: float | None = 1.0,
-    seed: int = 0,
 ) -> PullDiscrepancy | None:
     r"""Draws of the error under the loads (N) at the slips (m,); None where none is declared.
 
@@ -241,7 +240,7 @@ def draw_pull_discrepancy(
     )
     at_rows, at_asked = np.split(process_columns(points, scale * amplitude), [len(table)])
     used = np.isfinite(reading) & (std > 0.0) & (noise_scale is not None)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     shape = (len(predicted), at_rows.shape[1])
     before = rng.standard_normal(shape)
     residual = np.nan_to_num(reading - predicted)[:, used] / (scale * std[used])

@@ -64,16 +64,14 @@ def posterior_draws(
     Raises `FitError` as the posterior method does.
     """
     found = posterior_samples(case, condensed(case, readings, free), free)
-    offset = np.random.default_rng(seed).random()
-    rows = systematic_resampling(found.sample.weights, count, offset)
-    return _soil_draws(free, found.sample.u[rows]), found
+    return _soil_draws(free, found.sample.u[found.equally_weighted(count, seed)]), found
 
 
 def prior_draws(
-    free: Sequence[Coordinate], count: int = DRAWS, seed: int = 0, case: Case | None = None
+    free: Sequence[Coordinate], count: int = DRAWS, case: Case | None = None
 ) -> SoilDraws:
     """Draws of the priors by Latin hypercube; tests of the case's soil take part."""
-    return _soil_draws(free, prior_fractions(free, count, np.random.default_rng(seed), case))
+    return _soil_draws(free, prior_fractions(free, count, np.random.default_rng(0), case))
 
 
 def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:
@@ -82,7 +80,7 @@ def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:
 
 
 def estimated_draws(
-    free: Sequence[Coordinate], mean: Floats, covariance: Floats, count: int = DRAWS, seed: int = 0
+    free: Sequence[Coordinate], mean: Floats, covariance: Floats, count: int = DRAWS
 ) -> SoilDraws:
     r"""Draws of the maximum-entropy density in the prior with this mean (p,) and covariance (p, p).
 
@@ -114,16 +112,27 @@ def estimated_draws(
     def white(u: Floats) -> Floats:
         return np.asarray(np.linalg.solve(factor, (u - middle).T).T)
 
-    found = importance_sample(lambda u: -0.5 * (white(u) ** 2).sum(axis=1), len(free), seed)
+    found = importance_sample(lambda u: -0.5 * (white(u) ** 2).sum(axis=1), len(free))
     weights = moment_matched_weights(found.weights, white(found.u))
-    rows = systematic_resampling(weights, count, np.random.default_rng(seed).random())
+    rows = systematic_resampling(weights, count, np.random.default_rng(0).random())
     return SoilDraws(tuple(f.path for f in free), low + width * found.u[rows])
 
 
-def onboard_draws(
-    estimator: Estimator, case: Case, table: Table
-) -> tuple[list[Coordinate], SoilDraws, list[Remark]]:
-    """Parameters that the file estimates with their priors, draws of its estimate, and warnings.
+@dataclass(frozen=True)
+class MeasuredSoil:
+    """Draws of the soil, the parameters that were unknown, and warnings.
+
+    `noise_scale` is the factor on the declared noise; None for the estimate of a trained file.
+    """
+
+    draws: SoilDraws
+    unknown: Sequence[Coordinate]
+    warnings: tuple[Remark, ...]
+    noise_scale: float | None
+
+
+def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSoil:
+    """The soil by a trained file, whose priors are those of the parameters.
 
     Raises `InputError` where the file is for another gear or estimates a parameter that the case
     lacks, and `FitError` where no row has all its readings.
@@ -158,7 +167,8 @@ def onboard_draws(
             "prior, or no soil explains them, which widens its estimate"
         )
         warnings.append(Remark("out-of-range", text))
-    return free, estimated_draws(free, estimate.mean, estimate.covariance), warnings
+    draws = estimated_draws(free, estimate.mean, estimate.covariance)
+    return MeasuredSoil(draws, free, tuple(warnings), None)
 
 
 def _check_case(estimator: Estimator, case: Case) -> list[Remark]:
@@ -179,19 +189,6 @@ def _check_case(estimator: Estimator, case: Case) -> list[Remark]:
     ]
 
 
-@dataclass(frozen=True)
-class MeasuredSoil:
-    """Draws of the soil, the parameters that were unknown, and warnings.
-
-    `noise_scale` is the factor on the declared noise; None for the estimate of a trained file.
-    """
-
-    draws: SoilDraws
-    unknown: Sequence[Coordinate]
-    warnings: tuple[Remark, ...]
-    noise_scale: float | None
-
-
 def measured_soil(
     case: Case,
     table: Table,
@@ -205,8 +202,7 @@ def measured_soil(
     """
     if estimator is not None:
         check_wheel_size(case, table)
-        unknown, draws, notes = onboard_draws(estimator, case, table.rows(table.answered))
-        return MeasuredSoil(draws, unknown, tuple(notes), None)
+        return estimated_soil(estimator, case, table.rows(table.answered))
     unknown = select_free(case, free)
     readings = usable_readings(case, table)
     if as_usual:

@@ -169,5 +169,5 @@ def test_draws_of_the_prior_follow_tests():
     assert abs(z.mean() - mean) < 0.1
     assert abs(z.std() / std - 1.0) < 0.1
     np.testing.assert_array_equal(samples_of_prior(free, 400, 0, case).u, u)
-    values = prior_draws(free, 400, 0, case).values
+    values = prior_draws(free, 400, case).values
     np.testing.assert_allclose(values[:, 1], free[1].prior.at(u[:, 1]))
