@@ -69,7 +69,7 @@ def identify(
     method
         A key of `METHODS`: `nonlinear`, `linear`, `newton` or `posterior`.
     as_usual
-        Whether sensors and model have the errors that they usually have
+        Whether sensors and model have their typical errors
         (`soilml.fitting.shared_errors`), beside those that the case declares; for
         `nonlinear` and `posterior`. Otherwise the model is right, but for its [discrepancy], and
         sensors have the errors of [noise] and [bias] alone.

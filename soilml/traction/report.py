@@ -113,7 +113,7 @@ def pull_report(
     estimator
         Trained estimator whose estimate replaces the posterior.
     as_usual
-        Whether sensors and model have the errors that they usually have, as in `identify`; not
+        Whether sensors and model have their typical errors, as in `identify`; not
         with an estimator.
 
     Returns

@@ -96,7 +96,7 @@ def rover_report(
     estimator
         Trained estimator whose estimate replaces the posterior.
     as_usual
-        Whether sensors and model have the errors that they usually have, as in `identify`; not
+        Whether sensors and model have their typical errors, as in `identify`; not
         with an estimator.
 
     Raises

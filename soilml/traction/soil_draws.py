@@ -198,7 +198,7 @@ def measured_soil(
 ) -> MeasuredSoil:
     """The soil of the rows of a table; raises as `pull_report` does.
 
-    With `as_usual`, sensors and model have the errors that they usually have.
+    With `as_usual`, sensors and model have their typical errors.
     """
     if estimator is not None:
         check_wheel_size(case, table)
