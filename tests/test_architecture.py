@@ -19,7 +19,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/parquet.py": {"pyarrow"},
     "soilml/io/table.py": {"pyarrow"},
-    "soilml/fitting/starts.py": {"scipy"},
+    "soilml/fitting/scipy_descents.py": {"scipy"},
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},

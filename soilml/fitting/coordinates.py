@@ -35,8 +35,10 @@ SHAPE_STD = {"slip_power": 1.0, "by_slip": 3.0, "by_load": 1.0}
 class Coordinate:
     """One coordinate x of a fit: its bounds, and how it maps to the value of a parameter.
 
-    A soil parameter's x is its cumulative probability under the prior, from 0 to 1; an effect's
-    size has x in reference sizes, and a shape coefficient is its own x.
+    The x of a parameter of `select_free`, also of an effect, is its cumulative probability under
+    the prior, from 0 to 1. In an analysis of gaps the size of an effect has x in reference sizes,
+    and a shape coefficient is its own x: `prior` is then a scale alone, from the value at x = 0 to
+    the one at x = 1.
 
     Attributes
     ----------
@@ -45,7 +47,7 @@ class Coordinate:
     unit
         SI unit of its values.
     prior
-        Maps x to the value: the case's prior, or the one that is assumed.
+        Maps x to the value: the case's prior, the one that is assumed, or a scale.
     nominal
         The value that the case gives it.
     assumed
@@ -85,6 +87,11 @@ class Coordinate:
         if self.normal_std is None:
             return float("inf")
         return self.normal_std / abs(self.prior.upper - self.prior.lower)
+
+    @property
+    def reference_size(self) -> float:
+        """The value at x = 1: of an effect's size in an analysis of gaps, its reference size."""
+        return self.prior.upper
 
     @property
     def centre(self) -> float:

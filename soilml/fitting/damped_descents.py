@@ -208,7 +208,7 @@ def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
     steps = DampedSteps.of(problem)
 
     def trial(last: Solution, x: Floats) -> _Question:
-        sinkage = replace(last.model.sinkage_at(x - last.x), nearest=True)
+        sinkage = replace(last.linearisation.sinkage_at(x - last.x), nearest=True)
         return _Question(problem.request(x, sinkage), linearise=False)
 
     x = steps.within(start)
@@ -231,7 +231,7 @@ def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
         improvement = last.objective - float(np.ravel(objectives)[best])
         if improvement > 0.0:
             x = np.concatenate(trials)[best]
-            sinkage = last.model.sinkage_at((x - last.x)[None, :])
+            sinkage = last.linearisation.sinkage_at((x - last.x)[None, :])
             question = _Question(problem.request(x[None, :], sinkage), linearise=True)
             new = problem.at(x, (yield question))
             improvement = last.objective - new.objective

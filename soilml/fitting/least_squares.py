@@ -39,7 +39,9 @@ class LeastSquaresProblem:
     .. math:: \min_x \|W (y - f(x))\|^2 + \sum_k (\theta_k(x) / \sigma_k)^2 + \sum_i z_i(x)^2
 
     with the whitening W, normal densities of parameters about zero, and the deviations z from
-    tests of the soil.
+    tests of the soil. `damped_descents`, which `gap` takes, minimises this sum. `scipy_descents`,
+    which `identify` takes, adds the normal priors of soil parameters to it (`cost_with_priors`);
+    for `gap` these are uniform in the coordinate.
     """
 
     case: Case
@@ -99,18 +101,29 @@ class LeastSquaresProblem:
         flat = residual.reshape(-1, residual.shape[-1])
         return np.asarray((self.whiten @ flat.T).T.reshape(residual.shape))
 
+    @cached_property
+    def normal_std(self) -> Floats:
+        """Standard deviation of each normal prior or density, (p,); infinite where uniform."""
+        stds = [c.normal_std or c.prior.normal_std or np.inf for c in self.coordinates]
+        return np.asarray(stds)
+
+    def normal_deviation(self, x: Floats) -> tuple[Floats, Floats]:
+        """Values over the standard deviations of normal priors, and their derivatives by x (p,)."""
+        values, rates = values_at(self.coordinates, x), rates_at(self.coordinates, x)
+        return values / self.normal_std, rates / self.normal_std
+
     def objective(self, residual: Floats, x: Floats) -> Floats:
         """What is minimised, at whitened residuals (..., m) and coordinates (..., p)."""
         of_prior = ((x - self.centre) ** 2 * self.precision).sum(axis=-1)
         of_tests = (self.soil_tests.deviation(x) ** 2).sum(axis=-1)
         return np.asarray((residual**2).sum(axis=-1) + of_prior + of_tests)
 
-    def at(self, x: Floats, model: Linearisation, *, converged: bool = False) -> Solution:
+    def at(self, x: Floats, linearisation: Linearisation) -> Solution:
         """The problem at x (p,), from a linearisation there."""
-        residual = self.whitened(model.prediction)
-        jacobian = np.asarray(self.whiten @ np.nan_to_num(model.jacobian))
+        residual = self.whitened(linearisation.prediction)
+        jacobian = np.asarray(self.whiten @ np.nan_to_num(linearisation.jacobian))
         objective = float(self.objective(residual, x))
-        return Solution(self, x, model, residual, jacobian, objective, converged)
+        return Solution(self, x, linearisation, residual, jacobian, objective)
 
     def linearised(self, x: Floats, near: Linearisation | None = None) -> Solution:
         """The problem at x (p,), found from a linearisation `near` it where there is one."""
@@ -121,17 +134,17 @@ class LeastSquaresProblem:
 class Solution:
     """A point of a least-squares problem: an optimum, or a trial on the way to it.
 
-    `objective` is what the problem minimises; `converged` is false where the limit of iterations
-    was reached.
+    `objective` is that of the problem. `converged` says that a descent ended here by its
+    tolerances, and not at its limit of iterations.
     """
 
     problem: LeastSquaresProblem
     x: Floats  # (p,)
-    model: Linearisation
+    linearisation: Linearisation
     residual: Floats  # (m,) whitened
     jacobian: Floats  # (m, p) of the readings, whitened
     objective: float
-    converged: bool
+    converged: bool = False
 
     @property
     def case(self) -> Case:
@@ -151,17 +164,24 @@ class Solution:
     @property
     def prediction(self) -> Floats:
         """Predictions of the readings, (m,)."""
-        return self.model.prediction
+        return self.linearisation.prediction
 
     @property
     def derivatives(self) -> Floats:
         """Derivatives of the predictions by the coordinates, (m, p); zero where unknown."""
-        return np.nan_to_num(self.model.jacobian)
+        return np.nan_to_num(self.linearisation.jacobian)
 
     @property
     def cost(self) -> float:
         """Sum of the squared whitened residuals."""
         return float(self.residual @ self.residual)
+
+    @property
+    def cost_with_priors(self) -> float:
+        """Cost with the deviations from normal priors and from tests of the soil."""
+        of_prior = self.problem.normal_deviation(self.x)[0]
+        of_tests = self.soil_tests.deviation(self.x)
+        return self.cost + float(of_prior @ of_prior) + float(of_tests @ of_tests)
 
     @property
     def precision(self) -> Floats:

@@ -1,4 +1,10 @@
-"""What cases predict for readings, and how that changes with the coordinates: many at once."""
+"""What cases predict for readings, and how that changes with the coordinates: many at once.
+
+A request goes this way: `predict_many` or `linearise_many` divide it by gear (`_by_gear`), gather
+requests whose rows the model can solve together (`_answered`, `joined_cases`), solve them in one
+call of the physics (`_predict_joined`, `_linearise_joined`), and take from its forces the readings
+of each request (`_stacked`). `predict`, `linearise` and `predict_channels` request for one case.
+"""
 
 from __future__ import annotations
 
@@ -268,8 +274,8 @@ def _answered(
     """Answers to all requests, those that can be joined together; else one by one."""
     groups: dict[object, list[int]] = {}
     for i, request in enumerate(requests):
-        near = None if request.estimate is None else request.estimate.nearest
-        key = join_key(request.case_sets(request.x)), near
+        nearest = None if request.estimate is None else request.estimate.nearest
+        key = join_key(request.case_sets(request.x)), nearest
         groups.setdefault(key, []).append(i)
     answers: dict[int, T | InputError] = {}
     for group in groups.values():

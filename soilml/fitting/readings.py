@@ -68,7 +68,7 @@ class Readings:
     row, channel
         Row, and index in `channels`, of each reading, (m,).
     reading, std
-        Readings (m,) and their declared noise, NaN where none is declared.
+        Readings (m,) and their noise: as declared, NaN where it is not; in a fit, as it is taken.
     noise, from_case
         Noise of each channel that the case declares, and of which readings (m,) it is the noise;
         that of others stands in the table.
@@ -81,7 +81,8 @@ class Readings:
     notes
         Remarks on the table.
     shared_errors
-        Standard deviations of the errors that all rows share, by name, as [bias] declares them.
+        Standard deviations of the errors that all rows share, by name: as [bias] declares them, or
+        with those that sensors and models typically have.
     condensed
         What the rows stand for, where many were condensed.
     """

@@ -28,6 +28,7 @@ def simulate(
     speed: float | None = None,
     pass_number: float | None = None,
     slip_angle: float | None = None,
+    run: ArrayLike | None = None,
     seed: int | None = None,
     on_rows: Callable[[int], None] | None = None,
 ) -> Table:
@@ -41,6 +42,8 @@ def simulate(
         Slip ratios and vertical loads (N), (n,) or numbers.
     speed, pass_number, slip_angle
         Speed in m/s, pass and slip angle in rad of all rows, where effects need them.
+    run
+        Name of the run of each row, (n,) or one: a column `run`.
     seed
         Adds normal noise as the case declares it in [noise], with this seed; without one, readings
         are exact. An error of the model, [discrepancy], is not added.
@@ -50,8 +53,8 @@ def simulate(
     Returns
     -------
     Table
-        Columns `slip`, `load_N`, known covariates, `torque_Nm`, `drawbar_pull_N`, `sinkage_m`,
-        `entry_angle_rad`, NaN without equilibrium, and `status`.
+        Columns `run` where it is given, `slip`, `load_N`, known covariates, `torque_Nm`,
+        `drawbar_pull_N`, `sinkage_m`, `entry_angle_rad`, NaN without equilibrium, and `status`.
 
     Raises
     ------
@@ -78,7 +81,8 @@ def simulate(
             on_rows(min(rows.stop, slips.size))
     names = [f.name for f in fields(Force)]
     force = Force(**{n: np.concatenate([getattr(part, n) for part in parts]) for n in names})
-    columns = {"slip": slips, "load_N": loads}
+    columns = {} if run is None else {"run": np.broadcast_to(np.asarray(run, str), slips.shape)}
+    columns |= {"slip": slips, "load_N": loads}
     for field, value in known.items():
         if value is not None:
             columns[COVARIATES[field]] = np.full(slips.size, value)

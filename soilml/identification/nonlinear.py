@@ -21,8 +21,8 @@ from soilml.fitting.covariance import (
 )
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
+from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
-from soilml.fitting.starts import descend, global_optimum, normal_stds
 from soilml.identification.fit import Fit, at_prior_bound, with_warnings
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.quantities import column
@@ -94,10 +94,12 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
     for _ in range(NOISE_ROUNDS if undeclared or readings.shared_errors else 1):
         weighted = weighted.with_noise_at(optimum)
-        optimum = descend(weighted.problem, optimum.x, near=optimum.model)
+        optimum = descend(weighted.problem, optimum.x, near=optimum.linearisation)
     with_prior = optimum
     if np.any(at_prior_bound(optimum.x[: len(free)])):
-        with_prior = descend(weighted.problem, optimum.x, with_prior=True, near=optimum.model)
+        with_prior = descend(
+            weighted.problem, optimum.x, with_prior=True, near=optimum.linearisation
+        )
     return _fit(case, free, readings, optimum, with_prior, undeclared=undeclared)
 
 
@@ -193,7 +195,7 @@ def _fit(
         with_prior,
         noise_variance,
         precision,
-        np.where(np.isinf(normal_stds(optimum.problem)), of_prior, 0.0),
+        np.where(np.isinf(optimum.problem.normal_std), of_prior, 0.0),
     )
     covariance = covariance[:p, :p]
     values, rate = values_at(free, x[:p]), rates_at(free, x[:p])

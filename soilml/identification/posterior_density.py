@@ -21,9 +21,9 @@ from soilml.fitting.covariance import (
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
+from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
 from soilml.fitting.soil_tests import SoilTestTerms
-from soilml.fitting.starts import descend, global_optimum
 from soilml.identification.nonlinear import WeightedRows
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE

@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        rows = simulate(case, slip, load, **known, on_rows=done)
+        rows = simulate(case, slip, load, **known, run=args.label, on_rows=done)
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))
@@ -88,8 +88,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
         )
-    labels = {} if args.label is None else {"run": [args.label] * slip.size}
-    write_columns(labels | dict(rows.columns), args.out)
+    write_columns(rows.columns, args.out)
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
     if failed:

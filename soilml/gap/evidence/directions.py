@@ -67,7 +67,7 @@ def effect_signatures(
         size = size_coordinate(effect, None)
         try:
             changed = with_effect(case, effect)
-            at = current_size(changed, size.path, size.prior.upper)
+            at = current_size(changed, size.path, size.reference_size)
             step = SECANT_STEP if size.upper >= at + SECANT_STEP else -SECANT_STEP
         except InputError as error:
             reasons[name] = Remark("refused", str(error), (name,))

@@ -79,7 +79,7 @@ class LinearisedFit:
     cross: Floats  # (q, p + 1) of the process with Jacobian and residual
     plain: Floats  # (p + 1, p + 1) of Jacobian and residual
     precision: Floats  # (p, p) of priors and tests of the soil
-    pull: Floats  # (p,) half the derivative of -2 ln prior density
+    prior_gradient: Floats  # (p,) half the derivative of -2 ln prior density
     movable: NDArray[np.bool_]  # (p,) not at a bound
     constant: float  # -2 ln prior density of the coordinates
 
@@ -105,8 +105,8 @@ class LinearisedFit:
 
     def slope_and_curvature(self, amplitude: Floats) -> tuple[Floats, Floats]:
         """Gradient (p,) and curvature (p, p) of ln p at amplitudes (channels,), bounds ignored."""
-        p, product = len(self.pull), self._product(amplitude)
-        return product[:p, p] - self.pull, product[:p, :p] + self.precision
+        p, product = len(self.prior_gradient), self._product(amplitude)
+        return product[:p, p] - self.prior_gradient, product[:p, :p] + self.precision
 
     def _product(self, amplitude: Floats) -> Floats:
         """Products (p + 1, p + 1) of Jacobian and residual under amplitudes (channels,)."""
@@ -121,9 +121,9 @@ class LinearisedFit:
         `product`, (b, p + 1, p + 1), has the products of Jacobian and residual under each
         covariance.
         """
-        p = len(self.pull)
+        p = len(self.prior_gradient)
         h = product[:, :p, :p] + self.precision
-        gradient = np.where(self.movable, product[:, :p, p] - self.pull, 0.0)
+        gradient = np.where(self.movable, product[:, :p, p] - self.prior_gradient, 0.0)
         both = self.movable[:, None] & self.movable
         inner = np.where(both, h, np.eye(p))  # coordinates at a bound stay there
         step = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0] if p else gradient

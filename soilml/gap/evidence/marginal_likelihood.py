@@ -160,7 +160,8 @@ def _linearised(model: DiscrepancyModel, fit: Solution, extra: Floats | None) ->
         cross=model.columns.T @ block,
         plain=block.T @ block,
         precision=np.diag([*precision, *np.full(k, WEAK_PRECISION)]) + rates.T @ rates,
-        pull=np.concatenate([[pull for _, pull, _ in priors], np.zeros(k)]) + rates.T @ deviation,
+        prior_gradient=np.concatenate([[own for _, own, _ in priors], np.zeros(k)])
+        + rates.T @ deviation,
         movable=np.concatenate([movable, np.ones(k, dtype=np.bool_)]),
         constant=sum(constant for _, _, constant in priors) + float(deviation @ deviation),
     )

@@ -127,7 +127,7 @@ class FitProblem:
         if coordinate.is_shape:
             return 0.0
         if coordinate.path in self.case.parameters():
-            return current_size(self.case, coordinate.path, coordinate.prior.upper)
+            return current_size(self.case, coordinate.path, coordinate.reference_size)
         return START_SIZE if coordinate.upper > 0.0 else -START_SIZE
 
 

@@ -47,11 +47,11 @@ def test_simulated_rows_are_read_by_identify_and_gap(case):
         noise={"torque_Nm": Noise(share=0.02), "drawbar_pull_N": Noise(constant=0.3)},
     )
     slip, load = np.tile(np.linspace(0.05, 0.6, 8), 2), np.repeat([40.0, 80.0], 8)
-    rows = simulate(case, slip, load, seed=2)
+    rows = simulate(case, slip, load, run=np.repeat(["a", "b"], 8), seed=2)
     fit = identify(case, rows)
     assert abs(fit["friction_angle"] - case.soil.friction_angle) < 4.0 * fit.std[0]
-    labelled = replace(rows, columns=rows.columns | {"run": np.repeat(["a", "b"], 8)})
-    assert gap(case, labelled).status == "no-gap"
+    assert gap(case, rows).status == "no-gap"
+    assert simulate(case, 0.1, 60.0, run="one")["run"].tolist() == ["one"]
 
 
 def test_a_case_of_several_gears_is_refused(case):

@@ -10,7 +10,7 @@ from channel_readings import channel_readings
 
 from soilml import Operating, read_case
 from soilml.errors import FitError
-from soilml.fitting import starts
+from soilml.fitting import scipy_descents
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.identification import condensing
@@ -44,7 +44,9 @@ def optimum(x, jacobian, residual=(0.0, 0.0), of_tests=0.0):
     tests = SimpleNamespace(
         deviation=lambda x: np.sqrt([of_tests]), rates=lambda x: np.zeros((1, len(x)))
     )
-    problem = SimpleNamespace(soil_tests=tests, coordinates=())
+    problem = SimpleNamespace(
+        soil_tests=tests, coordinates=(), normal_deviation=lambda x: (0.0 * x, 0.0 * x)
+    )
     return Solution(problem, x, None, residual, jacobian, 0.0, True)
 
 
@@ -80,7 +82,7 @@ def test_noise_before_and_after_a_fit_is_that_of_each_channel(case):
 
 def test_a_trial_leads_to_a_known_optimum_where_the_cost_is_its_quadratic():
     known = optimum([0.5, 0.5], np.eye(2), residual=[1.0, 0.0], of_tests=0.2)
-    leads = starts._leads_to
+    leads = scipy_descents._leads_to
 
     def trial(distance, excess, prior=0.2, count=2):
         residual = np.zeros(count)

@@ -1,14 +1,14 @@
-"""Descents of a least-squares problem from several starts, to the lowest optimum."""
+"""Descents by scipy from several starts, which `identify` takes: the lowest optimum."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from importlib import resources
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import FitError, MissingLibraryError
-from soilml.fitting.coordinates import rates_at, values_at
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.numerics.prior import UNIFORM_PRECISION
@@ -55,8 +55,8 @@ def global_optimum(problem: LeastSquaresProblem, few: LeastSquaresProblem) -> So
         raise FitError(
             "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
         )
-    lowest = min(map(_total, found))
-    equal = [o for o in found if _total(o) <= lowest + EQUAL_COST]
+    lowest = min(o.cost_with_priors for o in found)
+    equal = [o for o in found if o.cost_with_priors <= lowest + EQUAL_COST]
     return min(equal, key=lambda optimum: float(np.sum((optimum.x - 0.5) ** 2)))
 
 
@@ -119,7 +119,7 @@ def descend(
     def linearised(x: Floats) -> Solution:
         key = x.tobytes()
         if key not in latest:
-            before = next(reversed(latest.values())).model if latest else near
+            before = next(reversed(latest.values())).linearisation if latest else near
             latest[key] = problem.linearised(x.copy(), before)
             while len(latest) > 2:
                 del latest[next(iter(latest))]
@@ -127,12 +127,12 @@ def descend(
                 raise _SameOptimumError(known)
         return latest[key]
 
-    uniform = np.isinf(normal_stds(problem))
+    uniform = np.isinf(problem.normal_std)
     uniform_root = np.where(uniform, np.sqrt(UNIFORM_PRECISION if with_prior else 0.0), 0.0)
 
     def prior(x: Floats) -> tuple[Floats, Floats]:
         """Deviations (p,) from the priors in standard deviations, and their derivatives (p,)."""
-        z, rate = _normal_deviation(problem, x)
+        z, rate = problem.normal_deviation(x)
         return z + uniform_root * (x - 0.5), rate + uniform_root
 
     tests = problem.soil_tests
@@ -148,12 +148,7 @@ def descend(
         )
     except _SameOptimumError as same:
         return same.optimum
-    return linearised(found.x)
-
-
-def normal_stds(problem: LeastSquaresProblem) -> Floats:
-    """Standard deviation of each normal prior or density, (p,); infinite where it is uniform."""
-    return np.asarray([c.normal_std or c.prior.normal_std or np.inf for c in problem.coordinates])
+    return replace(linearised(found.x), converged=bool(found.status > 0))
 
 
 class _SameOptimumError(Exception):
@@ -162,19 +157,6 @@ class _SameOptimumError(Exception):
     def __init__(self, optimum: Solution) -> None:
         super().__init__()
         self.optimum = optimum
-
-
-def _normal_deviation(problem: LeastSquaresProblem, x: Floats) -> tuple[Floats, Floats]:
-    """Values over the standard deviations of normal priors, and derivatives by x; (p,) each."""
-    std, coordinates = normal_stds(problem), problem.coordinates
-    return values_at(coordinates, x) / std, rates_at(coordinates, x) / std
-
-
-def _total(at: Solution) -> float:
-    """Cost with the deviations from normal priors and from tests of the soil."""
-    of_prior = _normal_deviation(at.problem, at.x)[0]
-    of_tests = at.soil_tests.deviation(at.x)
-    return at.cost + float(of_prior @ of_prior) + float(of_tests @ of_tests)
 
 
 def _leads_to(known: Solution, trial: Solution) -> bool:
@@ -187,4 +169,4 @@ def _leads_to(known: Solution, trial: Solution) -> bool:
     if np.abs(distance).max() > NEARLY_SAME or len(trial.residual) < len(trial.x):
         return False
     quadratic = float(np.sum((known.jacobian @ distance) ** 2))
-    return abs(_total(trial) - _total(known) - quadratic) < EQUAL_COST
+    return abs(trial.cost_with_priors - known.cost_with_priors - quadratic) < EQUAL_COST

@@ -8,7 +8,7 @@ from measured_rows import CHANNELS, measured, two_gears, with_model
 from scipy.stats import qmc
 
 from soilml import identify
-from soilml.fitting import least_squares, starts
+from soilml.fitting import least_squares, scipy_descents
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.predictions import linearise
 from soilml.fitting.usable_readings import usable_readings
@@ -69,8 +69,8 @@ def test_sixty_four_rows_take_few_linearisations(tmp_path, monkeypatch):
     few = len(calls)
     assert sum(sets) <= 65 * 3 * FEW
     calls.clear()
-    monkeypatch.setattr(starts, "NEARLY_SAME", 0.0)
-    monkeypatch.setattr(starts, "START_TOLERANCE", starts.TOLERANCE)
+    monkeypatch.setattr(scipy_descents, "NEARLY_SAME", 0.0)
+    monkeypatch.setattr(scipy_descents, "START_TOLERANCE", scipy_descents.TOLERANCE)
     identify(case, table)
     assert few <= len(calls) - 3
 
@@ -96,33 +96,33 @@ def test_the_optimum_is_the_lowest_of_descents_from_all_points(tmp_path):
         channels = list(CHANNELS)[: 1 + seed % 3]
         rows = weighted_rows(case, measured(case, rng, 24, channels))
         problem, few = rows.problem, rows.of_few_rows().problem
-        found = starts.global_optimum(problem, few)
-        points, _ = starts._ranked_starts(few)
-        lowest = min(starts.descend(problem, point).cost for point in points[::13])
-        assert found.cost <= lowest + starts.EQUAL_COST
+        found = scipy_descents.global_optimum(problem, few)
+        points, _ = scipy_descents._ranked_starts(few)
+        lowest = min(scipy_descents.descend(problem, point).cost for point in points[::13])
+        assert found.cost <= lowest + scipy_descents.EQUAL_COST
 
 
 def test_a_descent_that_comes_to_a_known_optimum_ends_there(tmp_path, monkeypatch):
     case = with_model(tmp_path)
     problem = problem_of(case, measured(case, np.random.default_rng(8), 40))
-    known = starts.descend(problem, np.full(3, 0.5))
+    known = scipy_descents.descend(problem, np.full(3, 0.5))
     calls = []
     whole = least_squares.linearise
     monkeypatch.setattr(least_squares, "linearise", lambda *a: calls.append(1) or whole(*a))
-    again = starts.descend(problem, np.full(3, 0.3))
+    again = scipy_descents.descend(problem, np.full(3, 0.3))
     alone = len(calls)
     calls.clear()
-    assert starts.descend(problem, np.full(3, 0.3), known=known) is known
+    assert scipy_descents.descend(problem, np.full(3, 0.3), known=known) is known
     assert len(calls) < alone
-    assert np.abs(again.x - known.x).max() < starts.SAME_OPTIMUM
+    assert np.abs(again.x - known.x).max() < scipy_descents.SAME_OPTIMUM
     elsewhere = replace(known, x=1.0 - known.x)
-    other = starts.descend(problem, np.full(3, 0.3), known=elsewhere)
-    assert other.x == pytest.approx(known.x, abs=starts.SAME_OPTIMUM)
+    other = scipy_descents.descend(problem, np.full(3, 0.3), known=elsewhere)
+    assert other.x == pytest.approx(known.x, abs=scipy_descents.SAME_OPTIMUM)
 
 
-@pytest.mark.parametrize("dimensions", range(1, starts.MOST_DIMENSIONS + 3))
+@pytest.mark.parametrize("dimensions", range(1, scipy_descents.MOST_DIMENSIONS + 3))
 def test_points_are_those_of_scipy(dimensions):
-    points = starts.sobol_points(dimensions)
-    assert points.shape == (starts.POINTS, dimensions) and points.dtype == np.float64
-    expected = qmc.Sobol(dimensions, scramble=True, rng=7).random(starts.POINTS)
+    points = scipy_descents.sobol_points(dimensions)
+    assert points.shape == (scipy_descents.POINTS, dimensions) and points.dtype == np.float64
+    expected = qmc.Sobol(dimensions, scramble=True, rng=7).random(scipy_descents.POINTS)
     np.testing.assert_array_equal(points, expected)
