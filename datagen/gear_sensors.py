@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_settings import take_prior
 from soilml.errors import InputError
@@ -23,8 +23,6 @@ from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
 from soilml.systems.wheel_legs.slip_models import GRAVITY, VIBRATION_SLIP, soil_spring
 from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
-
-Floats = NDArray[np.float64]
 
 #: Relations of vibration to slip: the rotating spring, or the straight line fitted to tests.
 LAWS = ("spring", "line")

@@ -15,14 +15,13 @@ from scipy.stats import qmc
 
 from datagen.gear_sensors import GEAR_SENSORS
 from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.row_status import Status
-
-Floats = NDArray[np.float64]
 
 #: Points of a Sobol sequence of scipy: runs that a block can have.
 MOST_RUNS = 2**30

@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 
 class NumericArray(Protocol):
@@ -69,6 +70,9 @@ class NumericArray(Protocol):
 Array: TypeAlias = Any
 #: What a computation takes: a plain number or an array.
 Real: TypeAlias = float | NumericArray
+#: Arrays of numpy.
+Floats: TypeAlias = NDArray[np.float64]
+Integers: TypeAlias = NDArray[np.int64]
 
 
 def namespace(*values: Real) -> Any:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
+from soilml.arrays import Floats
 from soilml.config.compatibility import recipe_content
 from soilml.config.units import text_in_si
 from soilml.errors import InputError, TableError
@@ -21,8 +22,6 @@ from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES, column
-
-Floats = NDArray[np.float64]
 
 #: Targets that differ between the rows of a run: its rows cannot be pooled.
 PER_ROW = ("slip",)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import BEST_LINEAR, RULES, best_linear, shrink_correlation
 from training.calibration.recalibration import CalibratedRegressor
 from training.dataset import Dataset
 from training.onnx_graph.builder import Graph
 from training.onnx_graph.value import Value, concat, reciprocal, sqrt
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.recipe import parse_recipe
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.fusion_rules import RULES
@@ -48,7 +49,6 @@ from training.set_posterior.validation import (
 )
 from training.spec import AnyWheelSpec, Spec
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 #: Called with the name of a stage, the steps done and the total number of steps.

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings
 from soilml.parameters import Parameter
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.model import Model
-
-Floats = NDArray[np.float64]
 
 #: Gravity by name, m/s^2: standard gravity (BIPM 2019), and the equatorial surface values of the
 #: Moon and Mars (NASA planetary fact sheets).

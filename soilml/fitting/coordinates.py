@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, did_you_mean
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, declared
 from soilml.physics.effects.base import Effect, SlipLoadScaling
 from soilml.quantities import SHEAR
-
-Floats = NDArray[np.float64]
 
 #: Ranges of natural soils, for parameters without a prior.
 _DEFAULT_PRIORS = {

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy, range_with_zero
 from soilml.fitting.coordinates import Coordinate
@@ -18,9 +18,6 @@ from soilml.fitting.readings import Readings
 from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
 from soilml.quantities import QUANTITIES, column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Usual model error of a channel in an analysis of gaps, where the case does not state another.
 USUAL = Discrepancy(share=0.02)

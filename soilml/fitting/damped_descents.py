@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
@@ -19,8 +20,6 @@ from soilml.fitting.predictions import (
     predict_many,
 )
 from soilml.fitting.soil_tests import SoilTestTerms
-
-Floats = NDArray[np.float64]
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 25

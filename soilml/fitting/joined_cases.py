@@ -9,8 +9,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.parameters import check
 from soilml.parameters import values as parameter_values
@@ -18,8 +18,6 @@ from soilml.physics.effects.base import Effect
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened
 from soilml.physics.operating_point import COVARIATES, Operating
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

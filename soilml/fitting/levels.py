@@ -8,12 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.physics.operating_point import Operating
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Two levels are apart by this many standard deviations of their values, plus the second figure
 #: divided by the number of values. In a simulation of 4 to 64 values of one normal or uniform

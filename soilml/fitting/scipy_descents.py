@@ -8,12 +8,11 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError, MissingLibraryError
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.numerics.prior import UNIFORM_PRECISION
-
-Floats = NDArray[np.float64]
 
 #: Points of the table of Sobol points, and the most dimensions that it has.
 POINTS, MOST_DIMENSIONS = 64, 8

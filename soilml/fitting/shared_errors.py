@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Real, namespace
+from soilml.arrays import Floats, Real, namespace
 from soilml.config.case import Case
 from soilml.config.measurement_noise import KNOWN_PARTS, common_errors
 from soilml.fitting.coordinates import Coordinate
@@ -24,8 +24,6 @@ from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.physics.soils import Soil
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Standard deviations of errors that the readings of a drive usually have in common: wheel speed
 #: over ground speed, effective radius and gear ratios, current to torque, mass and load transfer,

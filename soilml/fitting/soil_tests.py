@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.physics.soils.soil_tests import deviation_rates, deviations
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Deviation, in standard deviations of the test's scatter, that is remarked on.
 NOTABLE = 2.5

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.errors import FitError
@@ -21,8 +21,6 @@ from soilml.fitting.readings import (
 from soilml.io.table import Table
 from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 
 def usable_readings(case: Case, table: Table) -> Readings:

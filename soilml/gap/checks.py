@@ -10,14 +10,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
 from soilml.io.table import Table
 from soilml.quantities import column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
 #: standard error is then 30 %.

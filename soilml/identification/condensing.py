@@ -9,6 +9,7 @@ from heapq import heapify, heappop, heappush
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
@@ -17,9 +18,6 @@ from soilml.fitting.predictions import forces, predict
 from soilml.fitting.readings import CondensedRows, Readings
 from soilml.identification.nonlinear import nonlinear
 from soilml.physics.operating_point import COVARIATES, Operating
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Rows above which they are condensed, and rows that become of them.
 MOST_ROWS, CELLS = 5_000, 1024

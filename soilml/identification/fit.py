@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.levels import is_one_load
@@ -21,7 +22,6 @@ from soilml.remarks import Remark
 if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
 
-Floats = NDArray[np.float64]
 
 #: Size r of a correlation from which on two parameters are reported as a trade-off: one combination
 #: of the two, scaled to equal widths, is then known sqrt((1 + r) / (1 - r)) > 6 times better than

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
@@ -20,8 +20,6 @@ from soilml.physics.gears import LinearWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Most iterations of the stress at the exit and of the weights.
 ITERATIONS = 50

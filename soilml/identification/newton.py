@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
@@ -20,8 +20,6 @@ from soilml.physics.gears import LinearWheel
 from soilml.physics.soils import Soil
 from soilml.quantities import column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Most Newton steps, and most halvings of one.
 STEPS, HALVINGS = 60, 12

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError
@@ -26,8 +27,6 @@ from soilml.fitting.shared_errors import errors_at, with_modelled_errors
 from soilml.identification.fit import Fit, at_prior_bound, with_warnings
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.quantities import column
-
-Floats = NDArray[np.float64]
 
 #: Rounds in which the fit is repeated with noise estimated from its residuals, and with errors of
 #: sensors in proportion to its predictions.

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
@@ -26,8 +26,6 @@ from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 from soilml.numerics.surface_sampling import surface_sample
 from soilml.quantities import column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Fractions of the posterior below the ends of the 90 % interval.
 INTERVAL = np.asarray([0.05, 0.95])

@@ -8,6 +8,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.errors import FitError
@@ -29,8 +30,6 @@ from soilml.numerics.importance_sampling import ImportanceSample, importance_sam
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample
 from soilml.numerics.surrogate_density import SamplingBox
-
-Floats = NDArray[np.float64]
 
 #: Most model evaluations in one call, which bounds memory.
 MOST_EVALUATIONS = 200_000

@@ -9,8 +9,8 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.compatibility import (
     check_wheel_columns,
@@ -35,8 +35,6 @@ from soilml.physics.gears import Wheel
 from soilml.physics.soils import Soil
 from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Fixed coefficients of the angle of maximum stress in such a file.
 FIXED_ANGLE = {"a0": 0.4, "a1": 0.15}

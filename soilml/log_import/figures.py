@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.io.table import Table
-from soilml.log_import.recording import Floats
 from soilml.log_import.rows import WheelSeries
 from soilml.quantities import Z_90
 from soilml.report.figure_style import (

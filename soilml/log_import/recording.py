@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

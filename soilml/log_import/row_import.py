@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.inputs import channel_constant, our_slip
@@ -17,7 +18,7 @@ from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
-from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import (
     AVERAGED,

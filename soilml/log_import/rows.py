@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.io.table import Table
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import constants_of, wheel_quantities
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
-from soilml.log_import.recording import Floats
 from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
 from soilml.log_import.windows.slip_errors import travel_ratio
 from soilml.log_import.windows.steady import Stretch

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError, InputError
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
@@ -26,7 +27,6 @@ from soilml.log_import.checks.sensors import (
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
 from soilml.log_import.readers import read_log
-from soilml.log_import.recording import Floats
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.row_import import import_rows
 from soilml.log_import.rows import (

@@ -7,11 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.resampling import effective_size, latin_hypercube, weighted_quantiles
-
-Floats = NDArray[np.float64]
 
 #: Samples of the first round, stratified over the cube, and of each round after it.
 FIRST_ROUND, LATER_ROUND = 2048, 2048

@@ -8,12 +8,10 @@ of its prior, `moment_matched_weights` for weighted samples of several.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.prior import Prior
 from soilml.numerics.resampling import effective_size
-
-Floats = NDArray[np.float64]
 
 #: Grid points along the prior: their spacing, 0.05 % of the range, is the least std resolved.
 GRID_POINTS = 2000

@@ -8,9 +8,8 @@ from statistics import NormalDist
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
 
 #: Standard deviations at which a normal prior ends where no bound of the parameter is nearer.
 NORMAL_REACH = 4.0

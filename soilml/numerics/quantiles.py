@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
 
 #: Fractions of the draws below the lower end, the median and the upper end of the band.
 QUANTILES = (0.05, 0.5, 0.95)

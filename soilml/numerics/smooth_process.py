@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+from soilml.arrays import Floats, Integers
 
 #: Most points that represent the process. Points closer to each other than the correlation lengths
 #: add little: a hundred at slips from -0.5 to 1 and loads within a factor of ten, at the usual

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
 
 #: Relative singular value below which a direction is rounding error: a hundred thousand times the
 #: double precision, so that only columns that depend linearly on each other are dropped.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.importance_sampling import LEAST_EFFECTIVE_SIZE, ImportanceSample
 from soilml.numerics.resampling import effective_size, latin_hypercube, systematic_resampling
 from soilml.numerics.surrogate_density import (
@@ -19,8 +19,6 @@ from soilml.numerics.surrogate_density import (
     fit_surface,
     term_count,
 )
-
-Floats = NDArray[np.float64]
 
 #: Points for each variable at which the model is evaluated in a round: over the whole cube, and
 #: where the region is known, so that lower degrees do.

@@ -9,12 +9,10 @@ from math import sqrt
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import systematic_resampling
-
-Floats = NDArray[np.float64]
 
 #: A region ends so many standard deviations from its middle, unless the density goes on beyond.
 REACH = 4.5

@@ -11,6 +11,7 @@ from typing import Any, NoReturn, final
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.features import flatten_readings, without_copies
@@ -20,7 +21,6 @@ from soilml.onboard.metadata import read_fields, read_prior, read_probe
 from soilml.onboard.model_file import Session, find_model, open_model
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
-Floats = NDArray[np.float64]
 NoiseModels = Mapping[str, tuple[float, float]]
 
 #: Outputs of the graph for single readings.

@@ -10,13 +10,11 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
 from soilml.quantities import QUANTITIES
-
-Floats = NDArray[np.float64]
 
 #: Quantities that a model can read, with the open interval of possible readings.
 READABLE: dict[str, tuple[float, float]] = {

@@ -16,12 +16,9 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
-
-Floats = NDArray[np.float64]
-
 
 #: Ridge that keeps the correlation matrix of two equal estimators invertible.
 RIDGE = 1e-9

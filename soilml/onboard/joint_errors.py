@@ -7,12 +7,10 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import best_linear
 from soilml.onboard.held_out_errors import HeldOutErrors
-
-Floats = NDArray[np.float64]
 
 #: Fewest held-out rows that two files must have in common, and fewest averages of repeated ones.
 LEAST_COMMON_ROWS, LEAST_AVERAGES = 200, 100

@@ -11,10 +11,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.features import as_numbers
 
-Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 #: Version of the content of a memory.

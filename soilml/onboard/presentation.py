@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
@@ -26,8 +27,6 @@ from soilml.report.parameter_lines import (
     parameter_table,
 )
 from soilml.report.terminal import shown_unit, significant
-
-Floats = NDArray[np.float64]
 
 #: Ending of the columns of the estimate with typical model errors.
 TYPICAL = "usual"

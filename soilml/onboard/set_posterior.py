@@ -14,6 +14,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings, parts_of_rows
@@ -42,7 +43,6 @@ from soilml.onboard.set_contract import (
     empty_memory,
 )
 
-Floats = NDArray[np.float64]
 Feed = dict[str, NDArray[Any]]
 
 #: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import FusedEstimate, inverse_variance, pairwise
 from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
@@ -37,8 +37,6 @@ from soilml.systems.wheel_legs.stances import (
     midstance_torques,
     vibration_amplitude,
 )
-
-Floats = NDArray[np.float64]
 
 #: Width (m) and slip of the rover's wheel, neither printed.
 WIDTH, SLIP = 0.18, 0.2

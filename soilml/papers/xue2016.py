@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
@@ -25,8 +25,6 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil, soil
 from soilml.quantities import SHEAR
-
-Floats = NDArray[np.float64]
 
 #: The wheel is assumed, the soil is from another paper, the load is printed.
 NAME = "ding2015/lunar_soil"

@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from soilml.arrays import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.report import numbers
 from soilml.report.page import ReportTable
-
-Floats = NDArray[np.float64]
 
 #: What the two intervals of `identify` and `estimate` are called on a page.
 MODEL_EXACT, TYPICAL_ERRORS = "model taken as exact", "with typical errors of model and sensors"

@@ -9,14 +9,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES, SHEAR
 from soilml.report.terminal import shown_unit
 from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import NOMINAL, PairedResult
-
-Floats = NDArray[np.float64]
 
 #: Display units and symbols of the shear parameters: cohesion, friction angle, shear modulus.
 SHEAR_UNITS = tuple(shown_unit(QUANTITIES[name].unit) for name in SHEAR)

@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
-from numpy.typing import NDArray
 
 from datagen.processes import process_map
 from datagen.recipe import Recipe
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, select_free
@@ -31,7 +31,6 @@ from training.benchmark.designs import (
     set_hash,
 )
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 #: Interpolation nodes along each parameter: 1000 evaluations of the model for three parameters,

@@ -12,12 +12,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output
 from soilml.io.parquet import read_parquet
 from soilml.quantities import column
-
-Floats = NDArray[np.float64]
 
 #: Quantiles that are stored: ends of the 90 % and of the 50 % interval.
 FRACTIONS = (0.05, 0.25, 0.75, 0.95)

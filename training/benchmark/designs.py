@@ -7,17 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from datagen.recipe import Block, Recipe
 from datagen.simulation import block_sizes, simulate_rows
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column
-
-Floats = NDArray[np.float64]
 
 #: Columns of a set that its hash covers: what every method reads.
 HASHED_COLUMNS = ("slip", "load_N", "torque_Nm")

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from datagen.processes import FORKS, process_map
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.identification import CLOSED_FORM, identify
@@ -22,8 +23,6 @@ from soilml.onboard.estimator import Estimator
 from soilml.quantities import Z_50, Z_90, column
 from training.benchmark.designs import select_channels
 from training.regressors.linear_gaussian import LinearGaussian
-
-Floats = NDArray[np.float64]
 
 #: Label of the prior, and prefix of the labels of analytic methods.
 PRIOR_LABEL, ANALYTIC_PREFIX = "prior", "analytic "

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from soilml.arrays import Floats
 from soilml.numerics.prior import Prior
 from training.benchmark.designs import Design
 from training.benchmark.methods import MethodEstimates, MethodKind
-
-Floats = NDArray[np.float64]
 
 #: Nominal coverage of intervals, ellipsoids and highest-density regions.
 NOMINAL = 0.9

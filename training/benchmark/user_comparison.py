@@ -29,7 +29,6 @@ from soilml.remarks import Remark
 from training.benchmark.methods import Method, analytic_method, model_file_method, prior_method
 from training.benchmark.paired_results import MethodResult
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 

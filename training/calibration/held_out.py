@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.quantities import Z_90
@@ -15,7 +16,6 @@ from training.calibration.recalibration import Metrics, compute_metrics
 from training.calibration.row_pooling import LEAST_GROUPS, Rows, row_groups, runs_with_pattern
 from training.dataset import Dataset
 
-Floats = NDArray[np.float64]
 #: Mean, standard deviation (n, q) and in-range flag (n,) of features (n, d), as in the file.
 Predict = Callable[[Floats], tuple[Floats, Floats, NDArray[np.bool_]]]
 

@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.quantities import Z_50, Z_90
 from training.dataset import Dataset
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

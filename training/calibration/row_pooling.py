@@ -9,6 +9,7 @@ from itertools import chain, product
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import (
     PoolingCalibration,
@@ -18,7 +19,6 @@ from soilml.onboard.gaussian_pooling import (
 )
 from training.dataset import Dataset
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 #: Readings that are operating conditions: the driver sets them, the soil does not.

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.calibration.row_pooling import OPERATING_CONDITIONS
 from training.onnx_graph.builder import Graph
 from training.regressors.standardisation import Standardisation
-
-Floats = NDArray[np.float64]
 
 #: Largest number of knots along the first and the second operating condition.
 MOST_KNOTS = (24, 8)

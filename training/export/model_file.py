@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from soilml import __version__
+from soilml.arrays import Floats
 from soilml.config.model_settings import take_gear
 from soilml.errors import SoilmlError
 from soilml.io.atomic_files import atomic_output
@@ -27,8 +27,6 @@ from training.onnx_graph.builder import IR_VERSION, OPSET, Graph, Output, sessio
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.validation import figures_of, metadata_of, probe_of_sets
 from training.train import TrainedModel
-
-Floats = NDArray[np.float64]
 
 #: Sums of inputs and features up to this are finite; one with NaN or an infinity is not below it.
 LARGEST_SUM = 1e300

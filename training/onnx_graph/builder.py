@@ -17,11 +17,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.set_contract import SET_SWITCH
 
-Floats = NDArray[np.float64]
 #: Element type and shape of a graph's output.
 Output = tuple[int, list[Any]]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from soilml.arrays import Floats
 from training.regressors.ordered_threads import Progress
 from training.regressors.rbf_expansion import (
     MOST_VALIDATION_ROWS,
@@ -21,8 +21,6 @@ from training.regressors.rbf_expansion import (
     usable_validation,
 )
 from training.regressors.tiled_cholesky import TiledCholesky, factor_bytes
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

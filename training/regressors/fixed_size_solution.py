@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.regressors.nystrom_features import (
     NystromFeatures,
     RidgeEigensystem,
@@ -23,8 +24,6 @@ from training.regressors.rbf_expansion import (
     median_distance,
     usable_validation,
 )
-
-Floats = NDArray[np.float64]
 
 #: Searched unless fixed: widths in median distances between rows, and gammas.
 WIDTHS = (0.5, 1.0, 1.5, 2.0, 3.0)

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
 from training.regressors.gaussian_regressor import GaussianRegressor, Progress
 from training.regressors.tanh_network import TanhNetwork, evaluate_layers, layer_pairs
 
-Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 
 #: Penalty of AdamW on the weights: small, against growth without effect on the fit.

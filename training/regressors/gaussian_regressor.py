@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
 from training.regressors.standardisation import Standardisation
 
-Floats = NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 #: Share of the training rows whose log-variances are clipped at either end.

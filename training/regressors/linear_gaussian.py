@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
 from training.regressors.gaussian_regressor import GaussianRegressor, Progress
 from training.regressors.rbf_expansion import log_squared_residuals
-
-Floats = NDArray[np.float64]
 
 
 class LinearGaussian(GaussianRegressor):

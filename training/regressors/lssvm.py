@@ -6,15 +6,13 @@ from abc import abstractmethod
 from typing import Any, ClassVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
 from training.regressors.exact_solution import ExactSolution
 from training.regressors.fixed_size_solution import FixedSizeSolution
 from training.regressors.gaussian_regressor import GaussianRegressor, Progress, Requirements
 from training.regressors.rbf_expansion import Expansion, rbf
-
-Floats = NDArray[np.float64]
 
 #: Elements of the kernel matrix that a prediction computes at a time.
 PREDICTED_AT_A_TIME = 4_000_000

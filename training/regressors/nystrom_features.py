@@ -9,10 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.regressors.ordered_threads import Progress, ordered_map, thread_count
 from training.regressors.rbf_expansion import rbf
-
-Floats = NDArray[np.float64]
 
 #: Rows that centres are selected from, at least and for each centre; and exchanges per centre.
 CANDIDATES, CANDIDATES_PER_CENTRE = 4000, 10

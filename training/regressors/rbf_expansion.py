@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
+
 Rows = tuple[Floats, Floats]
 
 #: Expectation of the logarithm of a squared standard normal variable.

@@ -12,7 +12,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
+
 Singles = NDArray[np.float32]
 
 #: Decay rates of Adam's moments, and what is added to the root of the second.

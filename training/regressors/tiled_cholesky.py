@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dtrtri
 
+from soilml.arrays import Floats
 from training.regressors.ordered_threads import Progress, ordered_map, thread_count
 from training.regressors.rbf_expansion import rbf
-
-Floats = NDArray[np.float64]
 
 #: Rows of a tile: large enough for matrix products at full speed.
 TILE = 512

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.onnx_graph.value import (
     Value,
     cholesky_columns,
@@ -43,8 +43,6 @@ from training.set_posterior.sampling_rounds import (
     sample_sizes,
     weights_by_effective_size,
 )
-
-Floats = NDArray[np.float64]
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
 #: the other coordinates in adapted rounds, which is closer.

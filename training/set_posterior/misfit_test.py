@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.onnx_graph.value import Value, log, maximum, minimum
-
-Floats = NDArray[np.float64]
 
 #: A set is estimated only if at least this share of its rows is in range; the other rows are left
 #: out.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import combinations_with_replacement
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
+
 #: Monomials, each as the coordinates (counted from 1) that are multiplied; 0 stands for the factor
 #: 1.
 Terms = tuple[tuple[int, ...], ...]

@@ -7,15 +7,13 @@ from functools import reduce
 from operator import mul
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, log
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.monomials import Terms, derivative, monomials, pair_factors
 from training.set_posterior.response_surface import Response
-
-Floats = NDArray[np.float64]
 
 #: Its inverse square is added to the curvature along the solved coordinate: it damps the step, and
 #: is the width of the proposal, where readings do not constrain the coordinate. A little more than

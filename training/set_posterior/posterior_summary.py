@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.onboard.estimate import EDGE_STDS
 from soilml.onboard.set_contract import SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
@@ -12,8 +12,6 @@ from training.onnx_graph.value import Value, concat, constant, exp, gemm, maximu
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.importance_sampler import WeightedSample
 from training.set_posterior.misfit_test import Consistency
-
-Floats = NDArray[np.float64]
 
 #: Probabilities of the ends of the interval.
 INTERVAL = (0.05, 0.95)

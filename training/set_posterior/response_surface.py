@@ -13,6 +13,7 @@ from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 from datagen.processes import process_map
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh
@@ -22,7 +23,6 @@ from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 CHANNELS = len(RESPONSE_CHANNELS)

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 from scipy.stats import chi2, qmc
 from scipy.stats import t as student_t
 
+from soilml.arrays import Floats
 from training.onnx_graph.value import (
     Value,
     absolute,
@@ -30,8 +30,6 @@ from training.onnx_graph.value import (
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, PriorAxis
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
-
-Floats = NDArray[np.float64]
 
 #: Degrees of freedom of the t distributions: tails heavier than those of a normal distribution keep
 #: the importance weights bounded where the posterior has heavier tails than its normal

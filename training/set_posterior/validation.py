@@ -8,10 +8,10 @@ from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from datagen.processes import process_map
+from soilml.arrays import Floats
 from soilml.onboard.set_contract import (
     ABSENT_STD,
     COMMON_ERROR_INPUTS,
@@ -28,7 +28,6 @@ from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.posterior_summary import INTERVAL, prior_summary
 from training.set_posterior.response_surface import Response
 
-Floats = NDArray[np.float64]
 Progress = Callable[[str, int, int], None]
 
 T = TypeVar("T")

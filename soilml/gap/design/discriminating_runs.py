@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
@@ -26,7 +26,6 @@ from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
 
-Floats = NDArray[np.float64]
 T = TypeVar("T")
 
 #: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
@@ -32,7 +32,6 @@ from soilml.report.figure_style import AFTER, UNCHANGED, take_axes
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 
 #: Largest difference, in sigma of a reading, of two signatures that count as equal.
 SAME_PREDICTION = 0.1

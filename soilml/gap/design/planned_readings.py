@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.config.model_settings import UNNAMED_GEAR
@@ -18,8 +19,6 @@ from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
-
-Floats = NDArray[np.float64]
 
 #: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on.
 USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.readings import Readings
 from soilml.gap.design.planned_readings import USUAL_COVARIATES, carried_rows
 from soilml.parameters import declared
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
-
-Floats = NDArray[np.float64]
 
 #: Rows of a proposed run, and the fewest that make a run.
 ROWS_PER_RUN, FEWEST_ROWS = 8, 3

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.predictions import linearise
@@ -19,8 +20,6 @@ from soilml.numerics.prior import Prior
 from soilml.numerics.subspaces import column_space
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
-
-Floats = NDArray[np.float64]
 
 #: One unit of run-to-run variation: half a degree of friction angle, 5 % of the bearing moduli.
 RUN_EFFECT_UNITS = {"friction_angle": np.deg2rad(0.5), "bearing": 0.05}

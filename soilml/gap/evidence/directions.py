@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate, size_coordinate
@@ -19,8 +20,6 @@ from soilml.gap.candidate_effects import gears_differ, with_effect
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Step of the secant that gives a signature, in reference sizes. A secant is used because some
 #: effects start with a square root, whose derivative at zero is infinite.

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
@@ -18,8 +19,6 @@ from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.report.results import BeforeAfter, GapReduction
 from soilml.io.table import Table
 from soilml.quantities import column
-
-Floats = NDArray[np.float64]
 
 FOLDS = 4
 #: Fraction of the readings, those of highest load or of highest slip, in the held-out region.

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
 
 #: Divisions that are kept: fits share them, because amplitudes are those of a grid.
 KEPT = 64

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import DiscrepancyProcess, Whitening
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.covariance import Covariance
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, LinearisedFit, ProcessDivisions
 from soilml.numerics.prior import UNIFORM_PRECISION
-
-Floats = NDArray[np.float64]
 
 #: Precision of the size of an effect whose prior is added afterwards, in reference sizes: so weak
 #: that it does not shrink the size, and strong enough for an effect without influence.

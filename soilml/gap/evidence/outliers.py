@@ -5,12 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.gap.evidence.covariance import FIXED_EFFECT_TOLERANCES, Covariance
 from soilml.numerics.subspaces import column_space
 from soilml.quantities import Z_50
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Studentised residual above which a reading is an outlier: chance exceeds it once in 150 000
 #: readings.

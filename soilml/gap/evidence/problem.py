@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coordinate
@@ -22,8 +22,6 @@ from soilml.gap.evidence.directions import current_size
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
-
-Floats = NDArray[np.float64]
 
 #: Size, in reference sizes, from which the fit of a new effect starts: away from zero, where the
 #: derivative of some effects vanishes.

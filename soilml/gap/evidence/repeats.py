@@ -7,12 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.fitting.readings import Readings
 from soilml.quantities import QUANTITIES, column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Probability by chance below which repeats scatter less than declared.
 SIGNIFICANCE = 0.01

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.subspaces import project_out
-
-Floats = NDArray[np.float64]
 
 #: Draws of the null distribution: the smallest p value is 1/4001, well below every level used.
 DRAWS = 4000

@@ -18,7 +18,6 @@ from soilml.report.numbers import channel_name, channel_unit, format_number, wit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 #: Colours of loads from light to heavy (the colour map plasma without its yellow), and markers that

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
@@ -29,8 +29,6 @@ from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, witho
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
 MAX_PASSES = 2

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.fitting.coordinates import shape_coordinates
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
-
-Floats = NDArray[np.float64]
 
 #: -2 ln of the prior odds of one effect: one in twenty, for a catalogue of about twenty.
 EFFECT_PENALTY = 2.0 * float(np.log(20.0))

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_basis
@@ -30,8 +29,6 @@ from soilml.gap.search.screening import (
     predicted_with_and_without,
 )
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Family-wise significance level of the test for a gap.
 GAP_LEVEL = 0.03

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
@@ -35,8 +35,6 @@ from soilml.gap.verdict.estimates import effect_estimates
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity
-
-Floats = NDArray[np.float64]
 
 #: Outliers that a note lists by name.
 LISTED_OUTLIERS = 6

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import Discrepancy
 from soilml.fitting.coordinates import rates_at
@@ -21,8 +21,6 @@ from soilml.gap.search.posterior import Posterior
 from soilml.numerics.prior import UNIFORM_PRECISION, Prior
 from soilml.quantities import Z_90
 from soilml.report.numbers import significant
-
-Floats = NDArray[np.float64]
 
 #: Sizes, in reference sizes, over whose logarithm the likelihood of an effect is summed.
 SIZES = np.geomspace(SMALLEST_SIZE, LARGEST_SIZE, 40)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import regions, smooth_basis
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
@@ -13,8 +13,6 @@ from soilml.gap.report.results import RegionScore, RemainingDiscrepancy
 from soilml.numerics.subspaces import column_space, project_out
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal
-
-Floats = NDArray[np.float64]
 
 #: Factor on the expected amplitude in intervals: the part of a discrepancy that resembles a change
 #: of the soil leaves no residual that determines its size. It lies between 1.5, with which 90 %

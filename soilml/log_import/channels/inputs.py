@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.cell_text import read_number
 from soilml.log_import.channels.resampling import (
@@ -21,7 +22,6 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
-from soilml.log_import.recording import Floats
 from soilml.log_import.windows.mean_errors import mean_error
 from soilml.remarks import Remark
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.log_import.recording import Floats
+from soilml.arrays import Floats
 
 #: Most points of a grid, and its shortest step in s.
 MOST_POINTS, SHORTEST_STEP = 20_000, 0.002

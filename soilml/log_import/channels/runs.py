@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.log_import.mapping.log_map import FileKind, LogMap
-from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 from soilml.remarks import Remark
 

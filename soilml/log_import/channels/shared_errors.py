@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.log_import.mapping.uncertain_value import Uncertain
-from soilml.log_import.recording import Floats
 from soilml.quantities import column
 
 #: What [bias] of a model file can say of a quantity: an offset, a share, or both.

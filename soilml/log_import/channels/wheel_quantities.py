@@ -6,15 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.log_import.mapping.channel_map import GEARED
 from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.log_import.mapping.uncertain_value import Uncertain
 
 #: Value of a constant of the map by name, such as "vehicle.mass".
 Constants = Callable[[str], float]
-Floats = NDArray[np.float64]
 
 
 def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertain]:

@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.log_import.checks.table_hints import MOST_TRACTION, falls_with_slip, traction_cause
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
-from soilml.log_import.recording import Floats
 from soilml.log_import.units import spelling
 from soilml.remarks import Remark
 

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
-from soilml.log_import.recording import Floats
 from soilml.remarks import Remark
 
 #: Range of T / (W r) of driving wheels on soil, and its usual value.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.log_import.recording import Floats
+from soilml.arrays import Floats
 
 #: Range of an angle or counter that starts again, by unit.
 _PERIODS = (360.0, 2.0 * np.pi, 65536.0, 4096.0, 1024.0, 8192.0, 16384.0, 32768.0, 4294967296.0)

@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
 from soilml.log_import.mapping.channel_map import ROLES
-from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, is_raw_signal, spelling, unit_in_name
 from soilml.optional_imports import tomllib
 

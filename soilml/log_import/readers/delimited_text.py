@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.cell_text import read_number, read_numbers
 from soilml.log_import.readers.text_layout import (
@@ -22,7 +23,7 @@ from soilml.log_import.readers.text_layout import (
     find_layout,
     split_line,
 )
-from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
 
 #: Cells of a column looked at to tell text from numbers, and the share that must be numbers.

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.cell_text import read_number
-from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 
 _DEEPEST = 6

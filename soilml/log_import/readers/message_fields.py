@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.log_import.recording import Floats
+from soilml.arrays import Floats
 
 _DEEPEST = 6
 #: Longer arrays (images, point clouds, laser scans) are no channels.

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.log_import.recording import Floats, Recording
+from soilml.arrays import Floats
+from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
 
 #: Ends of the ranges of integers, which converters without a signal show.

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.io.parquet import read_parquet
-from soilml.log_import.recording import Floats, Recording
+from soilml.log_import.recording import Recording
 
 
 def read_parquet_log(path: Path) -> list[Recording]:

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from soilml.log_import.recording import Floats
+from soilml.arrays import Floats
 
 #: Numbers of values whose means show the long-run noise, and fewest such means.
 _WIDTHS, _FEWEST_MEANS = (2, 4, 8, 12), 16

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from soilml.log_import.recording import Floats
+from soilml.arrays import Floats
 
 #: Samples are first averaged to at most this many, which lowers the noise in their correlations.
 _MOST_VALUES = 256

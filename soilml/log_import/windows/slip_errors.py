@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from soilml.log_import.recording import Floats
+from soilml.arrays import Floats
 from soilml.log_import.windows.mean_errors import mean_error, time_and_window
 
 #: Parts that a window is divided into: for motion without noise of the places, and for noisy

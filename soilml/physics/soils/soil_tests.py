@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.parameters import Parameter
 from soilml.physics.soils import Soil
-
-Floats = NDArray[np.float64]
 
 #: Least value, as a fraction of the measured one, that is compared with it: a soil without bearing
 #: capacity or strength is as far off as one with this share of it.

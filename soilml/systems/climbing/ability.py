@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from soilml.arrays import Real
+from soilml.arrays import Floats, Real
 from soilml.errors import FitError, InputError
 from soilml.systems.climbing.climb import Rover, WheelRun
 from soilml.systems.climbing.identify import GroundEstimate
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 from soilml.systems.climbing.wheel_force_components import ForceComponents, force_components
-
-Floats = NDArray[np.float64]
 
 #: Points of the curve over slip; resamples of the measured stress; soil samples taken with each
 #: resample. Forces are computed for all soils of a resample at once: 24 x 16 samples determine the

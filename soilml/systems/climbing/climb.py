@@ -7,14 +7,11 @@ from dataclasses import dataclass, field, replace
 from typing import Annotated, final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from soilml.arrays import Real
+from soilml.arrays import Floats, Real
 from soilml.errors import InputError
 from soilml.parameters import Parameter
 from soilml.systems.force_sensor_wheel import StressProfile
-
-Floats = NDArray[np.float64]
 
 #: Cohesion (Pa), friction angle (rad), shear modulus (m).
 ShearParameters = tuple[float, float, float]

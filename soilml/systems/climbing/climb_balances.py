@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from soilml.arrays import Array
+from soilml.arrays import Array, Floats
 from soilml.numerics.prior import Prior
 from soilml.systems.climbing.climb import Climb, Rover, ShearParameters, Uncertainty, WheelRun
 from soilml.systems.climbing.wheel_force_components import (
@@ -19,8 +18,6 @@ from soilml.systems.climbing.wheel_force_components import (
     stack_components,
 )
 from soilml.systems.force_sensor_wheel import StressProfile
-
-Floats = NDArray[np.float64]
 
 #: Values of k_x, evenly spaced in the logarithm, between which forces are interpolated linearly.
 KNOTS = 256

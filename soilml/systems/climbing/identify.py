@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.identification.fit import STRONG_CORRELATION, Fit
 from soilml.numerics.prior import Prior
@@ -17,8 +17,6 @@ from soilml.systems.climbing.climb import Climb, Rover, ShearParameters, Uncerta
 from soilml.systems.climbing.climb_balances import ForceBalances
 from soilml.systems.climbing.soil_sampling import SoilPosterior, SoilSampler
 from soilml.systems.climbing.wheel_force_components import estimate_wheel_loads
-
-Floats = NDArray[np.float64]
 
 #: Priors of the shear parameters of sands, used where neither a value nor a range is given.
 DEFAULT_PRIORS = {

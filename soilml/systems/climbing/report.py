@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import SHEAR
 from soilml.remarks import Remark
@@ -23,8 +24,6 @@ from soilml.systems.climbing.identify import GroundEstimate, identify_ground
 from soilml.systems.climbing.rover_file import RoverFile
 from soilml.systems.climbing.stress_by_slip import StressBySlip
 from soilml.systems.climbing.tables import ClimbData
-
-Floats = NDArray[np.float64]
 
 #: Fraction of samples whose slope still rises at the highest slip, above which a warning is given.
 MAX_STILL_RISING = 0.05

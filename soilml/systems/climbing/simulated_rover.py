@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.systems.climbing.ability import slope_pull
 from soilml.systems.climbing.climb import (
@@ -21,8 +21,6 @@ from soilml.systems.climbing.climb import (
 )
 from soilml.systems.climbing.wheel_force_components import force_components
 from soilml.systems.force_sensor_wheel import StressProfile
-
-Floats = NDArray[np.float64]
 
 #: Slopes of the test field and artificial slips on the flat, as in Nagatani et al., sections 3, 5.
 SLOPES = tuple(np.deg2rad([0.0, 4.0, 8.0, 10.0, 12.0]).tolist())

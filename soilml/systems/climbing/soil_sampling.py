@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.prior import Prior
 from soilml.quantities import SHEAR
 from soilml.systems.climbing.climb import ShearParameters, Uncertainty
 from soilml.systems.climbing.climb_balances import ForceBalances
-
-Floats = NDArray[np.float64]
 
 #: Random soils among which the search starts; posterior samples returned; iterations in which the
 #: noise covariance, which depends on the soil, is updated at the current centre. Two suffice: the

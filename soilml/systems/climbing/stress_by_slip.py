@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.systems.climbing.climb import WheelRun
 from soilml.systems.force_sensor_wheel import StressProfile
-
-Floats = NDArray[np.float64]
 
 #: Points from exit to entry that represent the shape of a profile.
 POINTS = 41

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
 from soilml.systems.climbing.climb import WHEELS, Climb, WheelRun
 from soilml.systems.force_sensor_wheel import StressProfile
-
-Floats = NDArray[np.float64]
 
 #: Required columns; in addition slip, or speed_m_s and rim_speed_m_s.
 CLIMB_COLUMNS = ("run", "wheel", "slope_rad")

@@ -8,11 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Array, Real
+from soilml.arrays import Array, Floats, Real
 from soilml.systems.climbing.climb import Climb, Rover, ShearParameters, WheelRun
 from soilml.systems.force_sensor_wheel import forces_from_profile
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

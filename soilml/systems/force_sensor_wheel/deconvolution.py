@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.systems.force_sensor_wheel.sensor_readings import BinnedStress, SensingWheel
-from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
+from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
 #: Fewest bins that show a shape of seven numbers.
 LEAST_BINS = 12

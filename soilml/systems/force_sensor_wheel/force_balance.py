@@ -9,12 +9,12 @@ from typing import Annotated, final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Real
+from soilml.arrays import Floats, Real
 from soilml.errors import FitError
 from soilml.parameters import Parameter, check
 from soilml.physics.operating_point import MOST_SLIP
 from soilml.systems.force_sensor_wheel.sensor_readings import SensingWheel
-from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
+from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 from soilml.systems.force_sensor_wheel.wheel_forces import ShearInputs, integrate_profile
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.remarks import Remark
 from soilml.systems.force_sensor_wheel.deconvolution import fit_stress_arc
@@ -28,7 +29,7 @@ from soilml.systems.force_sensor_wheel.shear_modulus import (
     profile_from_readings,
     student_t_quantile,
 )
-from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
+from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
 #: Above this slip the measured k_x dropped to a third of its value at small slip (Table I).
 MAX_VALID_SLIP = 0.5

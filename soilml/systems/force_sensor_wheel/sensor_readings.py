@@ -9,12 +9,10 @@ from typing import Annotated, final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Real
+from soilml.arrays import Floats, Real
 from soilml.errors import InputError
 from soilml.parameters import Parameter, check
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
-
-Floats = NDArray[np.float64]
 
 #: Points across the diameter of a sensor.
 CHORDS = 48

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.remarks import Remark
 from soilml.systems.force_sensor_wheel.deconvolution import deconvolve, fit_stress_arc
@@ -21,7 +22,7 @@ from soilml.systems.force_sensor_wheel.sensor_readings import (
     SensorReadings,
     bin_stress,
 )
-from soilml.systems.force_sensor_wheel.stress_profile import Floats, StressProfile
+from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
 #: Step of the central differences, in standard deviations of the measured quantity: large enough
 #: for the solver's tolerance, small enough for a first-order formula.

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.numerics.quadrature import gauss
 from soilml.parameters import check
@@ -17,8 +17,6 @@ from soilml.physics.contact import stress
 from soilml.physics.gears import Wheel
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
-
-Floats = NDArray[np.float64]
 
 #: Gauss points between two samples: there the stress is linear in the angle, the shear
 #: displacement is not.

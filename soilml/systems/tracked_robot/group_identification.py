@@ -7,16 +7,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.identification import Fit, identify
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 from soilml.quantities import WEAKLY_IDENTIFIED_ABOVE, column
-
-Floats = NDArray[np.float64]
 
 #: Parameters that the source identifies from the pull alone, in its order.
 PARAMETERS = ("n", "friction_angle", "kphi", "shear_modulus", "cohesion")

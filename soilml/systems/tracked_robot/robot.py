@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
@@ -16,7 +17,6 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 
-Floats = NDArray[np.float64]
 GRAVITY = 9.81
 #: Bisection steps for the settling between 0 and 0.5: 0.5 / 2^16 is below 1e-5.
 BISECTIONS = 16

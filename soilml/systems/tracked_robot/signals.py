@@ -13,9 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError, InputError, MissingLibraryError
-
-Floats = NDArray[np.float64]
 
 #: Samples by which a signal is extended at its ends before it is filtered.
 PADDING = 9

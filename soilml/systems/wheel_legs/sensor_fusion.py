@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.onboard.fusion_rules import FusedEstimate, best_linear, inverse_variance, pairwise
 from soilml.systems.wheel_legs.slip_models import GRAVITY, PRESSURE
 from soilml.systems.wheel_legs.stances import StanceReadings
 
-Floats = NDArray[np.float64]
 Rule = Callable[[Floats, Floats, Floats | None], FusedEstimate]
 
 #: The rules of Comin and Saaj 2017 (eq. 30), for independent errors (eq. 26), and for any errors.

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
-
-Floats = NDArray[np.float64]
 
 Real = float | Floats
 

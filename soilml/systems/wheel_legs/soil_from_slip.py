@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.systems.wheel_legs.slip_models import (
     GRAVITY,
@@ -18,8 +18,6 @@ from soilml.systems.wheel_legs.slip_models import (
     VibrationSlip,
     spring_soil,
 )
-
-Floats = NDArray[np.float64]
 
 #: Smallest range of slips for a regression, in standard deviations of the slip.
 MIN_RANGE = 1.0

@@ -9,16 +9,14 @@ from functools import cache
 from typing import Annotated, final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.parameters import Parameter, check
 from soilml.physics.gears.wheel_leg_foot import Midstance
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil, soil
-
-Floats = NDArray[np.float64]
 
 Real = float | Floats
 

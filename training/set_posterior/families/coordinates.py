@@ -6,12 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior
-
-Floats = NDArray[np.float64]
 
 #: A range whose lower end is below this share of its upper end is treated as one from zero, where
 #: the logarithm is unbounded: its coordinate is the logarithm of the value plus an offset.

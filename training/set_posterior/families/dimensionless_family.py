@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from soilml.arrays import Floats
 from soilml.config.model_settings import take_prior
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
@@ -42,8 +42,6 @@ from training.set_posterior.families.wheel_family import (
     typical_contact,
     typical_model_errors,
 )
-
-Floats = NDArray[np.float64]
 
 #: Designs are drawn beyond the ends of every range by this share of its width, so that readings at
 #: the ends are not extrapolated.

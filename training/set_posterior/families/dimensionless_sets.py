@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.numerics.prior import Prior
 from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
@@ -14,8 +15,6 @@ from training.set_posterior.families.wheel_family import (
     WheelFamily,
     run_patterns,
 )
-
-Floats = NDArray[np.float64]
 
 #: Columns of a design: slip, radius (m), width (m), load (N), exponent n, bearing modulus
 #: (N/m^(n+2)), largest cohesion (Pa) and largest shear modulus (m) of the prior.

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from datagen.recipe import Recipe
+from soilml.arrays import Floats
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.fitting.shared_errors import PULL_OFFSET_SHARE
@@ -38,8 +38,6 @@ from training.set_posterior.families.wheel_family import (
     typical_contact,
     typical_model_errors,
 )
-
-Floats = NDArray[np.float64]
 
 #: Up to this many unknowns the terms of a polynomial of the third degree (84) can be fitted.
 MOST_UNKNOWNS = 6

@@ -7,16 +7,14 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, USUAL_SENSOR_ERRORS, without_errors
 from soilml.onboard.set_contract import LEAST_STD
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.model import Model
 from training.onnx_graph.value import Value, log, maximum, minimum
 from training.set_posterior.families.coordinates import PriorAxis
-
-Floats = NDArray[np.float64]
 
 #: Logarithms are taken of nothing smaller: slip, load, torque or sinkage of zero or less is then
 #: far out of range.
