@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from soilml.arrays import Floats
+from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
@@ -61,7 +61,7 @@ class PosteriorSamples:
         """Whether the residuals exceed the declared noise."""
         return self.noise_scale > 1.0
 
-    def equally_weighted(self, count: int, seed: int = 0) -> NDArray[np.int64]:
+    def equally_weighted(self, count: int, seed: int = 0) -> Integers:
         """Rows (count,) of the samples, as often as their weights say."""
         offset = np.random.default_rng(seed).random()
         return systematic_resampling(self.sample.weights, count, offset)
