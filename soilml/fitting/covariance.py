@@ -80,10 +80,8 @@ def squared_residuals_and_log_determinant(
         its own.
     columns (k, q) or (n, k, q): C, the columns of the process.
 
-    References
-    ----------
-    Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. A.9 and A.10 (the
-    lemmas of matrix inversion and of determinants).
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. A.9 and
+    A.10 (the lemmas of matrix inversion and of determinants).
     """
     if (std == std[0]).all():  # one factorisation for all sets
         std = std[:1]
@@ -108,10 +106,8 @@ class DiscrepancyProcess:
         \delta_c(s, W) = \tau_c u_c \sum_k w_k \psi_k(s, \ln W), \quad w_k \sim N(0, 1), \quad
         \sum_k \psi_k \psi_k' = e^{-(s - s')^2 / (2 l_s^2) - (\ln W - \ln W')^2 / (2 l_W^2)}
 
-    References
-    ----------
-    Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2;
-    Brynjarsdottir and O'Hagan, Inverse Problems 30, 2014.
+    References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2; Brynjarsdottir
+    and O'Hagan, Inverse Problems 30, 2014.
     """
 
     # (m, q): The functions u_c psi_k at the readings; each is zero outside its channel and gear

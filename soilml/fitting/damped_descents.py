@@ -153,9 +153,7 @@ def descend_together(
     equilibrium. Where the model refuses the coordinates of a trial, its `InputError` takes the
     place of the solution.
 
-    References
-    ----------
-    Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
+    References: Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
     results: dict[int, Solution | InputError] = {}
     descents = [_descent(problem, x) for problem, x in zip(problems, starts, strict=True)]

@@ -87,10 +87,8 @@ def importance_sample(
         hypercube is where the density is.
     most_samples: Number of samples at which sampling ends anyway.
 
-    References
-    ----------
-    Cornuet, Marin, Mira and Robert, Scandinavian J. Statistics 39(4), 2012 (adaptive multiple
-    importance sampling).
+    References: Cornuet, Marin, Mira and Robert, Scandinavian J. Statistics 39(4), 2012 (adaptive
+    multiple importance sampling).
     """
     rng = np.random.default_rng(seed)
     mixtures: list[_Mixture] = []

@@ -39,9 +39,7 @@ def prior_quantiles(prior: Prior, mean: float, std: float, probability: Floats) 
     mean, std: Moments in the parameter's unit.
     probability: Probabilities (...) at which the quantile function is evaluated.
 
-    References
-    ----------
-    Jaynes, Physical Review 106, 1957.
+    References: Jaynes, Physical Review 106, 1957.
     """
     fraction = (np.arange(GRID_POINTS) + 0.5) / GRID_POINTS
     value = prior.at(fraction)
@@ -76,9 +74,7 @@ def moment_matched_weights(weights: Floats, white: Floats) -> Floats:
     white: Samples (n, p), less the wanted mean and divided by the Cholesky factor of the
         covariance.
 
-    References
-    ----------
-    Jaynes, Physical Review 106, 1957.
+    References: Jaynes, Physical Review 106, 1957.
     """
     features = _moment_features(white)
     multipliers = np.zeros(features.shape[1])

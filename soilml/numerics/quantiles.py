@@ -44,9 +44,7 @@ def chi_squared_quantile(degrees: float, normal_quantile: float) -> float:
     with n degrees of freedom, 0.5 or more. At z of 3 to 4 it is up to a tenth too large for one
     degree of freedom, and closer for more.
 
-    References
-    ----------
-    Wilson and Hilferty, Proc. Natl. Acad. Sci. 17, 1931.
+    References: Wilson and Hilferty, Proc. Natl. Acad. Sci. 17, 1931.
 
     Examples
     --------

@@ -22,9 +22,8 @@ def systematic_resampling(weights: Floats, count: int, offset: float) -> NDArray
     count: Number N of indices.
     offset: Uniform draw from [0, 1) for an unbiased sample; 0.5 for a deterministic one.
 
-    References
-    ----------
-    Carpenter, Clifford and Fearnhead, IEE Proc. Radar, Sonar and Navigation 146(1), 1999.
+    References: Carpenter, Clifford and Fearnhead, IEE Proc. Radar, Sonar and Navigation 146(1),
+    1999.
     """
     cumulative = np.cumsum(weights)
     position = (offset + np.arange(count)) / count * cumulative[-1]
@@ -34,9 +33,7 @@ def systematic_resampling(weights: Floats, count: int, offset: float) -> NDArray
 def latin_hypercube(count: int, p: int, rng: np.random.Generator) -> Floats:
     """Points (count, p) in the unit cube, one in each of `count` strata of every axis.
 
-    References
-    ----------
-    McKay, Beckman and Conover, Technometrics 21(2), 1979.
+    References: McKay, Beckman and Conover, Technometrics 21(2), 1979.
     """
     strata = np.stack([rng.permutation(count) for _ in range(p)], axis=1)
     return np.asarray((strata + rng.random((count, p))) / count)

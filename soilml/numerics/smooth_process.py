@@ -36,10 +36,8 @@ def process_columns(
     amplitude (n,): Standard deviation a of the process, in the unit of the values.
     least_eigenvalue: Directions with a smaller fraction of the largest eigenvalue are dropped.
 
-    References
-    ----------
-    Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 4.9 (the covariance)
-    and 8.13 (Nystroem's approximation).
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 4.9 (the
+    covariance) and 8.13 (Nystroem's approximation).
 
     Examples
     --------
@@ -114,9 +112,7 @@ def independent_bound(points: Floats) -> Floats:
     than that of the independent errors. A point far from all others has 1; one of m close together
     has about m.
 
-    References
-    ----------
-    Golub and Van Loan, Matrix Computations, section 4.1.1 (diagonal dominance).
+    References: Golub and Van Loan, Matrix Computations, section 4.1.1 (diagonal dominance).
     """
     return np.concatenate(
         [

@@ -79,11 +79,9 @@ def surface_sample(
         None where no polynomial is accurate enough, or not soon enough, or where predictions are
         missing in the region.
 
-    References
-    ----------
-    Marzouk and Xiu, Communications in Computational Physics 6(4), 2009 (polynomials in place of a
-    model in its posterior). Conrad, Marzouk, Pillai and Smith, J. American Statistical Association
-    111(516), 2016 (their refinement where the posterior is).
+    References: Marzouk and Xiu, Communications in Computational Physics 6(4), 2009 (polynomials in
+    place of a model in its posterior). Conrad, Marzouk, Pillai and Smith, J. American Statistical
+    Association 111(516), 2016 (their refinement where the posterior is).
     """
     rng = np.random.default_rng(seed)
     points, predictions = [], []

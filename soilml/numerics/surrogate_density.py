@@ -77,9 +77,8 @@ def fit_surface(
     degree: Total degree; there must be more points than monomials.
     u, y: Points (n, p) and outputs (n, k).
 
-    References
-    ----------
-    Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2009, eq. 7.64.
+    References: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2009, eq.
+    7.64.
     """
     basis = monomials(scaling(u), degree)
     q, r = np.linalg.qr(basis)

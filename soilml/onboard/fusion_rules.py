@@ -43,9 +43,7 @@ def inverse_variance(mean: Floats, std: Floats, correlation: Floats | None = Non
     mean, std: Estimates and standard deviations (m, ...).
     correlation: Not used.
 
-    References
-    ----------
-    Comin and Saaj 2017, eq. 26, for two.
+    References: Comin and Saaj 2017, eq. 26, for two.
     """
     _check(std)
     information = std**-2.0
@@ -61,9 +59,7 @@ def pairwise(mean: Floats, std: Floats, correlation: Floats | None = None) -> Fu
     A heuristic: not optimal even for independent errors, but less sensitive to one understated
     variance. Not for correlated errors.
 
-    References
-    ----------
-    Comin and Saaj 2017, eq. 30, for three.
+    References: Comin and Saaj 2017, eq. 30, for three.
     """
     _check(std)
     m = len(mean)
@@ -92,9 +88,7 @@ def best_linear(mean: Floats, std: Floats, correlation: Floats | None = None) ->
     mean, std: Estimates and standard deviations (m, ...).
     correlation: Correlation R (m, m) of the errors; the identity by default.
 
-    References
-    ----------
-    Bates and Granger, J. Oper. Res. Soc. 20(4), 1969.
+    References: Bates and Granger, J. Oper. Res. Soc. 20(4), 1969.
     """
     _check(std)
     m = len(mean)
@@ -128,9 +122,7 @@ def covariance_intersection(
 
     Conservative: for independent errors the variance is m times the optimal one.
 
-    References
-    ----------
-    Julier and Uhlmann, Proc. American Control Conference, 1997, with omega = 1/m.
+    References: Julier and Uhlmann, Proc. American Control Conference, 1997, with omega = 1/m.
     """
     _check(std)
     information = std**-2.0
@@ -147,9 +139,7 @@ def _check(std: Floats) -> None:
 def shrink_correlation(correlation: Floats, share: float = 0.1) -> Floats:
     """A correlation matrix (m, m) shrunk by `share` towards its constant-correlation target.
 
-    References
-    ----------
-    Ledoit and Wolf, J. Portfolio Management 30(4), 2004.
+    References: Ledoit and Wolf, J. Portfolio Management 30(4), 2004.
     """
     m = len(correlation)
     if m == 1:

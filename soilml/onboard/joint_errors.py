@@ -47,10 +47,8 @@ class JointErrors:
         between 1 and this number the factors are interpolated in its logarithm. 1 where the data
         have no repeated readings.
 
-    References
-    ----------
-    Comin and Saaj 2017, eq. 26, is the case of independent errors. Bates and Granger, J. Oper.
-    Res. Soc. 20(4), 1969. Birge, Phys. Rev. 40(2), 1932.
+    References: Comin and Saaj 2017, eq. 26, is the case of independent errors. Bates and Granger,
+    J. Oper. Res. Soc. 20(4), 1969. Birge, Phys. Rev. 40(2), 1932.
     """
 
     correlation: Floats

@@ -50,10 +50,9 @@ def truncated_normal(mean: Floats, covariance: Floats, lower: Floats, upper: Flo
 
     The points are the same in each call.
 
-    References
-    ----------
-    Genz, J. Computational and Graphical Statistics 1(2), 1992; Geweke, Hajivassiliou and Keane
-    (the same recursion in econometrics). Points: the additive recurrence of Roberts, 2018.
+    References: Genz, J. Computational and Graphical Statistics 1(2), 1992; Geweke, Hajivassiliou
+    and Keane (the same recursion in econometrics). Points: the additive recurrence of Roberts,
+    2018.
     """
     grid, cumulative = _normal_table()
     root = np.linalg.cholesky(covariance)

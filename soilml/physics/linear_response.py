@@ -50,9 +50,8 @@ def linear_response(
     Returns: NaN in rows whose base row has no equilibrium, or where the load carried does not rise
     with sinkage there.
 
-    References
-    ----------
-    Implicit function theorem; Griewank and Walther, Evaluating Derivatives, 2008, section 15.1.
+    References: Implicit function theorem; Griewank and Walther, Evaluating Derivatives, 2008,
+    section 15.1.
     """
     xp = namespace(load_case.at.slip)
     base_rows = xp.sort(xp.unique_values(base))

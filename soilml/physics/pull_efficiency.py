@@ -27,14 +27,9 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
     Negative where the wheel cannot propel itself; NaN where the soil does not carry the load.
     What effects subtract from the drawbar pull counts as resistance.
 
-    Raises
-    ------
-    InputError
-        For slip that is not above 0: there is no thrust.
+    Raises `InputError` for slip that is not above 0: there is no thrust.
 
-    References
-    ----------
-    Comin and Saaj 2017, eq. 32.
+    References: Comin and Saaj 2017, eq. 32.
     """
     load_case, shape = model.load_case(soil, at)
     xp = namespace(load_case.at.slip)

@@ -65,9 +65,7 @@ def fit_chebyshev_surrogate(
     Raises `FitError` where the relative error exceeds `TOLERANCE` at a check point: the torque is
     then not smooth over the prior.
 
-    References
-    ----------
-    Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013.
+    References: Trefethen, Approximation Theory and Approximation Practice, SIAM, 2013.
     """
     p = len(free)
     node = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)

@@ -163,10 +163,8 @@ class PairedResult(MethodResult):
         mean and covariance alone, its density is Gaussian; a failed set counts as the prior. NaN
         where a parameter is not estimated.
 
-        References
-        ----------
-        Gneiting and Raftery, Strictly proper scoring rules, prediction, and estimation, J. American
-        Statistical Association 102, 2007.
+        References: Gneiting and Raftery, Strictly proper scoring rules, prediction, and estimation,
+        J. American Statistical Association 102, 2007.
         """
         if self.not_estimated.any() and np.isnan(self.log_densities).all():
             return float("nan")
@@ -214,9 +212,7 @@ def jackknife_rmse_ratio_std(squares: Floats, reference_squares: Floats) -> Floa
         paired: because both errors are correlated, the standard error is smaller than that of
         either RMSE alone.
 
-    References
-    ----------
-    Efron and Stein, The jackknife estimate of variance, Annals of Statistics 9, 1981.
+    References: Efron and Stein, The jackknife estimate of variance, Annals of Statistics 9, 1981.
     """
     n = len(squares)
     if n < 2:

@@ -279,9 +279,7 @@ def cholesky_columns(matrix: Value, count: int) -> Value:
 
     Returns: The columns (p, count).
 
-    References
-    ----------
-    Golub and Van Loan, Matrix Computations, section 4.2 (outer-product form).
+    References: Golub and Van Loan, Matrix Computations, section 4.2 (outer-product form).
     """
     columns = []
     for k in range(count):

@@ -43,10 +43,8 @@ class KernelEigensystem:
             \begin{bmatrix} b^T \\ \alpha \end{bmatrix} =
             \begin{bmatrix} 0 \\ Y \end{bmatrix}, \qquad e_i = \alpha_i / (H^{-1})_{ii}
 
-        References
-        ----------
-        Suykens and Vandewalle, Neural Processing Letters 9, 1999; closed-form leave-one-out: Cawley
-        and Talbot, Neural Networks 17(10), 2004.
+        References: Suykens and Vandewalle, Neural Processing Letters 9, 1999; closed-form
+        leave-one-out: Cawley and Talbot, Neural Networks 17(10), 2004.
         """
         weights = 1.0 / (np.maximum(self.values, 0.0) + 1.0 / gamma)
         ones = self.vectors.sum(axis=0)

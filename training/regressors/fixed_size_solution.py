@@ -38,10 +38,8 @@ PASSES = 3
 class FixedSizeSolution:
     """How a fixed-size LS-SVM is solved.
 
-    References
-    ----------
-    Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; De Brabanter et al.,
-    Computational Statistics and Data Analysis 54, 2010 (large data sets).
+    References: Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; De Brabanter
+    et al., Computational Statistics and Data Analysis 54, 2010 (large data sets).
     """
 
     centres: int  # number of prototype rows

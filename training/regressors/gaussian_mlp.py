@@ -43,9 +43,7 @@ class GaussianMLP(GaussianRegressor):
     layers_: Weights and bias of each layer in turn.
     history_: See `loss_history`.
 
-    References
-    ----------
-    Nix and Weigend, Proc. IEEE ICNN, 1994.
+    References: Nix and Weigend, Proc. IEEE ICNN, 1994.
     """
 
     type_name: ClassVar[str] = "mlp"

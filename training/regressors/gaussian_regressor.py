@@ -191,9 +191,7 @@ class FeatureSubset:
     Errors of estimates from different sensors are less correlated than those of different
     regressors of the same reading: fusing them reduces the error more.
 
-    References
-    ----------
-    Comin and Saaj 2017, eqs. 18, 24 and 26.
+    References: Comin and Saaj 2017, eqs. 18, 24 and 26.
     """
 
     name: str  # label in metrics, card and plots

@@ -102,11 +102,9 @@ class FixedSizeLSSVM(KernelExpansion):
     More centres reduce the error only while the function varies over less than their distance; the
     inverse problem from a single reading does not.
 
-    References
-    ----------
-    Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; Williams and Seeger,
-    NIPS 13, 2001 (Nystrom); De Brabanter et al., Computational Statistics and Data Analysis 54(6),
-    2010 (large data sets).
+    References: Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; Williams and
+    Seeger, NIPS 13, 2001 (Nystrom); De Brabanter et al., Computational Statistics and Data Analysis
+    54(6), 2010 (large data sets).
     """
 
     type_name: ClassVar[str] = "fixed-size-lssvm"

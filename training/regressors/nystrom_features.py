@@ -26,11 +26,9 @@ def select_by_renyi_entropy(x: Floats, count: int, width: float, seed: int) -> N
     A random candidate replaces a random selected row wherever that increases H. Columns of the
     kernel matrix of the candidates are computed as they are needed.
 
-    References
-    ----------
-    Suykens, Van Gestel, De Brabanter, De Moor and Vandewalle, Least Squares Support Vector
-    Machines, World Scientific 2002, section 6.2 (fixed-size LS-SVM); Girolami, Neural Computation
-    14, 2002.
+    References: Suykens, Van Gestel, De Brabanter, De Moor and Vandewalle, Least Squares Support
+    Vector Machines, World Scientific 2002, section 6.2 (fixed-size LS-SVM); Girolami, Neural
+    Computation 14, 2002.
     """
     rng = np.random.default_rng(seed)
     candidates = rng.permutation(len(x))[: max(CANDIDATES, CANDIDATES_PER_CENTRE * count)]
@@ -117,10 +115,8 @@ RANK_TOLERANCE = 1e-11
 class NystromFeatures:
     r"""Features (n, k) whose products approximate the kernel: :math:`K_{nm} K_{mm}^{-1/2}`.
 
-    References
-    ----------
-    Williams and Seeger, NIPS 13, 2001; Suykens et al., Least Squares Support Vector Machines, 2002,
-    chapter 6.
+    References: Williams and Seeger, NIPS 13, 2001; Suykens et al., Least Squares Support Vector
+    Machines, 2002, chapter 6.
     """
 
     centres: Floats  # (m, d)

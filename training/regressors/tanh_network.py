@@ -27,10 +27,8 @@ class TanhNetwork:
     generator: Of the first weights, uniform in Glorot's range.
     last_share: Share of that range for the last layer.
 
-    References
-    ----------
-    Glorot and Bengio, AISTATS 2010 (first weights); Kingma and Ba, ICLR 2015 (Adam); Loshchilov and
-    Hutter, ICLR 2019 (decay of the weights).
+    References: Glorot and Bengio, AISTATS 2010 (first weights); Kingma and Ba, ICLR 2015 (Adam);
+    Loshchilov and Hutter, ICLR 2019 (decay of the weights).
     """
 
     def __init__(

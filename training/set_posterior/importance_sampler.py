@@ -103,11 +103,9 @@ def add_importance_sampler(
     context: Standard deviations of nearly known axes.
     system_at: Residuals (m, terms) with errors of sensors integrated out.
 
-    References
-    ----------
-    Cornuet et al., Scandinavian J. Statistics 39(4), 2012 (adaptive rounds); Robert and Casella,
-    Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the others);
-    Kish, Survey Sampling, 1965 (effective sample size).
+    References: Cornuet et al., Scandinavian J. Statistics 39(4), 2012 (adaptive rounds); Robert and
+    Casella, Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the
+    others); Kish, Survey Sampling, 1965 (effective sample size).
     """
     unknowns = len(family.axes)
     sizes = sample_sizes(unknowns)

@@ -326,9 +326,7 @@ def _train_network(
 def one_cycle_rate(done: float) -> float:
     """Learning rate at a share of the steps: half a cosine up, and a longer one down to nothing.
 
-    References
-    ----------
-    Smith and Topin, arXiv:1708.07120, 2017.
+    References: Smith and Topin, arXiv:1708.07120, 2017.
     """
     if done < WARM_UP:
         start, end, share = FIRST_RATE, LARGEST_RATE, done / WARM_UP

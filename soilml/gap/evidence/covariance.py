@@ -158,9 +158,7 @@ def estimate_covariance(
     space (m, q): X, all that soil, effects and smooth functions could explain: the fixed effects.
         Only the component of the residuals outside its span contributes to the estimate.
 
-    References
-    ----------
-    Patterson and Thompson, Biometrika 58, 1971.
+    References: Patterson and Thompson, Biometrika 58, 1971.
     """
     whitened = space / readings.std[:, None]
     basis = column_space(whitened, **FIXED_EFFECT_TOLERANCES) * readings.std[:, None]
@@ -279,9 +277,8 @@ class RestrictedLikelihood:
     B_r = U_r^T D^{-1} Y and T = diag(tau): only matrices of the size of Y^T Y are factored for each
     set of variance components.
 
-    References
-    ----------
-    Woodbury's identity; Searle, Casella and McCulloch, Variance Components, 1992, section 6.6.
+    References: Woodbury's identity; Searle, Casella and McCulloch, Variance Components, 1992,
+    section 6.6.
     """
 
     fixed: int  # q, number of fixed effects; Y has q + 1 columns, the last one the residuals

@@ -117,9 +117,7 @@ class DiscrepancyModel:
         extra (m, k): Signatures of further effects, in the readings' unit per reference size, which
             are treated as linear.
 
-        References
-        ----------
-        MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992, section 2.
+        References: MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992, section 2.
         """
         problem = _linearised(self, fit, extra)
         amplitude = np.zeros(len(self.process.usual)) if start is None else start.copy()

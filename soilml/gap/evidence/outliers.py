@@ -50,9 +50,7 @@ def outliers(
         Run of each reading. Where a group has several runs, only another run confirms a reading:
         neighbouring samples of one run may share a fault.
 
-    References
-    ----------
-    Cook and Weisberg, Residuals and Influence in Regression, 1982.
+    References: Cook and Weisberg, Residuals and Influence in Regression, 1982.
     """
     whiten = covariance.whiten
     basis = column_space(whiten @ space, **FIXED_EFFECT_TOLERANCES)

@@ -63,9 +63,8 @@ def repeat_disagreement(
 
     Returns: Of the channels with repeats, the least probable first.
 
-    References
-    ----------
-    Rao, Linear Statistical Inference and Its Applications, 2nd edition 1973, section 8b.
+    References: Rao, Linear Statistical Inference and Its Applications, 2nd edition 1973, section
+    8b.
     """
     matrix = np.diag(readings.std**2) if covariance is None else covariance
     value = readings.reading if expected is None else readings.reading - expected

@@ -62,9 +62,7 @@ def score_test(
     degrees_of_freedom : float
         Of the noise estimate; the draws are from Student's t distribution.
 
-    References
-    ----------
-    Westfall and Young, Resampling-Based Multiple Testing, 1993.
+    References: Westfall and Young, Resampling-Based Multiple Testing, 1993.
     """
     projected = project_out(columns, space)
     norm = np.linalg.norm(columns, axis=0)

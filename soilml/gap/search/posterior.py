@@ -56,10 +56,8 @@ class Posterior:
         A set that contains a likelier one counts towards it and is not listed; so does a set to the
         part of it whose effects are each present with a probability above one half.
 
-        References
-        ----------
-        Barbieri and Berger, Optimal predictive model selection, Annals of Statistics 32, 2004: of
-        single models, that of these effects predicts best under usual conditions.
+        References: Barbieri and Berger, Optimal predictive model selection, Annals of Statistics
+        32, 2004: of single models, that of these effects predicts best under usual conditions.
         """
         groups: dict[Names, set[Names]] = {}
         for names in sorted(self.log_weights, key=lambda n: (-self.log_weights[n], n)):

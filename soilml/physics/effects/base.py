@@ -77,11 +77,8 @@ class Effect:
     the stages that it acts at; the others pass their value on unchanged. With its parameters at
     their defaults an effect changes nothing, to the last bit.
 
-    Raises
-    ------
-    InputError
-        When a subclass is defined with a public method that begins with ``on_`` and is not one of
-        `STAGES`.
+    Raises `InputError` when a subclass is defined with a public method that begins with ``on_`` and
+    is not one of `STAGES`.
 
     Examples
     --------

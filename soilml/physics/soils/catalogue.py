@@ -95,10 +95,7 @@ def _entry(name: str, source: str, assumed: dict[str, float], entry: dict[str, A
 def soil(name: str, **changes: Real) -> Soil:
     """The soil `name` of the catalogue, with single values replaced by `changes`.
 
-    Raises
-    ------
-    InputError
-        For a name or a field that does not exist.
+    Raises `InputError` for a name or a field that does not exist.
 
     Examples
     --------
