@@ -13,7 +13,7 @@ import sys
 
 TYPE_CHECKING = False  # this module is the first of the command line: it imports little
 if TYPE_CHECKING:
-    from types import FrameType, TracebackType
+    from types import FrameType
     from typing import Any, NoReturn
 
 
@@ -44,12 +44,7 @@ class StopSignals:
                 self._before[number] = handler
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         for number, handler in self._before.items():
             signal.signal(number, handler)
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case, take_case
 from soilml.errors import FitError, InputError, SoilmlError
 from soilml.experiment_design.design import Advice, CandidateGrid, advise, candidate_grid
@@ -31,7 +31,6 @@ from soilml.remarks import Remark
 if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
 
-Floats = NDArray[np.float64]
 
 #: Samples and simulated readings of an advice that accompanies a result: takes half a second.
 QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128

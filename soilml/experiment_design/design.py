@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.experiment_design.expected_variance import (
@@ -22,8 +23,6 @@ from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.quantities import column
-
-Floats = NDArray[np.float64]
 
 #: Default slips, and the number of default loads.
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
@@ -187,21 +186,9 @@ class Advice:
         The frame marks the best row, rings the measured ones. Points at which the wheel might not
         be carried are blank. Channels are those of the first set.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib, one for each parameter; by default a new figure.
-        measured
-            Operating points of earlier rows.
-
-        Returns
-        -------
-        ndarray of Axes, shape (parameters,)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: axes of matplotlib, one for each parameter; by default a new figure. `measured`:
+        operating points of earlier rows. Returns the axes, (parameters,). Raises `InputError` for
+        another number of axes.
         """
         from soilml.experiment_design.presentation import plot_maps
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import range_with_zero
 from soilml.errors import InputError
@@ -18,8 +19,6 @@ from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
 from soilml.numerics.resampling import systematic_resampling
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
-
-Floats = NDArray[np.float64]
 
 #: Largest probability of no equilibrium at a point that is advised.
 MOST_FAILURE = 0.05
@@ -155,10 +154,8 @@ class ExpectedVariance:
         mean. The result is at most the current variance, as no reading widens a posterior on
         average.
 
-        References
-        ----------
-        Lindley, Annals of Mathematical Statistics 27, 1956. Chaloner and Verdinelli, Statistical
-        Science 10, 1995, section 2.
+        References: Lindley, Annals of Mathematical Statistics 27, 1956. Chaloner and Verdinelli,
+        Statistical Science 10, 1995, section 2.
         """
         weights = self._leave_one_out_weights(log_likelihood)
         theta = self.samples.standardised

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import erf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
@@ -16,8 +16,6 @@ from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube
-
-Floats = NDArray[np.float64]
 
 #: Default number of samples.
 SAMPLES = 2048

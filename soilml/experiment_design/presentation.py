@@ -9,14 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.experiment_design.design import Advice, RatedRow
 from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import NEXT_ROW, Remark
 from soilml.report.figure_style import save_png, take_axes
-
-Floats = NDArray[np.float64]
 
 #: Differences of remaining fractions that are not reported: the sampling error of one call.
 NEGLIGIBLE = 0.02

@@ -60,7 +60,8 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     whole = _with_effects(parts[0].case, effects)
     neutral: dict[str, Any] = {}
     for effect in effects.values():
-        neutral |= _neutral_values(effect)
+        unchanged = parameter_values(effect())  # at which it changes nothing
+        neutral |= {f"{effect.name}.{path}": value for path, value in unchanged.items()}
     sets = np.asarray([part.sets for part in parts])
     points = np.asarray([part.points for part in parts])
     set_ends = np.cumsum(sets)
@@ -103,11 +104,6 @@ def _with_effects(case: Case, effects: Mapping[str, type[Effect]]) -> Case:
     own = {effect.name: effect for effect in case.model.effects}
     joined = tuple(own.get(name, effect()) for name, effect in effects.items())
     return replace(case, model=replace(case.model, effects=joined))
-
-
-def _neutral_values(effect: type[Effect]) -> dict[str, Any]:
-    """Parameters by path of an effect that changes nothing."""
-    return {f"{effect.name}.{path}": value for path, value in parameter_values(effect()).items()}
 
 
 def _joined_operating(parts: Sequence[CaseSets]) -> Operating:

@@ -122,21 +122,9 @@ class Fit:
     def plot(self, ax: Any = None, prior: Mapping[str, Prior] | None = None) -> NDArray[Any]:
         """Draw each parameter with its 90 % interval, in usual units (kPa, degrees, mm).
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib, one for each parameter; a new figure where None.
-        prior
-            Priors by parameter, such as those of the case, whose ranges are shaded.
-
-        Returns
-        -------
-        ndarray of Axes, shape (p,)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: axes of matplotlib, one for each parameter; a new figure where None. `prior`: priors
+        by parameter, such as those of the case, whose ranges are shaded. Returns the axes, (p,).
+        Raises `InputError` for another number of axes.
         """
         return self.intervals(prior).plot(ax)
 

@@ -82,12 +82,9 @@ class Table:
 
     def __getitem__(self, name: str) -> Column:
         if name not in self.columns:
-            shown = name or "''"
-            raise TableError(f"{self.source}: column {shown} is missing; found: {self._found()}")
+            shown, found = name or "''", ", ".join(self.columns) or "no column"
+            raise TableError(f"{self.source}: column {shown} is missing; found: {found}")
         return self.columns[name]
-
-    def _found(self) -> str:
-        return ", ".join(self.columns) or "no column"
 
     @property
     def answered(self) -> NDArray[np.bool_]:

@@ -75,20 +75,9 @@ class ImportedLog:
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the rows over slip with 90 % intervals, a panel for each measured channel.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib, one for each of torque, drawbar pull and sinkage that was measured;
-            a new figure where None.
-
-        Returns
-        -------
-        ndarray of Axes, shape (channels,)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: axes of matplotlib, one for each of torque, drawbar pull and sinkage that was
+        measured; a new figure where None. Returns the axes, (channels,). Raises `InputError` for
+        another number of axes.
         """
         from soilml.log_import.figures import plot_rows
 

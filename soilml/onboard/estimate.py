@@ -237,19 +237,8 @@ class Estimate:
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw each quantity with its 90 % interval and the range of its prior, in usual units.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib, one for each quantity; a new figure where None.
-
-        Returns
-        -------
-        ndarray of Axes, shape (q,)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: axes of matplotlib, one for each quantity; a new figure where None. Returns the axes,
+        (q,). Raises `InputError` for another number of axes.
         """
         from soilml.report.parameter_figure import ParameterIntervals
 

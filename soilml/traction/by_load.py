@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.numerics.quantiles import quantile_band
@@ -17,8 +17,6 @@ from soilml.remarks import Remark
 from soilml.row_status import Status
 from soilml.traction.pull_and_slope import PullDiscrepancy, Traction, predict_traction
 from soilml.traction.soil_draws import SoilDraws
-
-Floats = NDArray[np.float64]
 
 #: Extrapolation beyond the measured slips (difference) and loads (factor) that is reported.
 SLIP_MARGIN, LOAD_FACTOR = 0.1, 1.25

@@ -38,26 +38,14 @@ Result = TypeVar("Result", bound=Plotted)
 
 @dataclass(frozen=True)
 class Presentation(Generic[Result]):
-    """What one kind of result is written as.
+    """What one kind of result is written as."""
 
-    Attributes
-    ----------
-    columns
-        The CSV table of a result, in SI units.
-    text
-        Tables and warnings for a terminal.
-    warnings
-        The warnings alone.
-    page
-        The page of results by group, the column of the groups, model file and table.
-    panels
-        Rows and columns of axes that `plot` takes, and the size of the figure, inches.
-    """
-
-    columns: Callable[[Result], Mapping[str, Any]]
-    text: Callable[[Result], str]
-    warnings: Callable[[Result], Sequence[Remark]]
+    columns: Callable[[Result], Mapping[str, Any]]  # The CSV table of a result, in SI units
+    text: Callable[[Result], str]  # Tables and warnings for a terminal
+    warnings: Callable[[Result], Sequence[Remark]]  # The warnings alone
+    # The page of results by group, the column of the groups, model file and table
     page: Callable[[Mapping[str, Result], str | None, tuple[str, str]], Report]
+    # Rows and columns of axes that `plot` takes, and the size of the figure, inches
     panels: Callable[[Result], tuple[int, int, tuple[float, float]]]
 
 

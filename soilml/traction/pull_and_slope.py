@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.model_discrepancy import range_with_zero
 from soilml.fitting.operating_points import operating_points
@@ -20,8 +21,6 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.traction.soil_draws import SoilDraws
-
-Floats = NDArray[np.float64]
 
 #: Upper end of the slopes searched, rad (86 degrees); steeper ones are clipped to it.
 LARGEST_SLOPE = 1.5
@@ -174,12 +173,8 @@ def _largest(values: Floats) -> Floats:
 class PullDiscrepancy:
     """Errors of the predicted pull, N: one for each draw of the soil, load and slip.
 
-    Attributes
-    ----------
-    amplitude
-        Standard deviation before any reading, N.
-    posterior, prior
-        Draws (n, loads, m) of the error, given the measured pulls and before them.
+    amplitude: Standard deviation before any reading, N.
+    posterior, prior: Draws (n, loads, m) of the error, given the measured pulls and before them.
     """
 
     amplitude: float
@@ -204,21 +199,14 @@ def draw_pull_discrepancy(
     .. math:: E[w] = M^{-1} B^T D^{-1} r, \quad \operatorname{cov}[w] = M^{-1}, \quad
         M = I + B^T B, \quad B = D^{-1} C
 
-    Parameters
-    ----------
-    case
-        Model, noise and discrepancy.
-    table
-        Rows with status ok. A share of the range is that of their pulls, or, where no pull was
+    case: Model, noise and discrepancy.
+    table: Rows with status ok. A share of the range is that of their pulls, or, where no pull was
         measured, of the median prediction for these rows.
-    draws
-        Draws of the soil, given the same rows.
-    noise_scale
-        Factor on noise and discrepancy; None to leave the measured pulls out.
+    draws: Draws of the soil, given the same rows.
+    noise_scale: Factor on noise and discrepancy; None to leave the measured pulls out.
 
-    References
-    ----------
-    Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.7 and 2.8.
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.7 and
+    2.8.
     """
     key = column("drawbar_pull")
     own = case.discrepancy.get(key)

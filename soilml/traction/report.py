@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.operating_points import operating_points
 from soilml.io.read_table import Rows, as_table
@@ -33,8 +34,6 @@ from soilml.traction.soil_draws import measured_soil, prior_draws
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-
-Floats = NDArray[np.float64]
 
 PRIOR, POSTERIOR, MEASURED = "#d9d9d9", "#005b96", "#cc7a00"
 
@@ -66,22 +65,9 @@ class PullReport:
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw pull (N) and slope (degrees) against slip with 90 % bands, a column for each load.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib, two for each load: pull first, then slopes; a new figure where None.
-
-        Returns
-        -------
-        ndarray of Axes, shape (2, loads)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: axes of matplotlib, two for each load: pull first, then slopes; a new figure where
+        None. Returns the axes, (2, loads). Raises `InputError` for another number of axes.
         """
-        from soilml.traction.report import plot_pull
-
         return plot_pull(self, ax)
 
 

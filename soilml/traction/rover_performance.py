@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
@@ -15,8 +15,6 @@ from soilml.numerics.root_finding import rising_root
 from soilml.physics.operating_point import Operating
 from soilml.traction.pull_and_slope import on_a_vehicle
 from soilml.traction.soil_draws import SoilDraws
-
-Floats = NDArray[np.float64]
 
 #: Loads (N) that agree to this share are those of one wheel, solved once.
 SAME_LOAD = 1e-9

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
@@ -24,8 +25,6 @@ from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.report import POSTERIOR, PRIOR
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import SoilDraws, measured_soil, prior_draws
-
-Floats = NDArray[np.float64]
 
 #: Slopes that are looked at by default, rad.
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])
@@ -48,22 +47,9 @@ class RoverReport:
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw slip, margin and energy against the slope, and the steepest slope.
 
-        Parameters
-        ----------
-        ax
-            Four axes of matplotlib; a new figure where None.
-
-        Returns
-        -------
-        ndarray of Axes, shape (2, 2)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: four axes of matplotlib; a new figure where None. Returns the axes, (2, 2). Raises
+        `InputError` for another number of axes.
         """
-        from soilml.traction.rover_report import plot_rover
-
         return plot_rover(self, ax)
 
 
@@ -79,32 +65,19 @@ def rover_report(
 ) -> RoverReport:
     """Performance of the case's rover on the soil that the rows were measured on.
 
-    Parameters
-    ----------
-    case
-        With a rover. `soilml.config.case.Case` describes the rest.
-    table
-        Measured rows of one soil. A column `wheel` that names wheels of the rover stands for the
+    case: With a rover. `soilml.config.case.Case` describes the rest.
+    table: Measured rows of one soil. A column `wheel` that names wheels of the rover stands for the
         gear and the pass of its rows.
-    free
-        Paths of the unknown parameters; by default those with a prior.
-    slopes
-        From 0 to 60 degrees, rad; by default 0 to 20 degrees in steps of 5, where all wheels stay
-        on the ground.
-    slip_limit
-        Highest slip; by default the highest measured one, at least 0.6.
-    estimator
-        Trained estimator whose estimate replaces the posterior.
-    as_usual
-        Whether sensors and model have their typical errors, as in `identify`; not
-        with an estimator.
+    free: Paths of the unknown parameters; by default those with a prior.
+    slopes: From 0 to 60 degrees, rad; by default 0 to 20 degrees in steps of 5, where all wheels
+        stay on the ground.
+    slip_limit: Highest slip; by default the highest measured one, at least 0.6.
+    estimator: Trained estimator whose estimate replaces the posterior.
+    as_usual: Whether sensors and model have their typical errors, as in `identify`; not with an
+        estimator.
 
-    Raises
-    ------
-    InputError
-        As `rover_performance` does, or for a slip limit outside (0, 1).
-    FitError, TableError
-        As `identify` with the posterior method.
+    Raises `InputError` as `rover_performance` does, or for a slip limit outside (0, 1); `FitError`,
+    `TableError` as `identify` with the posterior method.
     """
     if case.rover is None:
         raise InputError("the model file has no [rover]")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.compatibility import (
     check_wheel_size,
@@ -35,8 +36,6 @@ from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark
-
-Floats = NDArray[np.float64]
 
 #: Number of draws: the probability below a 5 % quantile of as many has a standard error of 1.1 %.
 DRAWS = 400
@@ -90,14 +89,9 @@ def estimated_draws(
     truncated Gaussian does not. Moments that no density in the range has are met as nearly as
     samples allow. Priors must be uniform, not logarithmic.
 
-    Raises
-    ------
-    InputError
-        For a covariance that is not positive definite, or a mean outside the range.
+    Raises `InputError` for a covariance that is not positive definite, or a mean outside the range.
 
-    References
-    ----------
-    Jaynes, Phys. Rev. 106, 1957.
+    References: Jaynes, Phys. Rev. 106, 1957.
     """
     low = np.asarray([f.prior.lower for f in free])
     width = np.asarray([f.prior.upper for f in free]) - low

@@ -89,13 +89,8 @@ class MethodScores(list[MethodResult]):
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw the RMSE over the prior's standard deviation, and the coverage of 90 % intervals.
 
-        ax: Axes of matplotlib, two for each of q parameters; a new figure where None.
-
-        Returns
-        -------
-        ndarray of Axes, shape (2, q)
-
-        Raises `InputError` for another number of axes.
+        `ax`: axes of matplotlib, two for each of q parameters; a new figure where None. Returns the
+        axes, (2, q). Raises `InputError` for another number of axes.
         """
         from training.benchmark.user_report import plot_comparison
 

@@ -149,14 +149,10 @@ def _merge(sizes: list[Size], steps: list[list[Size]]) -> tuple[list[Size], list
     steps = [[own[axis] for axis in kept] for own in steps]
     for axis in range(len(sizes) - 1, 0, -1):
         both_variable = not sizes[axis].fixed and not sizes[axis - 1].fixed
-        if not both_variable and all(_follows(own, sizes, axis) for own in steps):
+        if not both_variable and all(own[axis - 1] == own[axis] * sizes[axis] for own in steps):
             sizes[axis - 1] = sizes[axis - 1] * sizes[axis]
             del sizes[axis]
             for own in steps:
                 own[axis - 1] = own[axis]
                 del own[axis]
     return sizes, steps
-
-
-def _follows(steps: list[Size], sizes: list[Size], axis: int) -> bool:
-    return steps[axis - 1] == steps[axis] * sizes[axis]

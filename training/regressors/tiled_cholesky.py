@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.linalg.lapack import dpotrf, dtrtri
@@ -58,7 +58,7 @@ class TiledCholesky:
                 raise np.linalg.LinAlgError("the kernel matrix is not positive definite")
             found.inverses.append(np.ascontiguousarray(dtrtri(factor, lower=1)[0]))
             rows = range(k + 1, count)
-            for i, tile in zip(rows, ordered_map(_bound(below, k), rows), strict=True):
+            for i, tile in zip(rows, ordered_map(partial(below, k), rows), strict=True):
                 found.tiles[i].append(tile)
             progress(k + 1, count)
         return found
@@ -100,7 +100,3 @@ class TiledCholesky:
             parts.append(part)
             progress(done + 1, count)
         return np.concatenate(parts)
-
-
-def _bound(function: Callable[[int, int], Floats], k: int) -> Callable[[int], Floats]:
-    return lambda i: function(k, i)

@@ -72,22 +72,9 @@ class Audit:
     def plot(self, ax: Any = None) -> Any:
         """Draw what is left of each effect beside the soil, and what separates it, in sigma.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib; by default those of a new figure.
-
-        Returns
-        -------
-        Axes
-
-        Raises
-        ------
-        InputError
-            For several axes.
+        `ax`: axes of matplotlib; by default those of a new figure. Returns the axes. Raises
+        `InputError` for several axes.
         """
-        from soilml.gap.design.identifiability import plot_audit
-
         return plot_audit(self, ax)
 
     def as_json(self) -> dict[str, Any]:

@@ -278,21 +278,9 @@ class GapReport:
     def plot(self, ax: Any = None, part: str = "train") -> Any:
         """Draw the mean squared residuals of all readings and of each channel, before and after.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib; a new figure where None.
-        part
-            A key of `gap`: the fitted rows (`train`), or a held-out part.
-
-        Returns
-        -------
-        Axes
-
-        Raises
-        ------
-        InputError
-            For a part that the report does not have, or several axes.
+        `ax`: axes of matplotlib; a new figure where None. `part`: a key of `gap`: the fitted rows
+        (`train`), or a held-out part. Returns the axes. Raises `InputError` for a part that the
+        report does not have, or several axes.
         """
         from soilml.gap.report.gap_figure import plot_gap
 

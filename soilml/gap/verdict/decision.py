@@ -150,17 +150,13 @@ def with_refused_outside(result: SearchResult) -> SearchResult:
     They need an implausible size, or another law than the catalogue's. Where a part of such a set
     is accepted, what is refused is its supplement, not that part.
     """
-    far = {c.names for c in result.candidates if c.names and _is_refused(c)}
+    candidates = [c for c in result.candidates if c.names]
+    far = {c.names for c in candidates if _implausible(c.fit) or _far_from_catalogue(c)}
     parts = [set(c.names) for c in result.accepted if c.names not in far]
     refused = {
         names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
     }
     return replace(result, posterior=replace(result.posterior, refused=refused))
-
-
-def _is_refused(candidate: Explanation) -> bool:
-    """Whether an explanation needs an implausible size, or another law than the catalogue's."""
-    return _implausible(candidate.fit) or _far_from_catalogue(candidate)
 
 
 def _far_from_catalogue(best: Explanation) -> bool:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import TableError
 from soilml.identification.bevameter.scatter import (
     Scatter,
@@ -20,8 +21,6 @@ from soilml.identification.bevameter.scatter import (
 from soilml.io.table import Table
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
-
-Floats = NDArray[np.float64]
 
 #: Most points of a curve that are kept: means over equal steps of sinkage, so that neither a slow
 #: part of a test nor a high sampling rate counts more than the rest.
@@ -61,16 +60,10 @@ class PlateTest:
 def read_plate_tests(table: Table) -> list[PlateTest]:
     """The tests of a table of plate-sinkage tests.
 
-    Parameters
-    ----------
-    table
-        Rows with `test`, `sinkage_m`, the plate as `plate_radius_m`, as `plate_width_m` and
+    table: Rows with `test`, `sinkage_m`, the plate as `plate_radius_m`, as `plate_width_m` and
         `plate_length_m`, or as `plate_area_m2` (of a round plate), and `pressure_Pa` or `load_N`.
 
-    Raises
-    ------
-    TableError
-        Names the column that is missing, or the test that has no usable curve.
+    Raises `TableError`, which names the missing column, or the test without a usable curve.
     """
     if len(table) == 0:
         raise TableError(f"{table.source}: the table has no row")
@@ -239,10 +232,8 @@ def fit_pressure_sinkage(tests: Sequence[PlateTest]) -> PressureSinkageFit:
     gives the uncertainty. It contains the bend of the curves in the logarithm, as an exponent
     that is not the same at all depths.
 
-    References
-    ----------
-    Bekker, Introduction to Terrain-Vehicle Systems, 1969. Wong, J. Terramechanics 17(1), 1980,
-    weighted least squares of pressure-sinkage data.
+    References: Bekker, Introduction to Terrain-Vehicle Systems, 1969. Wong, J. Terramechanics
+    17(1), 1980, weighted least squares of pressure-sinkage data.
     """
     depth = _reference_depth(tests)
     curves = tuple(_fit_curve(test, depth) for test in tests)

@@ -62,20 +62,8 @@ class BevameterResult:
 
         Dots are measured, thin lines fitted to each test, thick lines the law of the result.
 
-        Parameters
-        ----------
-        ax
-            Axes of matplotlib: one for plate tests and two for shear tests; by default a new
-            figure.
-
-        Returns
-        -------
-        ndarray of Axes, shape (panels,)
-
-        Raises
-        ------
-        InputError
-            For another number of axes.
+        `ax`: axes of matplotlib: one for plate tests and two for shear tests; by default a new
+        figure. Returns the axes, (panels,). Raises `InputError` for another number of axes.
         """
         axes = take_axes(ax, 1, _panels(self), _size(self))[0]
         panels = list(axes)

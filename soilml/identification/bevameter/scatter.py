@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from soilml.arrays import Floats
 
 #: Draws by which uncertainties are carried from test results to soil parameters: quantiles of 2.5
 #: and 97.5 % are then known to 2 % of the standard deviation.
@@ -28,21 +28,12 @@ LEAST_FITTED = 1e-3
 
 @dataclass(frozen=True)
 class SpreadEstimate:
-    """A value with two ranges of 95 %.
+    """A value with two ranges of 95 %."""
 
-    Attributes
-    ----------
-    value
-        The estimate, in `unit`.
-    mean_95
-        Where the mean of many such tests would lie.
-    another_place_95
-        Where the value at another place of the same soil would lie; it contains the scatter from
-        test to test, and is what a prior for other runs should be.
-    """
-
-    value: float
-    mean_95: tuple[float, float]
+    value: float  # The estimate, in `unit`
+    mean_95: tuple[float, float]  # Where the mean of many such tests would lie
+    # Where the value at another place of the same soil would lie; it contains the scatter from test
+    # to test, and is what a prior for other runs should be
     another_place_95: tuple[float, float]
     unit: str
 
@@ -112,16 +103,11 @@ def pooled_scatter(residuals: Floats, usual: Floats, estimated: int) -> Scatter:
 
     .. math:: S = \frac{\nu_0 \, \mathrm{diag}(s_0^2) + \sum_i r_i r_i^T}{\nu_0 + \nu}
 
-    Parameters
-    ----------
-    usual
-        Standard deviations s_0, (q,), that repeated tests of such a quantity usually have.
-    estimated
-        Number of means that were fitted to the tests; nu is the number of tests less this.
+    usual: Standard deviations s_0, (q,), that repeated tests of such a quantity usually have.
+    estimated: Number of means that were fitted to the tests; nu is the number of tests less this.
 
-    References
-    ----------
-    Gelman et al., Bayesian Data Analysis, 2013, section 2.6, scaled inverse chi-squared prior.
+    References: Gelman et al., Bayesian Data Analysis, 2013, section 2.6, scaled inverse chi-squared
+    prior.
     """
     freedom = max(len(residuals) - estimated, 0)
     total = USUAL_FREEDOM * np.diag(usual**2) + residuals.T @ residuals

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.errors import TableError
 from soilml.identification.bevameter.plate_tests import thinned
 from soilml.identification.bevameter.scatter import (
@@ -18,8 +18,6 @@ from soilml.identification.bevameter.scatter import (
     spread_estimate,
 )
 from soilml.io.table import Table
-
-Floats = NDArray[np.float64]
 
 #: Points of a shear curve that its two parameters need.
 LEAST_POINTS = 2
@@ -66,21 +64,13 @@ def read_shear_tests(table: Table) -> list[ShearTest]:
     taken as constant over the ring. A row whose displacement or angle is blank holds the steady
     shear stress at the end of the test.
 
-    Parameters
-    ----------
-    table
-        Rows with `test`, and either `normal_stress_Pa`, `shear_displacement_m`, `shear_stress_Pa`,
-        or `inner_radius_m`, `outer_radius_m`, `angle_rad`, `torque_Nm`, `load_N` (or
-        `normal_stress_Pa`).
+    table: Rows with `test`, and either `normal_stress_Pa`, `shear_displacement_m`,
+        `shear_stress_Pa`, or `inner_radius_m`, `outer_radius_m`, `angle_rad`, `torque_Nm`, `load_N`
+        (or `normal_stress_Pa`).
 
-    Raises
-    ------
-    TableError
-        Names the column that is missing, or the test that has no usable curve.
+    Raises `TableError`, which names the missing column, or the test without a usable curve.
 
-    References
-    ----------
-    Wong, Theory of Ground Vehicles, 2008, section 2.4, shear ring.
+    References: Wong, Theory of Ground Vehicles, 2008, section 2.4, shear ring.
     """
     if len(table) == 0:
         raise TableError(f"{table.source}: the table has no row")
@@ -214,9 +204,8 @@ def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
     with the deviation of the ends and peaks of the curves from the fitted shape. A line that meets
     the axis below zero is drawn again through the origin.
 
-    References
-    ----------
-    Janosi and Hanamoto, Proc. 1st ISTVS, 1961. Wong, Theory of Ground Vehicles, 2008, section 2.4.
+    References: Janosi and Hanamoto, Proc. 1st ISTVS, 1961. Wong, Theory of Ground Vehicles, 2008,
+    section 2.4.
     """
     curves = tuple(fit_shear_curve(test) for test in tests)
     sigma = np.asarray([test.normal_stress for test in tests])

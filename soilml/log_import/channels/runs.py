@@ -113,7 +113,7 @@ def matched_files(
         }
     found: dict[str, list[Member]] = {}
     for file, name, log in zip(files, names, logs, strict=True):
-        matching = [k for k in kinds if fnmatch.fnmatch(name, k.pattern) or _name_fits(file, k)]
+        matching = [k for k in kinds if fnmatch.filter((name, file.name), k.pattern)]
         if len(matching) != 1:
             known = ", ".join(f"{k.name} = {k.pattern!r}" for k in kinds)
             raise InputError(
@@ -132,10 +132,6 @@ def matched_files(
                 f"{', '.join(str(recording.file) for recording, _ in members)}"
             )
     return found
-
-
-def _name_fits(file: Path, kind: FileKind) -> bool:
-    return fnmatch.fnmatch(file.name, kind.pattern)
 
 
 def run_names(files: Sequence[Path]) -> list[str]:

@@ -158,12 +158,10 @@ def offered_effects(gear: Gear) -> list[type[Effect]]:
     return [
         effect
         for effect in EFFECTS.values()
-        if effect.about.kind in OFFERED_KINDS and not effect.about.needs and _applies(effect, gear)
+        if effect.about.kind in OFFERED_KINDS
+        and not effect.about.needs
+        and (not effect.gear_types or isinstance(gear, effect.gear_types))
     ]
-
-
-def _applies(effect: type[Effect], gear: Gear) -> bool:
-    return not effect.gear_types or isinstance(gear, effect.gear_types)
 
 
 def with_sliders(case: Case, request: dict[str, Any]) -> tuple[Case, dict[str, float]]:

@@ -109,13 +109,8 @@ class ClimbingReport:
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw pull (N) and slope (degrees) against slip with 90 % bands, and the climbs.
 
-        ax: Two axes of matplotlib; a new figure where None.
-
-        Returns
-        -------
-        ndarray of Axes, shape (2,)
-
-        Raises `InputError` for another number of axes.
+        `ax`: two axes of matplotlib; a new figure where None. Returns the axes, (2,). Raises
+        `InputError` for another number of axes.
         """
         left, right = axes = take_axes(ax, 1, 2, FIGURE_SIZE)[0]
         slip = self.ability.slip
