@@ -17,8 +17,7 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output, write_files
 from soilml.io.cell_text import escaped
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
-from soilml.report.page import Provenance, Report
-from soilml.report.result_files import Content, report_texts
+from soilml.report.page import Content, Provenance, Report, report_texts
 from soilml.report.terminal import rounded, shown_column
 
 _ENDING = re.compile(r"_(std|p05|p95)$")

@@ -8,8 +8,13 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from soilml.config.measurement_noise import Noise, take_bias, take_noise
-from soilml.config.model_discrepancy import Discrepancy, take_discrepancy
+from soilml.config.measurement_noise import (
+    Discrepancy,
+    Noise,
+    take_bias,
+    take_discrepancy,
+    take_noise,
+)
 from soilml.config.model_settings import (
     UNNAMED_GEAR,
     take_effects,

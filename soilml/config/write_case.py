@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import discrepancy_as_settings
+from soilml.config.measurement_noise import discrepancy_as_settings
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.config.wheeled_rover import WheeledRover
 from soilml.numerics.prior import Prior

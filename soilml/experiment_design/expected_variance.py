@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import range_with_zero
+from soilml.config.measurement_noise import range_with_zero
 from soilml.errors import InputError
 from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.fitting.covariance import noise_of_operation

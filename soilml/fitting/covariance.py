@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import Discrepancy, range_with_zero
+from soilml.config.measurement_noise import Discrepancy, range_with_zero
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.operating_points import gear_numbers
 from soilml.fitting.predictions import predict

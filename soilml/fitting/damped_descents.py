@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.least_squares import LeastSquaresProblem, SoilTestTerms, Solution
 from soilml.fitting.predictions import (
     Linearisation,
     PredictionRequest,
     linearise_many,
     predict_many,
 )
-from soilml.fitting.soil_tests import SoilTestTerms
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 25

@@ -21,15 +21,43 @@ from soilml.fitting.predictions import (
     readings_by_gear,
 )
 from soilml.fitting.readings import Readings
-from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.sinkage_estimate import SinkageEstimate
+from soilml.physics.soils.soil_tests import deviation_rates, deviations
 
 Floats = NDArray[np.float64]
 
 #: Residual, in standard deviations, of a reading without equilibrium at a trial: large enough that
 #: the trial is rejected, finite so that trials can still be compared.
 NO_EQUILIBRIUM = 1e3
+
+
+@dataclass(frozen=True)
+class SoilTestTerms:
+    """Deviations of the soil from the tests of a case, at coordinates of a fit.
+
+    Each is a residual of unit variance beside those of the readings. It has neither discrepancy nor
+    scatter from run to run: its own scatter contains that from place to place.
+    """
+
+    case: Case | None = None
+    coordinates: Sequence[Coordinate] = ()
+
+    def deviation(self, x: Floats) -> Floats:
+        """Deviations (..., t) at coordinates x (..., p), in standard deviations."""
+        if self.case is None or not self.case.soil_tests:
+            return np.zeros((*x.shape[:-1], 0))
+        names = [c.path for c in self.coordinates]
+        values = values_at(self.coordinates, x)
+        return deviations(self.case.soil_tests, self.case.soil, names, values)
+
+    def rates(self, x: Floats) -> Floats:
+        """Derivatives (t, p) of the deviations at coordinates x (p,)."""
+        if self.case is None or not self.case.soil_tests:
+            return np.zeros((0, len(x)))
+        names = [c.path for c in self.coordinates]
+        values, rates = values_at(self.coordinates, x), rates_at(self.coordinates, x)
+        return deviation_rates(self.case.soil_tests, self.case.soil, names, values) * rates
 
 
 @dataclass(frozen=True)

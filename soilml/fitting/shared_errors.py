@@ -17,9 +17,8 @@ from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.effects.exit_angle import ExitAngle
-from soilml.physics.gears.arc import entry_angle
 from soilml.physics.gears.base import Gear
-from soilml.physics.gears.rigid_wheel import WheelArc
+from soilml.physics.gears.rigid_wheel import WheelArc, entry_angle
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.physics.soils import Soil

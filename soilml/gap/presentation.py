@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.io.text_tables import csv_text, format_table
 from soilml.report.numbers import format_residual
-from soilml.report.page import Provenance
-from soilml.report.result_files import json_text
+from soilml.report.page import Provenance, json_text
 from soilml.report.terminal import rounded, shown_unit, significant
 
 if TYPE_CHECKING:

@@ -17,10 +17,9 @@ from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import included_bias, usual_errors
-from soilml.fitting.soil_tests import disagreeing_soil_tests
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.condensing import condensed
-from soilml.identification.fit import Fit
+from soilml.identification.fit import Fit, disagreeing_soil_tests
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton
 from soilml.identification.nonlinear import nonlinear

@@ -16,6 +16,7 @@ from soilml.fitting.levels import is_one_load
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
 from soilml.parameters import unit_text
+from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
 from soilml.remarks import Remark
 
@@ -159,6 +160,10 @@ def _ends(prior: Prior) -> tuple[float, float]:
     return float(low), float(high)
 
 
+#: Deviation from a test of the soil, in standard deviations of its scatter, that is remarked on.
+NOTABLE = 2.5
+
+
 def at_prior_bound(u: NDArray[np.float64]) -> NDArray[np.bool_]:
     """Whether fractions of priors (p,) are at one of the bounds."""
     return np.asarray(np.minimum(u, 1.0 - u) < BOUND_TOLERANCE)
@@ -249,3 +254,28 @@ def _trade_offs(fit: Fit) -> list[Remark]:
         for j, b in enumerate(fit.names)
         if i < j and abs(correlation[i, j]) > STRONG_CORRELATION
     ]
+
+
+def disagreeing_soil_tests(case: Case, values: Mapping[str, float]) -> list[str]:
+    """Each test of the case that a soil with these values is far from, in words."""
+    at = np.asarray(list(values.values()))
+    each = deviations(case.soil_tests, case.soil, list(values), at)
+    return [
+        f"{test.label()} was {_kpa(test.measured)} kPa in the test, and is "
+        f"{_kpa(test.measured * np.exp(z * test.scatter))} kPa by the fitted soil "
+        f"({abs(z):.1f} standard deviations)"
+        for test, z in zip(case.soil_tests, each, strict=True)
+        if abs(z) > NOTABLE
+    ]
+
+
+def ignored_soil_tests(case: Case) -> list[Remark]:
+    """A remark that a file for the board ignores the case's tests; none for a case without."""
+    if not case.soil_tests:
+        return []
+    text = "[[soil.test]] is ignored: a file for the board takes no tests of the soil"
+    return [Remark("soil-tests-ignored", text)]
+
+
+def _kpa(stress: float) -> str:
+    return f"{1e-3 * stress:.3g}"

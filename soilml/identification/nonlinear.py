@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.covariance import (

@@ -11,9 +11,8 @@ from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.least_squares import Solution
+from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.fitting.readings import Readings
-from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.posterior_density import PosteriorDensity, joint_sample, most_probable
 from soilml.numerics.importance_sampling import (

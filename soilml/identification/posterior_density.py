@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import (
@@ -19,12 +19,11 @@ from soilml.fitting.covariance import (
     sensor_columns,
     squared_residuals_and_log_determinant,
 )
-from soilml.fitting.least_squares import Solution
+from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
-from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.identification.nonlinear import WeightedRows
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE

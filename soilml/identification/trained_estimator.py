@@ -21,10 +21,9 @@ from soilml.config.compatibility import (
     recipe_case,
     soil_value_differences,
 )
-from soilml.config.measurement_noise import common_errors
-from soilml.config.model_discrepancy import Discrepancy, range_with_zero
+from soilml.config.measurement_noise import Discrepancy, common_errors, range_with_zero
 from soilml.errors import InputError, TableError
-from soilml.fitting.soil_tests import ignored_soil_tests
+from soilml.identification.fit import ignored_soil_tests
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_process import independent_bound, slip_load_points

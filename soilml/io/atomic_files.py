@@ -8,6 +8,7 @@ files that were complete take their places, incomplete ones are removed.
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -344,3 +345,10 @@ def _same(target: Path, path: str) -> bool:
 
 def _why(error: OSError | ValueError) -> str:
     return getattr(error, "strerror", None) or str(error)
+
+
+def refuse_device(path: Path) -> None:
+    """Raise `OSError` where the path is missing, or a device; files, folders and pipes pass."""
+    mode = path.stat().st_mode
+    if stat.S_ISCHR(mode) or stat.S_ISBLK(mode):
+        raise OSError(errno.EINVAL, "it is a device; needed is a file")

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soilml.errors import TableError
+from soilml.io.atomic_files import refuse_device
 from soilml.io.csv_file import read_csv
-from soilml.io.devices import refuse_device
 from soilml.io.parquet import ArrowStream, arrow_columns, own_columns, plain_column, read_parquet
 from soilml.io.table import TEXT, Column, Table, text_column
 from soilml.quantities import COLUMNS

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
-from soilml.io.devices import refuse_device
+from soilml.io.atomic_files import refuse_device
 from soilml.optional_imports import tomllib
 
 #: Tables and lists in one another that a settings file may have; none needs more than six.

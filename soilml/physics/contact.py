@@ -106,7 +106,7 @@ def shear_direction(contact: Contact, at: Operating) -> Array:
     """Direction of the shear stress, 1 or -1: (points, batch), or (batch,) where it is the slip's.
 
     The shear stress on a braking gear has the sign of the shear displacement or, by the law that
-    the source papers print, that of the slip (`soilml.physics.gears.arc`).
+    the source papers print, that of the slip (`soilml.physics.gears.rigid_wheel`).
     """
     return slip_sign(at) if contact.shear_direction is None else contact.shear_direction
 

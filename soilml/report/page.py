@@ -1,11 +1,13 @@
-"""The one page of all reports: self-contained HTML without scripts, for screen and print."""
+"""The files of a result: one page for all reports, self-contained HTML, and JSON beside it."""
 
 from __future__ import annotations
 
 import hashlib
+import json
+import math
 import os
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -176,3 +178,41 @@ def _environment(package: str) -> Environment:
         "sentence": lambda text: numbers.capitalised(str(text)),
     }
     return environment
+
+
+#: What is written to a file: its text, or a function of the path.
+Content = str | Callable[[Path], object]
+
+
+def json_text(content: Any) -> str:
+    """The content as indented JSON; numbers that are not finite become null, as JSON has none."""
+    return json.dumps(finite_or_null(content), indent=2, allow_nan=False) + "\n"
+
+
+def finite_or_null(value: Any) -> Any:
+    """The content with None for every number that is not finite."""
+    if isinstance(value, dict):
+        return {key: finite_or_null(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite_or_null(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def report_texts(
+    report: Report,
+    origin: Provenance,
+    content: Mapping[str, Any],
+    names: tuple[str, str],
+    folder: Path,
+) -> dict[Path, Content]:
+    """The page and the JSON file, by their paths; `content` is the result in SI units."""
+    from soilml.report.page import page
+
+    html, json_name = names
+    entry = {"report": report.as_json(origin)}
+    return {
+        folder / html: page(report, origin),
+        folder / json_name: json_text({**content, **entry}),
+    }

@@ -8,7 +8,7 @@ from typing import Any
 from tornado.web import HTTPError, RequestHandler
 
 from soilml.errors import SoilmlError
-from soilml.report.result_files import finite_or_null
+from soilml.report.page import finite_or_null
 
 #: What the page may load: its own files alone, no inline script or style, no other host.
 POLICY = (

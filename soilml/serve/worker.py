@@ -38,7 +38,7 @@ def main(folder: str) -> int:
     def tell(stage: str, share: float | None = None) -> None:
         say({"stage": stage, "share": share})
 
-    from soilml.report.result_files import finite_or_null
+    from soilml.report.page import finite_or_null
 
     try:
         module, function = KINDS[request["kind"]]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import range_with_zero
+from soilml.config.measurement_noise import range_with_zero
 from soilml.fitting.operating_points import operating_points
 from soilml.fitting.readings import declared_std
 from soilml.io.table import Table

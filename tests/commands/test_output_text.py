@@ -5,7 +5,7 @@ import json
 import pytest
 
 from soilml.cli.output import show, tell
-from soilml.report.result_files import json_text
+from soilml.report.page import json_text
 
 
 def test_numbers_that_are_not_finite_become_null_and_texts_stay():

@@ -180,7 +180,7 @@ def _write(
     from soilml.cli.output import origin_of
     from soilml.io.atomic_files import write_files
     from soilml.io.text_tables import csv_text
-    from soilml.report.result_files import report_texts
+    from soilml.report.page import report_texts
 
     origin = origin_of(args, [str(path) for path in read])
     files = report_texts(page, origin, content, (names[0], names[1]), folder)

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.gap import audit
     from soilml.gap.presentation import audit_text
-    from soilml.report.result_files import json_text
+    from soilml.report.page import json_text
 
     effects = available_effects(args)
     case = read_case(args.model, effects)

@@ -84,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.identification.bevameter import bevameter
     from soilml.identification.bevameter.soil_section import missing_values, model_file_text
     from soilml.optional_imports import need
-    from soilml.report.result_files import json_text
+    from soilml.report.page import json_text
 
     if args.picture is not None:
         need("matplotlib", "bevameter --picture")

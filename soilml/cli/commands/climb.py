@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
-    from soilml.report.result_files import json_text, report_texts
+    from soilml.report.page import json_text, report_texts
     from soilml.systems.climbing.presentation import climb_report, climb_text
     from soilml.systems.climbing.report import climbing_report
     from soilml.systems.climbing.rover_file import read_rover

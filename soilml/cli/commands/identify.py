@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
-    from soilml.report.result_files import json_text
+    from soilml.report.page import json_text
 
     need("scipy", "identify")
     need_for_report(args, "identify")

@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text
     from soilml.log_import.workflow import import_log
     from soilml.optional_imports import need
-    from soilml.report.result_files import json_text
+    from soilml.report.page import json_text
 
     need("pint", "import")
     if args.init:

@@ -12,9 +12,9 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
-from soilml.fitting.soil_tests import SoilTestTerms
 from soilml.gap.candidate_effects import candidate_effects
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_kinds import check_costs

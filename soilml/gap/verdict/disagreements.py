@@ -8,7 +8,6 @@ from soilml.errors import InputError
 from soilml.fitting.damped_descents import levenberg_marquardt
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import linearise
-from soilml.fitting.soil_tests import disagreeing_soil_tests
 from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
     VarianceComponents,
@@ -18,6 +17,7 @@ from soilml.gap.evidence.covariance import (
 from soilml.gap.evidence.held_out import held_out_region
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.evidence.repeats import repeat_disagreement
+from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal

@@ -11,7 +11,6 @@ from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
-from soilml.fitting.soil_tests import disagreeing_soil_tests
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.covariance import FEW_RUNS
 from soilml.gap.evidence.directions import effect_signatures
@@ -32,6 +31,7 @@ from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.verdict.estimates import effect_estimates
+from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity

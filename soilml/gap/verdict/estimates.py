@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature

@@ -10,7 +10,7 @@ from importlib import import_module
 from pathlib import Path
 
 from soilml.errors import InputError
-from soilml.io.devices import refuse_device
+from soilml.io.atomic_files import refuse_device
 from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.recording import Recording
 

@@ -11,8 +11,7 @@ from soilml.arrays import Real, namespace, to_numpy
 from soilml.errors import InputError
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard, SlipLoadScaling
-from soilml.physics.gears.arc import entry_angle
-from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, entry_angle
 from soilml.physics.load_case import LoadCase
 
 

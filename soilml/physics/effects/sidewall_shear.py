@@ -10,8 +10,7 @@ from soilml.numerics.quadrature import columns, gauss
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force, mobilised_fraction
 from soilml.physics.effects.base import EffectCard, SlipLoadScaling
-from soilml.physics.gears.arc import displacement_direction, displacement_slip
-from soilml.physics.gears.rigid_wheel import RigidWheel
+from soilml.physics.gears.rigid_wheel import RigidWheel, displacement_direction, displacement_slip
 from soilml.physics.load_case import LoadCase
 
 

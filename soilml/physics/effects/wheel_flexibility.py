@@ -8,8 +8,7 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Real
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import EffectCard, SlipLoadScaling
-from soilml.physics.gears.arc import entry_angle
-from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, entry_angle
 from soilml.physics.load_case import LoadCase
 
 

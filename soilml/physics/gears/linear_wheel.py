@@ -7,8 +7,7 @@ from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.arc import displacement_direction
-from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
+from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, displacement_direction
 from soilml.physics.operating_point import Operating
 
 

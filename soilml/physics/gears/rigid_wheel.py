@@ -1,17 +1,130 @@
-"""The contact arc of a rigid wheel."""
+"""The arc of a circle in the soil, the shear displacement along it, and the rigid wheel.
+
+Differences of angles keep their digits at small sinkage. The laws of braking say how the shear
+displacement is found while the gear brakes, and which sign the shear stress has.
+"""
 
 from __future__ import annotations
 
+import math
 from abc import ABC
 from dataclasses import dataclass
-from typing import Annotated, final
+from typing import Annotated, Literal, final, get_args
 
 from soilml.arrays import Array, Real, namespace
+from soilml.errors import InputError
 from soilml.parameters import Parameter
-from soilml.physics.gears.arc import BrakingLaw, check_law, displacement_slip, entry_angle
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
+
+#: "displacement-sign": shear stress has the sign of the shear displacement, point by point;
+#: "slip-sign": it has the sign of the slip all along the rim, as the source papers print it.
+BrakingLaw = Literal["displacement-sign", "slip-sign"]
+#: Newton's steps from a start that is off by a few per cent of the distance to the nearer extreme.
+NEWTON_STEPS = 4
+
+
+def entry_angle(sinkage: Array, radius: Real) -> Array:
+    r"""Angle (rad) from straight down at which a circle meets the surface.
+
+    .. math:: \theta_1 = \arccos(1 - z / r) = 2 \arcsin\sqrt{z / (2 r)}
+
+    The second form keeps all digits at small sinkage, where arccos loses them.
+    """
+    xp = namespace(sinkage)
+    return 2.0 * xp.asin(xp.sqrt(sinkage / (2.0 * radius)))
+
+
+def differences_from_entry(
+    sin_entry: Array, cos_entry: Array, passed: Array
+) -> tuple[Array, Array]:
+    r"""Differences of sine and cosine between the entry angle and a point of the arc.
+
+    .. math::
+        \sin\theta_1 - \sin\theta = u (\cos\theta_1 + t \sin\theta_1), \quad
+        \cos\theta - \cos\theta_1 = u (\sin\theta_1 - t \cos\theta_1), \quad
+        t = \tan\frac{\theta_1 - \theta}{2}, \quad u = \frac{2 t}{1 + t^2}
+
+    so that nothing cancels close to the entry. `passed` (rad) is the angle passed since entry,
+    theta_1 - theta; the sine and cosine of theta_1 broadcast against it.
+    """
+    xp = namespace(passed)
+    t = xp.tan(0.5 * passed)
+    u = 2.0 * t / (1.0 + t * t)
+    return u * (cos_entry + t * sin_entry), u * (sin_entry - t * cos_entry)
+
+
+def check_law(law: str) -> None:
+    """Raise `InputError` where there is no such law."""
+    if law not in get_args(BrakingLaw):
+        raise InputError(f"braking is {law!r}; there are: {', '.join(get_args(BrakingLaw))}")
+
+
+def displacement_slip(slip: Array, law: BrakingLaw) -> Array:
+    r"""Slip s' of the shear displacement, of any shape.
+
+    .. math::
+        j(\theta) = r [\theta_1 - \theta - (1 - s')(\sin\theta_1 - \sin\theta)], \quad
+        1 - s' = \frac{v}{r \omega} = \begin{cases} 1 - s & s \ge 0 \\
+        1 / (1 + s) & s < 0 \end{cases}
+
+    By "slip-sign" s' is the slip itself, and 1 - s is the travel ratio of a driving wheel only.
+    References: shear displacement as the integral of the slip velocity, Wong and Reece,
+    J. Terramechanics 4(1), 1967; definitions of slip, Wong, Theory of Ground Vehicles, chapter 2.
+    """
+    if law == "slip-sign":
+        return slip
+    return namespace(slip).where(slip < 0, slip / (1.0 + slip), slip)
+
+
+def displacement_direction(displacement: Array, slip: Array, law: BrakingLaw) -> Array:
+    """Direction of the shear stress, 1 or -1, at points of this shear displacement.
+
+    `displacement` has shape (points, batch) or (batch,), `slip` (batch,); the answer has the shape
+    of `slip` where nothing brakes, or where the direction is that of the slip.
+    """
+    xp = namespace(slip)
+    if law == "slip-sign" or not bool(xp.any(slip < 0)):
+        return xp.where(slip < 0, -xp.ones_like(slip), xp.ones_like(slip))
+    one = xp.ones_like(displacement)
+    return xp.where((slip < 0) & (displacement < 0), -one, one)
+
+
+def reversals(entry: Array, leave: Array, slip: Array) -> tuple[Array, Array]:
+    r"""Angles (rad) at which shear displacement is back at zero, and which of them there are.
+
+    .. math::
+        g(\theta) = g(\theta_1), \quad g(\theta) = (1 - s) \sin\theta - \theta, \quad
+        g'(\pm\alpha) = 0, \quad \cos\alpha = \frac{1}{1 - s}, \quad s < 0
+
+    A braking wheel that has sunk deep first pushes the soil back, as its rim moves steeply down,
+    pulls it forward only below alpha, and pushes back again behind -alpha, where it moves steeply
+    up. So there may be a zero between the two, on the falling branch of g, and, where the rim
+    touches the soil so far behind the axle, one on the branch behind -alpha. Newton's method
+    starts from the cubic that has the extremes of g, whose zeros are
+    2 alpha sin([asin(g(theta_1) / g(alpha))] / 3) and the same less a third of a turn. `slip` is
+    that of the shear displacement (`displacement_slip`); `entry`, `leave` and it have
+    shape (batch,), the answers (2, batch).
+    References: the shear displacement of Wong and Reece 1967; own derivation.
+    """
+    xp = namespace(entry)
+    m = 1.0 - slip
+    # the half angle keeps all digits at small slip, where arccos loses them
+    braking = xp.maximum(-slip, xp.full_like(slip, 1e-300))
+    turning = 2.0 * xp.asin(xp.sqrt(0.5 * braking / m))
+    level, most = m * xp.sin(entry) - entry, m * xp.sin(turning) - turning
+    height = level / xp.maximum(most, xp.full_like(most, 1e-300))
+    whole = xp.full_like(height, 1.0 - 1e-15)
+    third = xp.asin(xp.minimum(xp.maximum(height, -whole), whole)) / 3.0
+    angle = 2.0 * turning * xp.sin(xp.stack([third, -math.pi / 3.0 - third], axis=0))
+    for _ in range(NEWTON_STEPS):
+        rate = m * xp.cos(angle) - 1.0
+        step = (m * xp.sin(angle) - angle - level) / xp.where(rate == 0, 1.0 + 0.0 * rate, rate)
+        angle = angle - step
+    reached = (slip < 0) & (xp.abs(height) < 1.0) & (angle > leave) & (angle < entry)
+    return angle, reached & xp.stack([entry > turning, leave < -turning], axis=0)
+
 
 #: Smallest value of 3 - n in the initial sinkage, whose equation holds for n well below 3.
 SMALLEST_DIVISOR = 0.5
@@ -44,7 +157,7 @@ class WheelArc:
 class RigidWheel(ABC):
     """A rigid cylinder in the soil, for any assumption on the stresses along its arc.
 
-    `braking` names the law of shear while it brakes (`soilml.physics.gears.arc`).
+    `braking` names the law of shear while it brakes (`soilml.physics.gears.rigid_wheel`).
     """
 
     radius: Annotated[Real, Parameter("m", 0.005, 5.0, "r, radius of the rim")]

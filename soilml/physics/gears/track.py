@@ -11,8 +11,7 @@ from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import Parameter, as_numbers
 from soilml.physics.contact import Contact
-from soilml.physics.gears.arc import entry_angle
-from soilml.physics.gears.rigid_wheel import SMALLEST_DIVISOR
+from soilml.physics.gears.rigid_wheel import SMALLEST_DIVISOR, entry_angle
 from soilml.physics.gears.track_belt import Belt, belt_contact, belt_profile
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil

@@ -8,13 +8,14 @@ from typing import ClassVar, final
 from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import columns, crowded_ends, crowded_start, sine_and_versine
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.arc import (
+from soilml.physics.gears.rigid_wheel import (
     BrakingLaw,
+    RigidWheel,
+    WheelArc,
     differences_from_entry,
     displacement_direction,
     reversals,
 )
-from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.operating_point import Operating
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive

@@ -11,7 +11,7 @@ from soilml.arrays import Array, Real, namespace
 from soilml.numerics.quadrature import columns, crowded_ends
 from soilml.parameters import Parameter
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
-from soilml.physics.gears.arc import differences_from_entry, entry_angle, reversals
+from soilml.physics.gears.rigid_wheel import differences_from_entry, entry_angle, reversals
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status

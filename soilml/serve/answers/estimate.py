@@ -21,7 +21,7 @@ from soilml.log_import.checks.table_hints import table_remarks
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark, texts
-from soilml.report.result_files import json_text
+from soilml.report.page import json_text
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 from soilml.serve.answers.logs import table_summary
 from soilml.traction.by_load import LoadPrediction

@@ -18,7 +18,7 @@ from soilml.log_import.page import page
 from soilml.log_import.workflow import import_log
 from soilml.quantities import COLUMNS
 from soilml.remarks import texts
-from soilml.report.result_files import json_text
+from soilml.report.page import json_text
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
 #: The table that an import writes.

@@ -4,8 +4,7 @@ import pytest
 from conftest import MODEL
 
 from soilml import read_case
-from soilml.config.measurement_noise import Noise
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy, Noise
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.numerics.prior import Prior

@@ -8,8 +8,7 @@ from channel_readings import channel_readings
 from scipy.stats import multivariate_normal
 
 from soilml import Operating, read_case
-from soilml.config.measurement_noise import Noise
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy, Noise
 from soilml.errors import FitError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.covariance import discrepancy_process, noise_of_operation, sensor_columns

@@ -11,7 +11,7 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.experiment_design import samples_of_prior
 from soilml.fitting.coordinates import select_free
-from soilml.fitting.soil_tests import SoilTestTerms
+from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior import prior_fractions
 from soilml.identification.posterior_density import PosteriorDensity

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem, remark
 
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.gap import gap
 from soilml.gap.report.page import page
 from soilml.gap.report.results import GapReduction, GapReport, Suspect

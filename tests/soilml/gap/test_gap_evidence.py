@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.fitting.covariance import discrepancy_process
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, _size_prior, outside_bounds

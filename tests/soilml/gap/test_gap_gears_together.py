@@ -8,7 +8,7 @@ from gap_sets import case_of
 from test_gap_several_gears import LUGS, REST, WHEELS, rows
 
 from soilml import identify
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.coordinates import select_free, size_coordinate
 from soilml.fitting.covariance import discrepancy_process

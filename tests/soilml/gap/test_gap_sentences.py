@@ -7,7 +7,7 @@ import pytest
 from gap_sets import case_of, remark
 from remarked import remarked
 
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.gap.report.results import GapReduction, GapReport, RemainingDiscrepancy, Suspect
 from soilml.gap.report.sentences import _odds, unsupported_conclusions, verdict_sentence
 from soilml.remarks import texts

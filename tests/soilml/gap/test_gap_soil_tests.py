@@ -9,7 +9,7 @@ from remarked import remarked
 from soilml import Case, Model, Operating, Table, Wheel, soil
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.coordinates import select_free
-from soilml.fitting.soil_tests import SoilTestTerms
+from soilml.fitting.least_squares import SoilTestTerms
 from soilml.gap import audit, gap
 from soilml.gap.report.page import page
 from soilml.identification.bevameter import bevameter

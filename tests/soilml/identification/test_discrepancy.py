@@ -7,8 +7,7 @@ import pytest
 from remarked import remarked
 
 from soilml import Operating, identify, read_case
-from soilml.config.measurement_noise import Noise
-from soilml.config.model_discrepancy import Discrepancy, range_with_zero
+from soilml.config.measurement_noise import Discrepancy, Noise, range_with_zero
 from soilml.experiment_design import samples_of_prior
 from soilml.experiment_design.expected_variance import predicted_readings
 from soilml.fitting.coordinates import select_free

@@ -8,8 +8,7 @@ import pytest
 from channel_readings import channel_readings
 
 from soilml import Operating
-from soilml.fitting import soil_tests
-from soilml.identification import condensing, posterior_density
+from soilml.identification import condensing, fit, posterior_density
 from soilml.identification.bevameter import soil_section
 from soilml.identification.bevameter.soil_section import pressure_test, strength_test
 from soilml.numerics.importance_sampling import ImportanceSample
@@ -78,7 +77,7 @@ def test_a_strength_is_that_under_the_mean_stress_and_no_two_places_are_alike():
 
 
 def test_a_test_of_the_soil_is_remarked_on_from_two_and_a_half_sigma():
-    assert soil_tests.NOTABLE == 2.5
+    assert fit.NOTABLE == 2.5
 
 
 def test_rows_are_alike_by_slip_and_log_load_over_their_spreads_and_by_their_noise():

@@ -7,7 +7,7 @@ import pytest
 from channel_readings import channel_readings
 
 from soilml import identify, read_case
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, rates_at, select_free, values_at
 from soilml.identification.fit import Fit, at_prior_bound, with_warnings

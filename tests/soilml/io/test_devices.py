@@ -7,7 +7,7 @@ import pytest
 
 from soilml import read_table
 from soilml.errors import InputError
-from soilml.io.devices import refuse_device
+from soilml.io.atomic_files import refuse_device
 from soilml.io.toml_settings import read_settings
 from soilml.log_import.readers import read_log
 

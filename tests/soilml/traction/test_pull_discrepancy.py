@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from soilml import Operating, read_case
-from soilml.config.measurement_noise import Noise
-from soilml.config.model_discrepancy import Discrepancy
+from soilml.config.measurement_noise import Discrepancy, Noise
 from soilml.io.table import Table
 from soilml.traction.pull_and_slope import draw_pull_discrepancy, predict_traction
 from soilml.traction.soil_draws import SoilDraws

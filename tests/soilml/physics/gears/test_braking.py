@@ -11,7 +11,7 @@ from reference import equilibrium, forces, travel_ratio
 from soilml import EFFECTS, ExitAngle, LinearWheel, Model, Operating, Status, Wheel, soil
 from soilml.errors import InputError
 from soilml.numerics.root_finding import rising_root
-from soilml.physics.gears.arc import displacement_direction, displacement_slip
+from soilml.physics.gears.rigid_wheel import displacement_direction, displacement_slip
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))

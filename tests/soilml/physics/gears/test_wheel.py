@@ -9,7 +9,7 @@ from conftest import input_box, solved
 from reference import equilibrium, forces, load_carried, stresses, turning_points
 
 from soilml import ExitAngle, LinearWheel, Model, Operating, Soil, Status, Wheel, soil
-from soilml.physics.gears.arc import displacement_slip, reversals
+from soilml.physics.gears.rigid_wheel import displacement_slip, reversals
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
