@@ -116,10 +116,8 @@ class FixedSizeLSSVM(KernelExpansion):
         width: float | None = None,
         random_state: int = 0,
     ) -> None:
-        self.centres = centres
-        self.gamma = gamma
-        self.width = width
-        self.random_state = random_state
+        self.centres, self.random_state = centres, random_state
+        self.gamma, self.width = gamma, width
 
     def solution_for(self, rows: int) -> FixedSizeSolution:
         """The fixed-size solution."""
@@ -169,10 +167,8 @@ class LSSVM(KernelExpansion):
         random_state: int = 0,
     ) -> None:
         self.solution = solution
-        self.centres = centres
-        self.gamma = gamma
-        self.width = width
-        self.random_state = random_state
+        self.centres, self.random_state = centres, random_state
+        self.gamma, self.width = gamma, width
 
     def solution_for(self, rows: int) -> ExactSolution | FixedSizeSolution:
         """The solution that is used for a number of training rows."""

@@ -20,11 +20,6 @@ _OWN, _USUAL = 8.0, 4.0
 _FEWEST_WINDOWS = 4
 
 
-def autocorrelation_time(values: Floats) -> float:
-    """Integrated autocorrelation time of samples (n,), in samples; see `time_and_window`."""
-    return time_and_window(values)[0]
-
-
 def time_and_window(values: Floats) -> tuple[float, int, float]:
     r"""Integrated autocorrelation time of samples (n,), in samples, and the last lag M of its sum.
 
