@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import MODEL
+from exit_status import exit_status
 
 from soilml import Estimator
 from soilml.cli import main
@@ -100,10 +101,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, command, s
     (folder / "speed.toml").write_text(MODEL + rate)
     before = {p: p.read_bytes() for p in folder.iterdir()}
     outs = [] if {"--out", "--picture"} & {*command} else ["--out", "o.csv", "--picture", "o.png"]
-    try:
-        code = main(["advise", *command, *outs])
-    except SystemExit as done:  # an argument that the parser refuses
-        code = done.code
+    code = exit_status(["advise", *command, *outs])
     captured = capsys.readouterr()
     assert (
         code == 2 and captured.out == "" and captured.err.count("\n") == 1 and said in captured.err
