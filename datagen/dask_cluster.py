@@ -28,13 +28,11 @@ Result = TypeVar("Result")
 
 #: Seconds to wait for the scheduler, and for a worker to appear again when none is left.
 PATIENCE, WORKERLESS = 10, 60
-#: Tasks that are submitted ahead of the result that is waited for, for each worker.
-AHEAD = 6
+AHEAD = 6  # Tasks that are submitted ahead of the result that is waited for, for each worker
 #: Libraries whose versions must be those of this process, because they may change digits.
 SAME_VERSIONS = ("numpy", "scipy", "pyarrow")
 
-#: First part of the names of modules that are users' files of effects.
-OWN_EFFECTS = "own_effects_"
+OWN_EFFECTS = "own_effects_"  # First part of the names of modules that are users' files of effects
 
 #: Tasks of one worker process run one at a time, whatever its number of threads.
 _one_at_a_time = threading.Lock()

@@ -26,8 +26,7 @@ from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
 
 #: Relations of vibration to slip: the rotating spring, or the straight line fitted to tests.
 LAWS = ("spring", "line")
-#: s^2/m; with a smaller slope of the line, vibration (its inverse) diverges.
-MIN_SLOPE = 0.02
+MIN_SLOPE = 0.02  # s^2/m; with a smaller slope of the line, vibration (its inverse) diverges
 
 
 class GearSensor(Protocol):

@@ -29,14 +29,12 @@ WRITER: dict[str, Any] = {
     "write_page_checksum": True,
     "use_dictionary": ["run", "status"],
 }
-#: Rows that are simulated to estimate the size of a file.
-SAMPLE = 4096
+SAMPLE = 4096  # Rows that are simulated to estimate the size of a file
 
 Progress = Callable[[int], None]
 #: A function of a function and items, which yields the results in the order of the items.
 Engine = Callable[[Callable[[Any], Any], Sequence[Any]], AbstractContextManager[Any]]
-#: Rows of a file: whole pieces.
-PART = 16 * PIECE
+PART = 16 * PIECE  # Rows of a file: whole pieces
 #: First rows of a file that are simulated again before the file is kept, and how closely they must
 #: agree: vector units round the last digit by place.
 PROBE, AGREEMENT = 16, 1e-9

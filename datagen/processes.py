@@ -34,10 +34,8 @@ Result = TypeVar("Result")
 
 #: Whether workers have all that this process has; otherwise functions must be picklable.
 FORKS = sys.platform == "linux"
-#: Tasks that are submitted ahead of the result that is waited for, for each worker.
-AHEAD = 3
-#: Seconds without a result after which dead workers are looked for, and are given up.
-GRACE = 2.0
+AHEAD = 3  # Tasks that are submitted ahead of the result that is waited for, for each worker
+GRACE = 2.0  # Seconds without a result after which dead workers are looked for, and are given up
 #: Environment variables that limit threads of linear algebra in processes that are spawned.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 #: Parameters of `mallopt` in the GNU C library, and sizes in bytes.
@@ -142,8 +140,7 @@ def _result(future: Future[Any], workers: Sequence[BaseProcess]) -> Any:
                 raise BrokenProcessPool
 
 
-#: The function of this worker process.
-_function: Callable[[Any], Any] | None = None
+_function: Callable[[Any], Any] | None = None  # The function of this worker process
 
 
 def _start(function: Callable[[Any], Any]) -> None:

@@ -23,14 +23,11 @@ from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import COLUMNS, QUANTITIES
 from soilml.row_status import Status
 
-#: Points of a Sobol sequence of scipy: runs that a block can have.
-MOST_RUNS = 2**30
-#: Rows of a piece: one row group of a file.
-PIECE = 16384
+MOST_RUNS = 2**30  # Points of a Sobol sequence of scipy: runs that a block can have
+PIECE = 16384  # Rows of a piece: one row group of a file
 #: Number of the first random stream of gear sensors; lower ones are those of `sample_rows`.
 FIRST_STREAM = 4
-#: Text of the column `status` by status.
-REASONS = np.asarray([status.reason for status in Status])
+REASONS = np.asarray([status.reason for status in Status])  # Text of the column `status` by status
 
 
 @dataclass(frozen=True)

@@ -68,8 +68,7 @@ class NumericArray(Protocol):
 #: What a computation returns: an array of the library of its arguments, numpy or torch. Its static
 #: type is open, so that callers may pass it on to functions of that library without a cast.
 Array: TypeAlias = Any
-#: What a computation takes: a plain number or an array.
-Real: TypeAlias = float | NumericArray
+Real: TypeAlias = float | NumericArray  # What a computation takes: a plain number or an array
 #: Arrays of numpy.
 Floats: TypeAlias = NDArray[np.float64]
 Integers: TypeAlias = NDArray[np.int64]

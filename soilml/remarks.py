@@ -8,8 +8,7 @@ from typing import Any, Literal
 
 Severity = Literal["note", "warning"]
 
-#: Code of a remark that names the measurement to make next.
-NEXT_ROW = "next-row"
+NEXT_ROW = "next-row"  # Code of a remark that names the measurement to make next
 
 
 @dataclass(frozen=True)

@@ -23,10 +23,8 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES, column
 
-#: Targets that differ between the rows of a run: its rows cannot be pooled.
-PER_ROW = ("slip",)
-#: Targets with one value for all rows of a run.
-PER_RUN = (*declared(Soil), "normal_stiffness")
+PER_ROW = ("slip",)  # Targets that differ between the rows of a run: its rows cannot be pooled
+PER_RUN = (*declared(Soil), "normal_stiffness")  # Targets with one value for all rows of a run
 
 
 def check_targets(targets: Sequence[str], features: Sequence[str]) -> None:
@@ -60,8 +58,7 @@ def prior_of(name: str, recipe: Mapping[str, Any]) -> object:
     return (table or {}).get(name)
 
 
-#: With fewer rows, a fifth of them is too few to calibrate intervals on.
-LEAST_ROWS = 200
+LEAST_ROWS = 200  # With fewer rows, a fifth of them is too few to calibrate intervals on
 
 
 @dataclass(frozen=True)

@@ -203,8 +203,7 @@ def _take_parameter(
     return value
 
 
-#: With fewer operating conditions no network learns the response of a wheel.
-LEAST_DESIGNS = 512
+LEAST_DESIGNS = 512  # With fewer operating conditions no network learns the response of a wheel
 #: Upper limits, beyond which training takes days on a laptop.
 UPPER_LIMITS = {"designs": 10**7, "hidden": 1024, "epochs": 10**5}
 

@@ -60,8 +60,7 @@ TrainedSetPosterior = tuple[SetPosteriorGraph, dict[int, SetFigures]]
 class TrainedModel:
     """A trained model, what its file needs, and its metrics on unseen rows."""
 
-    #: what it was trained from
-    spec: Spec
+    spec: Spec  # what it was trained from
     estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
     domain: TrainingDomain  # where estimates are in range
     #: calibration of single rows, and of several rows of one soil that are pooled as

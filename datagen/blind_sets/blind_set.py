@@ -56,8 +56,7 @@ GEARS = ("wheel_a", "wheel_b")
 MECHANISMS_OF_ONE_GEAR = ("grousers",)
 #: Smallest sinkage with the discrepancy, over that without: a wheel on soil sinks.
 LEAST_SINKAGE = 0.3
-#: Soils tried before a plan is given up.
-ATTEMPTS = 50
+ATTEMPTS = 50  # Soils tried before a plan is given up
 
 Columns = dict[str, NDArray[Any]]
 

@@ -117,8 +117,7 @@ DESIGN_COUNTS = {
     "braking": (16, 6),
     "two-gears": (16, 4),
 }
-#: Number of runs of designs that prescribe it.
-DESIGN_RUNS = {"one-run": (1,), "few-runs": (2, 3)}
+DESIGN_RUNS = {"one-run": (1,), "few-runs": (2, 3)}  # Number of runs of designs that prescribe it
 
 
 @dataclass(frozen=True)

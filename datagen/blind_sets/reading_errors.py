@@ -15,23 +15,19 @@ from datagen.blind_sets.run_schedules import RunSchedule
 #: passes through zero.
 FLOOR = {"torque_Nm": 0.0, "drawbar_pull_N": 0.2, "sinkage_m": 0.0}
 CHANNELS = tuple(FLOOR)
-#: Correlation of a sample with the one before, in tier N2.
-AUTOCORRELATION = 0.7
+AUTOCORRELATION = 0.7  # Correlation of a sample with the one before, in tier N2
 #: Share of readings that are outliers in tier N3, and their distance in standard deviations.
 OUTLIER_FRACTION, OUTLIER_SIGMA = 0.02, 8.0
-#: Declared noise / true noise in tier N4.
-DECLARED_OVER_TRUE = 0.85
+DECLARED_OVER_TRUE = 0.85  # Declared noise / true noise in tier N4
 #: Probability that one channel was not measured rather than two, where channels are missing.
 ONE_MISSING = 2.0 / 3.0
 #: Correlation lengths, in slip and in the logarithm of the load.
 SLIP_LENGTH, LOG_LOAD_LENGTH = (0.2, 0.6), (0.4, 1.0)
-#: Number of terms of a function: few, so that it has features and is not Gaussian noise.
-TERMS = 4
+TERMS = 4  # Number of terms of a function: few, so that it has features and is not Gaussian noise
 #: Largest value, in the driven rows and in the region, over the rms of the driven rows: a function
 #: that happens to be near zero where the runs are must not be large everywhere else.
 MAX_OVER_RMS = 4.0
-#: Functions tried before a set is given up.
-ATTEMPTS = 200
+ATTEMPTS = 200  # Functions tried before a set is given up
 
 #: A function of slip and the logarithm of the load, both (n,) and in correlation lengths.
 SmoothFunction = Callable[[Floats, Floats], Floats]
@@ -133,8 +129,7 @@ def _steps(points: Floats, generator: np.random.Generator) -> SmoothFunction:
     return value
 
 
-#: Families of functions, equally probable.
-FUNCTIONS = (_cosines, _bumps, _steps)
+FUNCTIONS = (_cosines, _bumps, _steps)  # Families of functions, equally probable
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,9 @@ from datagen.blind_sets.reference_wheel import Floats
 POINTS, REGION_RUNS, REGION_POINTS = 64, 3, 8
 SLIP = (0.05, 0.6)
 LOAD = (40.0, 150.0)  # N
-#: The region's loads over the heaviest load measured.
-REGION_LOAD_RATIOS = (1.3, 1.45, 1.6)
-#: Number of runs -> number of different loads.
-LOADS = {2: 2, 4: 3, 8: 4, 16: 5}
-#: Rows in one run, at most, where a few runs do not make up the number of rows.
-MOST_RUN_POINTS = 24
+REGION_LOAD_RATIOS = (1.3, 1.45, 1.6)  # The region's loads over the heaviest load measured
+LOADS = {2: 2, 4: 3, 8: 4, 16: 5}  # Number of runs -> number of different loads
+MOST_RUN_POINTS = 24  # Rows in one run, at most, where a few runs do not make up the number of rows
 
 #: What a plan may say about its operating points, and about the soil of its runs.
 DESIGNS = {
@@ -34,16 +31,14 @@ DESIGNS = {
     "braking": "slips from braking to driving",
     "two-gears": "two wheels of different size, or with and without lugs, at the same points",
 }
-#: Slips of a design that brakes.
-BRAKING_SLIP = (-0.4, 0.6)
+BRAKING_SLIP = (-0.4, 0.6)  # Slips of a design that brakes
 #: Standard deviation of a load about its level, as a fraction, drawn for each set.
 LOAD_JITTER = (0.003, 0.08)
 
 #: Covariates, fields of `WheelState`: constant values where they do not vary, and columns.
 COVARIATE_DEFAULTS = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
 COVARIATE_COLUMNS = {"speed": "speed_m_s", "pass_number": "pass", "slip_angle": "slip_angle_rad"}
-#: Probability that a covariate without influence varies.
-DECOY_PROBABILITY = 0.3
+DECOY_PROBABILITY = 0.3  # Probability that a covariate without influence varies
 
 
 @dataclass(frozen=True)

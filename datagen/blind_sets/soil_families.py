@@ -10,8 +10,7 @@ RADIUS, WIDTH = 0.15, 0.12  # m, of the wheel
 #: Radius and width of a second wheel, over those of the first.
 SECOND_RADIUS, SECOND_WIDTH = (0.65, 0.95), (0.5, 0.9)
 
-#: Radius and width (m) of each wheel.
-Wheels = tuple[tuple[float, float], ...]
+Wheels = tuple[tuple[float, float], ...]  # Radius and width (m) of each wheel
 
 #: Parameters that can be unknown to the analyst: the first three, or all five.
 FREE_PARAMETERS = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")

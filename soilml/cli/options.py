@@ -21,12 +21,9 @@ if TYPE_CHECKING:
 
     from soilml.physics.effects import Effect
 
-#: Files of the folder of --report.
-REPORT_FILES = ("report.html", "report.json")
-#: Rows beyond which a table would not fit into the memory of a small machine.
-MAX_ROWS = 10_000_000
-#: A longer option value is cut in an error message.
-_MAX_SHOWN = 80
+REPORT_FILES = ("report.html", "report.json")  # Files of the folder of --report
+MAX_ROWS = 10_000_000  # Rows beyond which a table would not fit into the memory of a small machine
+_MAX_SHOWN = 80  # A longer option value is cut in an error message
 
 
 class InputFile(str):

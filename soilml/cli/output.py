@@ -21,8 +21,7 @@ from soilml.report.page import Content, Provenance, Report, report_texts
 from soilml.report.terminal import rounded, shown_column
 
 _ENDING = re.compile(r"_(std|p05|p95)$")
-#: Most characters of a text cell on a terminal.
-_MOST_TEXT = 44
+_MOST_TEXT = 44  # Most characters of a text cell on a terminal
 
 
 def write_columns(columns: Mapping[str, Any], out: str | None) -> None:

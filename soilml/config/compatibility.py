@@ -23,10 +23,8 @@ from soilml.quantities import QUANTITIES
 #: Relative difference up to which two sizes of a gear count as equal: they are measured, and
 #: written with three digits.
 SIZE_TOLERANCE = 0.005
-#: The same for other values, which are copied from file to file.
-VALUE_TOLERANCE = 0.001
-#: What a case is called in a difference.
-OWNER = "the model file"
+VALUE_TOLERANCE = 0.001  # The same for other values, which are copied from file to file
+OWNER = "the model file"  # What a case is called in a difference
 
 
 def recipe_content(text: str, source: str) -> dict[str, Any]:

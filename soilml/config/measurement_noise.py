@@ -177,9 +177,7 @@ class Discrepancy:
         \operatorname{cov}[\delta(s, W), \delta(s', W')] = a^2
         e^{-(s - s')^2 / (2 l_s^2) - (\ln W - \ln W')^2 / (2 l_W^2)}
 
-    References
-    ----------
-    Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
+    References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
     """
 
     constant: float = 0.0  # Absolute part of the amplitude a, in the unit of the column

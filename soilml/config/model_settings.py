@@ -79,8 +79,7 @@ def _number(unit: str) -> str:
     return "a number" if unit == "1" else f"a number in {unit}"
 
 
-#: Name of the gear in [gear], beside those in [gears.NAME].
-UNNAMED_GEAR = "gear"
+UNNAMED_GEAR = "gear"  # Name of the gear in [gear], beside those in [gears.NAME]
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 #: Kinds of tests; the key of the measured quantity identifies the kind.

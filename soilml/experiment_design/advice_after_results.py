@@ -36,12 +36,10 @@ if TYPE_CHECKING:
 QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128
 #: Rows up to which the exact posterior after an estimate takes at most half a second too.
 MAX_EXACT_ROWS = 4
-#: Rows in the planned sequence of such an advice.
-SEQUENCE_LENGTH = 2
+SEQUENCE_LENGTH = 2  # Rows in the planned sequence of such an advice
 #: Tables and keys of a recipe that a case contains, or that concern the sampling of rows only.
 CASE_KEYS = {"gear", "soil", "effect", "noise", "discrepancy", "operating", "rows", "seed", "runs"}
-#: Candidate slips, and loads, in the ranges of a recipe.
-GRID_SIZE = 4
+GRID_SIZE = 4  # Candidate slips, and loads, in the ranges of a recipe
 
 
 def advice_after_fit(

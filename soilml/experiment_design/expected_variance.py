@@ -24,10 +24,8 @@ from soilml.quantities import CHANNELS, column
 MOST_FAILURE = 0.05
 Floats32 = NDArray[np.float32]
 
-#: Stands for the logarithm of a vanishing likelihood where it is subtracted.
-LEAST_LOG = -1e30
-#: Number of simulated readings.
-OUTCOMES = 256
+LEAST_LOG = -1e30  # Stands for the logarithm of a vanishing likelihood where it is subtracted
+OUTCOMES = 256  # Number of simulated readings
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,7 @@ from soilml.identification.posterior import PosteriorSamples, posterior_samples,
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube
 
-#: Default number of samples.
-SAMPLES = 2048
+SAMPLES = 2048  # Default number of samples
 
 
 @dataclass(frozen=True)

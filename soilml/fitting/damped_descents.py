@@ -33,8 +33,7 @@ MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 #: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
 #: along it and an exponent are straight in its logarithm.
 RATIO_OF_BOUNDS = 3.0
-#: Largest increase of the logarithm of such a parameter in one step.
-MOST_LOG_STEP = 2.0
+MOST_LOG_STEP = 2.0  # Largest increase of the logarithm of such a parameter in one step
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,13 @@ from soilml.numerics.prior import UNIFORM_PRECISION
 
 #: Points of the table of Sobol points, and the most dimensions that it has.
 POINTS, MOST_DIMENSIONS = 64, 8
-#: Seed of their scrambling, and bits of a coordinate.
-SEED, BITS = 7, 30
-#: How many of the best of the Sobol points of the prior are descended from.
-STARTS = 4
+SEED, BITS = 7, 30  # Seed of their scrambling, and bits of a coordinate
+STARTS = 4  # How many of the best of the Sobol points of the prior are descended from
 #: Tolerance of a descent; and of those from several starts, which only tell optima apart.
 TOLERANCE, START_TOLERANCE = 1e-10, 1e-5
 #: Two descents that end this close, as fractions of the priors, found the same optimum.
 SAME_OPTIMUM = 1e-4
-#: A descent that comes this close to an optimum of equal cost ends there.
-NEARLY_SAME = 3e-2
+NEARLY_SAME = 3e-2  # A descent that comes this close to an optimum of equal cost ends there
 #: Costs, in squared standard deviations, that differ by less count as equal: e^(-0.01) in
 #: likelihood.
 EQUAL_COST = 0.02

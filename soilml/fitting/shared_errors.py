@@ -33,8 +33,7 @@ USUAL_SENSOR_ERRORS = {
     "torque_gain": 0.03,
     "sinkage_bias": 0.0005,
 }
-#: Usual offset of a sensor of drawbar pull as a share of a typical load.
-PULL_OFFSET_SHARE = 0.01
+PULL_OFFSET_SHARE = 0.01  # Usual offset of a sensor of drawbar pull as a share of a typical load
 #: Usual standard deviations of the errors of a wheel's model. A bearing modulus is known to a
 #: factor of 1.5. With slip it falls by slip-sinkage, n1 of about 0.2: k z^(n1 s) at z of 2 cm is
 #: k exp(-0.8 s). With the logarithm of load it changes in soil of layers, or with an exponent that
@@ -122,10 +121,8 @@ def _column_of(name: str) -> str:
     return next(key for key, parts in KNOWN_PARTS.items() if name in parts)
 
 
-#: Bounds of an error of size 1, far outside of what is looked for.
-LEAST, MOST = -50.0, 50.0
-#: Smallest divisor (rad).
-TINY = 1e-12
+LEAST, MOST = -50.0, 50.0  # Bounds of an error of size 1, far outside of what is looked for
+TINY = 1e-12  # Smallest divisor (rad)
 
 
 @final
@@ -186,8 +183,7 @@ class ModelledErrors(Effect):
         return replace(geometry, exit=geometry.exit + xp.where(moved < 0.0, moved, ahead))
 
 
-#: Farthest from zero that an error is looked for, in standard deviations.
-FARTHEST = 4.0
+FARTHEST = 4.0  # Farthest from zero that an error is looked for, in standard deviations
 
 
 def with_modelled_errors(

@@ -16,8 +16,7 @@ from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
-#: Rows that are solved at a time.
-BLOCK = 65_536
+BLOCK = 65_536  # Rows that are solved at a time
 
 
 def simulate(

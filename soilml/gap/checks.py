@@ -19,12 +19,9 @@ from soilml.remarks import Remark
 #: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
 #: standard error is then 30 %.
 MIN_REPEAT_DEGREES_OF_FREEDOM = 6
-#: Readings beyond the number of soil parameters that an analysis needs.
-MIN_RESIDUAL_READINGS = 8
-#: Code of the obstacle that one load cannot test the soil parameters.
-ONE_LOAD = "one-load"
-#: Fraction of duplicate rows above which the table itself is suspect.
-MAX_DUPLICATE_FRACTION = 0.2
+MIN_RESIDUAL_READINGS = 8  # Readings beyond the number of soil parameters that an analysis needs
+ONE_LOAD = "one-load"  # Code of the obstacle that one load cannot test the soil parameters
+MAX_DUPLICATE_FRACTION = 0.2  # Fraction of duplicate rows above which the table itself is suspect
 
 
 @dataclass(frozen=True)

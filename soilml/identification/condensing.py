@@ -19,14 +19,11 @@ from soilml.fitting.readings import CondensedRows, Readings
 from soilml.identification.nonlinear import nonlinear
 from soilml.physics.operating_point import COVARIATES, Operating
 
-#: Rows above which they are condensed, and rows that become of them.
-MOST_ROWS, CELLS = 5_000, 1024
+MOST_ROWS, CELLS = 5_000, 1024  # Rows above which they are condensed, and rows that become of them
 #: Rows of the fit that shows where the optimum is, and rounds in which it is approached.
 FIRST_ROWS, ROUNDS = 1000, 2
-#: Rows that are solved at a time.
-BLOCK = 50_000
-#: Most rows without equilibrium at the optimum that stay as they are.
-MOST_UNSOLVED = 200
+BLOCK = 50_000  # Rows that are solved at a time
+MOST_UNSOLVED = 200  # Most rows without equilibrium at the optimum that stay as they are
 
 
 def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Readings:

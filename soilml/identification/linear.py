@@ -21,8 +21,7 @@ from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 from soilml.remarks import Remark
 
-#: Most iterations of the stress at the exit and of the weights.
-ITERATIONS = 50
+ITERATIONS = 50  # Most iterations of the stress at the exit and of the weights
 #: Condition number of the normal equations above which the rows do not determine both unknowns.
 MOST_CONDITION = 1e16
 #: One standard deviation of a uniform prior to either side of its middle, as fractions of it.

@@ -21,18 +21,15 @@ from soilml.physics.soils import Soil
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Most Newton steps, and most halvings of one.
-STEPS, HALVINGS = 60, 12
+STEPS, HALVINGS = 60, 12  # Most Newton steps, and most halvings of one
 #: Step, as a fraction of the search range, at which the iteration has converged; and the largest
 #: at which an iteration that finds no lower cost has.
 CONVERGED, STALLED = 1e-9, 1e-6
-#: Least ratio of the singular values of the Jacobian.
-LEAST_RATIO = 1e-6
+LEAST_RATIO = 1e-6  # Least ratio of the singular values of the Jacobian
 #: Step of central differences, as a fraction of the search range: rounding errors of the
 #: equilibrium (1e-10 of a reading) and curvature then both stay below 1e-6 of a derivative.
 DIFFERENCE_STEP = 1e-4
-#: Noise, as a fraction of the reading, where none is declared.
-ASSUMED_NOISE = 0.02
+ASSUMED_NOISE = 0.02  # Noise, as a fraction of the reading, where none is declared
 
 #: Whitened residuals (k,) and Jacobian (k, 3) at fractions of the search ranges (3,).
 Linearised = Callable[[Floats], tuple[Floats, Floats]]

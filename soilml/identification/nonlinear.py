@@ -35,8 +35,7 @@ NOISE_ROUNDS = 3
 INITIAL_NOISE = 0.05
 #: Sum of squared residuals that is significant where no degree of freedom is left: 3 sigma.
 SIGNIFICANT_COST = 9.0
-#: Readings of each channel of the few rows that tell good starts from bad ones.
-FEW = 16
+FEW = 16  # Readings of each channel of the few rows that tell good starts from bad ones
 
 
 def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:

@@ -31,8 +31,7 @@ INTERVAL = np.asarray([0.05, 0.95])
 #: Effective sample size below which mean and spread of the samples are not reported: their errors
 #: then exceed 1 / sqrt(50) = 14 % of the standard deviation.
 LEAST_USABLE_SIZE = 50.0
-#: Normal quantile of 0.999.
-Z_999 = 3.09
+Z_999 = 3.09  # Normal quantile of 0.999
 #: Readings from which on polynomials take the place of the model: few readings may leave a region
 #: with edges, and need few evaluations.
 FEWEST_READINGS = 8
@@ -40,8 +39,7 @@ FEWEST_READINGS = 8
 MANY_ROWS, FIRST_ROWS = 512, 256
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
 SIMILAR_NOISE = 2.0
-#: Draws of the priors from which one is chosen by the tests of the soil.
-CANDIDATES = 64
+CANDIDATES = 64  # Draws of the priors from which one is chosen by the tests of the soil
 
 
 @dataclass(frozen=True)

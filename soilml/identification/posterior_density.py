@@ -30,8 +30,7 @@ from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample
 from soilml.numerics.surrogate_density import SamplingBox
 
-#: Most model evaluations in one call, which bounds memory.
-MOST_EVALUATIONS = 200_000
+MOST_EVALUATIONS = 200_000  # Most model evaluations in one call, which bounds memory
 #: Samples of the normal distribution, and their spread over that of the linearised posterior.
 SAMPLES, WIDER = 2048, 1.2
 #: Rows from which on polynomials are tried in the place of the model, which take longer with fewer,
@@ -42,8 +41,7 @@ FEWEST_ROWS, TEMPERED_ROUNDS = 32, 2
 UNEXPLAINED, FEW_ROUNDS = 2.0, 4
 #: Standard deviations from the middle at which the region ends in which the model is sampled.
 REACH = 6.0
-#: Most rows where the model is sampled, which bounds the time.
-MOST_SAMPLED_ROWS = 128
+MOST_SAMPLED_ROWS = 128  # Most rows where the model is sampled, which bounds the time
 #: Effective sample size at which sampling of the model ends, and the numbers of solutions and of
 #: samples at which it ends anyway where nothing explains the rows.
 ENOUGH, MOST_SOLUTIONS, FEWEST_SAMPLES = 1250.0, 500_000, 4096

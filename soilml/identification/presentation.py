@@ -29,8 +29,7 @@ from soilml.report.parameter_lines import (
 )
 from soilml.report.terminal import interval, rounded, shown_unit
 
-#: Most results that the page describes in sentences; more are in its table.
-_MOST_SENTENCES = 4
+_MOST_SENTENCES = 4  # Most results that the page describes in sentences; more are in its table
 
 
 @dataclass(frozen=True)

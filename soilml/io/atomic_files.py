@@ -26,8 +26,7 @@ try:
 except ImportError:  # not on every system: nothing is cleared there
     fcntl = None  # type: ignore[assignment]
 
-#: Names of outputs that this process has replaced, in order.
-replaced: list[str] = []
+replaced: list[str] = []  # Names of outputs that this process has replaced, in order
 #: Last line of a journal whose files are all complete.
 _COMPLETE = "complete\n"
 _SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP")

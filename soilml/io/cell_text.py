@@ -11,13 +11,11 @@ import unicodedata
 from collections.abc import Sequence
 
 _CHARACTERS = frozenset("0123456789+-.eE")
-#: Digits of a whole number; more do not fit into 64 bits.
-_MOST_DIGITS = 18
+_MOST_DIGITS = 18  # Digits of a whole number; more do not fit into 64 bits
 #: Unicode categories that a terminal may obey or that reorder what is read: control, format,
 #: surrogate, private use, not assigned; and separators of lines and paragraphs.
 _NOT_PLAIN = ("Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp")
-#: First characters of a cell that spreadsheet programs calculate.
-_FORMULA = ("=", "+", "-", "@")
+_FORMULA = ("=", "+", "-", "@")  # First characters of a cell that spreadsheet programs calculate
 
 
 def read_number(text: str) -> float:

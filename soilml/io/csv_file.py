@@ -16,10 +16,8 @@ from soilml.io.table import TEXT, Column, text_column
 
 #: Rows that a table may have: more do not fit into the memory of a usual machine.
 MOST_ROWS = 10_000_000
-#: Rows whose cells are held as text at a time.
-BLOCK = 8192
-#: Characters of a line; a longer one is not of a table.
-_LINE = 1_000_000
+BLOCK = 8192  # Rows whose cells are held as text at a time
+_LINE = 1_000_000  # Characters of a line; a longer one is not of a table
 #: Characters of a cell that a message shows.
 _SHOWN = 60
 _QUOTES = "quotation marks must stand in pairs around a whole cell"

@@ -19,10 +19,8 @@ from soilml.quantities import COLUMNS
 
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
 RUNS = ("run", "slip", "load_N", "torque_Nm")
-#: Columns in which every row must have a value.
-FILLED = ("run", "slip", "load_N")
-#: Lower and upper bound, and what is needed in words.
-Limits = tuple[float, float, str]
+FILLED = ("run", "slip", "load_N")  # Columns in which every row must have a value
+Limits = tuple[float, float, str]  # Lower and upper bound, and what is needed in words
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
 _LIMITS: dict[str, Limits] = {
     "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a fraction and not in percent"),
@@ -44,10 +42,8 @@ _LIMITS: dict[str, Limits] = {
     "outer_radius_m": (0.0, 10.0, "a radius above zero and below 10, in m"),
     "shear_displacement_m": (-1.0, 10.0, "a displacement in m"),
 }
-#: Magnitude of any other number; squares and products of such are finite.
-_MOST = 1e30
-#: What the analyses take as rows.
-Rows = Table | ArrowStream | Mapping[str, ArrayLike]
+_MOST = 1e30  # Magnitude of any other number; squares and products of such are finite
+Rows = Table | ArrowStream | Mapping[str, ArrayLike]  # What the analyses take as rows
 
 
 def read_table(

@@ -17,8 +17,7 @@ Column = NDArray[Any]
 
 #: Columns that hold text; all others hold numbers, NaN where a cell is blank.
 TEXT = ("run", "status", "source", "wheel", "gear", "test")
-#: Characters of a text; every row of a column takes the memory of the longest.
-MOST_TEXT = 256
+MOST_TEXT = 256  # Characters of a text; every row of a column takes the memory of the longest
 
 
 def fault_of_text(text: str) -> str:
@@ -40,8 +39,7 @@ def text_column(cells: Iterable[Any], place: Callable[[int], str]) -> Column:
     return np.asarray(texts, dtype=np.str_)
 
 
-#: Name of the group of all rows; see `Table.groups`.
-ALL = "all"
+ALL = "all"  # Name of the group of all rows; see `Table.groups`
 
 
 @dataclass(frozen=True)

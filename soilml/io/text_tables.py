@@ -14,12 +14,9 @@ from soilml.io.cell_text import text_as_cell
 
 Columns = Mapping[str, Sequence[Any] | np.ndarray[Any, Any]]
 
-#: Rows that are formatted at a time.
-BLOCK = 8192
-#: Characters of a line of an aligned table.
-WIDTH = 100
-#: Fewest characters to which a column is wrapped.
-_LEAST_WRAPPED = 16
+BLOCK = 8192  # Rows that are formatted at a time
+WIDTH = 100  # Characters of a line of an aligned table
+_LEAST_WRAPPED = 16  # Fewest characters to which a column is wrapped
 
 
 def wrapped(text: str, width: int = WIDTH) -> str:

@@ -35,8 +35,7 @@ from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Channels that only samples over time can be.
-_OF_SAMPLES = ("wheel_angle", "position")
+_OF_SAMPLES = ("wheel_angle", "position")  # Channels that only samples over time can be
 
 
 def import_rows(

@@ -25,8 +25,7 @@ from soilml.remarks import Remark
 AVERAGED = ("torque", "load", "drawbar_pull", "sinkage")
 #: How many times the usual wandering, and how large a standard error of slip, a window may have.
 _TIMES, _LEAST_ERROR = 6.0, 0.01
-#: Fewest windows that tell what is usual.
-_FEWEST = 4
+_FEWEST = 4  # Fewest windows that tell what is usual
 #: Largest slip of a row: at 1 the wheel spins on the spot, and r omega and v say no more.
 _MOST_SLIP = 0.995
 

@@ -13,26 +13,22 @@ from soilml.numerics.resampling import effective_size, latin_hypercube, weighted
 
 #: Samples of the first round, stratified over the cube, and of each round after it.
 FIRST_ROUND, LATER_ROUND = 2048, 2048
-#: Most adaptive rounds.
-MOST_ROUNDS = 24
+MOST_ROUNDS = 24  # Most adaptive rounds
 #: Effective sample size at which sampling ends: sampling error of a mean is then 1 / sqrt(2500),
 #: 2 % of the standard deviation.
 LEAST_EFFECTIVE_SIZE = 2500.0
 #: Effective sample size that a mixture is fitted to; below it the density is tempered.
 FITTED_SIZE = 150.0
-#: Bisections of the tempering exponent.
-BISECTIONS = 30
+BISECTIONS = 30  # Bisections of the tempering exponent
 #: Most components of the mixture, degrees of freedom of their t distributions (four: tails heavy
 #: enough to cover a density that the fit has missed), and the uniform fraction of every proposal.
 COMPONENTS, FREEDOM, UNIFORM = 6, 4.0, 0.1
-#: Iterations of expectation maximisation.
-EM_STEPS = 12
+EM_STEPS = 12  # Iterations of expectation maximisation
 #: Fraction of the pooled covariance in that of each component, which keeps it regular.
 SHRINKAGE = 0.05
 #: Relative weight below which a sample, and mixing weight below which a component, is left out.
 LEAST_WEIGHT, LEAST_MIXING_WEIGHT = 1e-12, 1e-6
-#: Smallest divisor.
-TINY = 1e-300
+TINY = 1e-300  # Smallest divisor
 
 
 @dataclass(frozen=True)
@@ -41,8 +37,7 @@ class ImportanceSample:
 
     u: Floats
     weights: Floats
-    #: logarithm of the mean of the density over the cube
-    evidence: float
+    evidence: float  # logarithm of the mean of the density over the cube
 
     @property
     def effective_size(self) -> float:

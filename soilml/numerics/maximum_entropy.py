@@ -22,8 +22,7 @@ GRID_STEPS, LARGEST_STEP, GRID_TOLERANCE = 100, 4.0, 1e-6
 SAMPLE_STEPS, SAMPLE_TOLERANCE = 60, 1e-4
 #: Effective sample size below which a step is refused: no density in the range has such moments.
 LEAST_EFFECTIVE_SIZE = 200.0
-#: Halvings of a Newton step that does not lower the dual.
-HALVINGS = 12
+HALVINGS = 12  # Halvings of a Newton step that does not lower the dual
 
 
 def prior_quantiles(prior: Prior, mean: float, std: float, probability: Floats) -> Floats:

@@ -12,8 +12,7 @@ from soilml.arrays import Array, namespace
 TOLERANCE = 1e-9
 #: Bisection alone would take log2(bracket / TOLERANCE) steps, about 35 for a bracket of 32.
 MAX_STEPS = 80
-#: A secant steeper than this comes from rounding and is not used.
-MAX_SLOPE = 1e12
+MAX_SLOPE = 1e12  # A secant steeper than this comes from rounding and is not used
 #: From this step on, a step that is not half as long as the last one is replaced by bisection.
 FIRST_CHECKED_STEP = 3
 

@@ -13,10 +13,8 @@ MOST_CENTRES = 100
 #: Eigenvalues below this fraction of the largest are dropped: all together they hold a few
 #: thousandths of the process's standard deviation.
 LEAST_EIGENVALUE = 1e-6
-#: Points whose correlations with all others are computed at once, which bounds memory.
-BLOCK = 1000
-#: Decimals, in correlation lengths, to which points count as the same.
-SAME_POINT_DECIMALS = 6
+BLOCK = 1000  # Points whose correlations with all others are computed at once, which bounds memory
+SAME_POINT_DECIMALS = 6  # Decimals, in correlation lengths, to which points count as the same
 
 
 def process_columns(

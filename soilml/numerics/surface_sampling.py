@@ -23,8 +23,7 @@ from soilml.numerics.surrogate_density import (
 #: Points for each variable at which the model is evaluated in a round: over the whole cube, and
 #: where the region is known, so that lower degrees do.
 POINTS_IN_CUBE, POINTS_IN_REGION = 64, 40
-#: Most rounds.
-MOST_ROUNDS = 10
+MOST_ROUNDS = 10  # Most rounds
 #: Total degrees that are tried, and points that each coefficient needs.
 DEGREES, POINTS_PER_TERM = (2, 3, 4, 5, 6), 1.6
 #: Largest standard deviation of the error of the log density: weights that would correct it have an
@@ -33,13 +32,11 @@ DEGREES, POINTS_PER_TERM = (2, 3, 4, 5, 6), 1.6
 LARGEST_ERROR, LARGEST_INTERIM_ERROR = 0.1, 0.7
 #: Least power of the density that is sampled, and least factor between two powers.
 LEAST_POWER, LEAST_FACTOR = 1e-6, 1e-3
-#: Effective size of samples from which the next points are drawn.
-INTERIM_SIZE = 300.0
+INTERIM_SIZE = 300.0  # Effective size of samples from which the next points are drawn
 #: New points are samples of the density, this much farther from its middle, and moved at random by
 #: this share of its standard deviations.
 SPREAD, JITTER = 1.5, 0.3
-#: Effective number of points that the final error is judged by, at least.
-FEWEST_POINTS = 8.0
+FEWEST_POINTS = 8.0  # Effective number of points that the final error is judged by, at least
 #: Largest probability of the outermost twentieth of a region: more shows that the density goes on
 #: beyond. The next regions then reach farther by the second value: the tail of an exponential
 #: distribution ends at seven standard deviations, that of a normal one at four.

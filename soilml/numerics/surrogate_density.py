@@ -19,12 +19,9 @@ REACH = 4.5
 #: Farthest from the middle that polynomials are used, in standard deviations: the corners of a box
 #: of many dimensions are far beyond the points that they were fitted to.
 FARTHEST = 8.0
-#: Dimensions from which on the first samples are drawn about the middle.
-MANY_DIMENSIONS = 5
-#: Most predictions that are held at once: few enough to stay in a processor's cache.
-BLOCK = 100_000
-#: Trials of the error of the log density.
-TRIALS = 256
+MANY_DIMENSIONS = 5  # Dimensions from which on the first samples are drawn about the middle
+BLOCK = 100_000  # Most predictions that are held at once: few enough to stay in a processor's cache
+TRIALS = 256  # Trials of the error of the log density
 
 
 @dataclass(frozen=True)

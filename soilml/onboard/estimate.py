@@ -47,8 +47,7 @@ _WORDS = {
     Reason.NO_INFORMATION: "no reading has so little noise that it is used",
     Reason.CONTRADICTORY: "the files contradict each other",
 }
-#: Stands for a field that follows from the others.
-_NOT_GIVEN: NDArray[Any] = np.zeros(0)
+_NOT_GIVEN: NDArray[Any] = np.zeros(0)  # Stands for a field that follows from the others
 
 
 @dataclass(frozen=True)

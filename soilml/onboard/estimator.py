@@ -23,8 +23,7 @@ from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
 NoiseModels = Mapping[str, tuple[float, float]]
 
-#: Outputs of the graph for single readings.
-ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")
+ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Outputs of the graph for single readings
 #: Rows fed to the graph at a time: bounds its working memory, which the runtime keeps.
 ROWS_PER_CALL = 4096
 #: Largest deviation of mean or std from the file's own probe, in prior standard deviations.

@@ -25,8 +25,7 @@ READABLE: dict[str, tuple[float, float]] = {
     "sinkage": (-np.inf, np.inf),
     "vibration": (-np.inf, np.inf),
 }
-#: A longer argument is cut in an error message.
-MOST_SHOWN = 40
+MOST_SHOWN = 40  # A longer argument is cut in an error message
 
 
 def as_numbers(name: str, value: Any) -> Floats:

@@ -20,8 +20,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError
 
-#: Ridge that keeps the correlation matrix of two equal estimators invertible.
-RIDGE = 1e-9
+RIDGE = 1e-9  # Ridge that keeps the correlation matrix of two equal estimators invertible
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,11 @@ from soilml.onboard.held_out_errors import HeldOutErrors
 
 #: Fewest held-out rows that two files must have in common, and fewest averages of repeated ones.
 LEAST_COMMON_ROWS, LEAST_AVERAGES = 200, 100
-#: Intervals are calibrated by the fused mean, in so many bins of equal numbers of rows.
-BINS = 6
+BINS = 6  # Intervals are calibrated by the fused mean, in so many bins of equal numbers of rows
 #: Estimates that differ by more than this many standard deviations of their difference widen the
 #: fused one in proportion: Birge's ratio, from which it would start at 1.
 DISAGREEMENT = 2.0
-#: Least eigenvalue of a correlation matrix.
-LEAST_EIGENVALUE = 1e-3
+LEAST_EIGENVALUE = 1e-3  # Least eigenvalue of a correlation matrix
 
 
 @dataclass(frozen=True)

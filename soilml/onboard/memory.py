@@ -17,8 +17,7 @@ from soilml.onboard.features import as_numbers
 
 Singles = NDArray[np.float32]
 
-#: Version of the content of a memory.
-MEMORY_FORMAT = "1"
+MEMORY_FORMAT = "1"  # Version of the content of a memory
 #: A memory is packed each time that it has grown by so many rows, so that a step takes about as
 #: long after thousands of readings as after a few.
 PACKED_EVERY = 32

@@ -27,8 +27,7 @@ os.environ.setdefault("ORT_DISABLE_TELEMETRY", "1")
 
 import onnxruntime as ort
 
-#: A loaded ONNX file.
-Session: TypeAlias = ort.InferenceSession
+Session: TypeAlias = ort.InferenceSession  # A loaded ONNX file
 
 #: message -> field number -> message in that field
 _INSIDE: dict[str, dict[int, str]] = {
@@ -43,12 +42,10 @@ _INSIDE: dict[str, dict[int, str]] = {
 #: Fields external_data and data_location of a tensor.
 _EXTERNAL, _LOCATION = 13, 14
 _VARINT, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
-#: Version of the file format: names of inputs and outputs, keys of the metadata.
-FORMAT = "3"
+FORMAT = "3"  # Version of the file format: names of inputs and outputs, keys of the metadata
 #: Largest model file, bytes. Those that `soilml train` writes have some MB at most.
 MOST_BYTES = 256 << 20
-#: Characters of an entry of the metadata that a message shows.
-_MOST_SHOWN = 40
+_MOST_SHOWN = 40  # Characters of an entry of the metadata that a message shows
 #: The metadata entry `soilml_kind` of a graph of one step, which other programs feed.
 ONE_STEP = "step"
 

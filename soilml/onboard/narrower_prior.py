@@ -10,17 +10,14 @@ import numpy as np
 
 from soilml.arrays import Floats
 
-#: Points drawn.
-POINTS = 2048
+POINTS = 2048  # Points drawn
 #: Standard deviations to which the cumulative normal distribution is tabulated, and its entries.
 REACH, ENTRIES = 8.0, 4001
-#: Fractions below the ends of the 90 % interval.
-INTERVAL = (0.05, 0.95)
+INTERVAL = (0.05, 0.95)  # Fractions below the ends of the 90 % interval
 #: Standard deviation, in widths of the prior, of the likelihood of a quantity that the readings do
 #: not determine.
 NO_INFORMATION = 20.0
-#: Share of the estimate in the box below which the readings contradict it.
-LEAST_MASS = 1e-4
+LEAST_MASS = 1e-4  # Share of the estimate in the box below which the readings contradict it
 
 
 @dataclass(frozen=True)

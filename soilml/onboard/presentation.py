@@ -28,8 +28,7 @@ from soilml.report.parameter_lines import (
 )
 from soilml.report.terminal import shown_unit, significant
 
-#: Ending of the columns of the estimate with typical model errors.
-TYPICAL = "usual"
+TYPICAL = "usual"  # Ending of the columns of the estimate with typical model errors
 #: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
 MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
 #: Runs with the same remark have a line each up to this number, and one together beyond it.

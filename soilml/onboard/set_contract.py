@@ -27,16 +27,14 @@ STD_INPUTS = ("torque_std", "torque_bias", "sinkage_std", "drawbar_pull_std")
 #: Standard deviations of a row's slip and load, zero where they are exact. Files of earlier
 #: versions lack these inputs.
 OPERATING_STD_INPUTS = ("slip_std", "load_std")
-#: Names under which that noise is declared.
-OPERATING_NOISE = ("slip", "load")
+OPERATING_NOISE = ("slip", "load")  # Names under which that noise is declared
 #: Standard deviations of errors of the sensors that all rows of a set share: offset of slip,
 #: relative errors of load and torque, offsets of sinkage and drawbar pull.
 SENSOR_ERROR_INPUTS = ("slip_bias", "load_gain", "torque_gain", "sinkage_bias", "drawbar_pull_bias")
 #: Size of the errors of the model, as a multiple of their usual size; 0: the model is right. Files
 #: of interface 2 and earlier lack it.
 MODEL_ERROR_INPUT = "model_error"
-#: All errors that a set shares.
-COMMON_ERROR_INPUTS = (*SENSOR_ERROR_INPUTS, MODEL_ERROR_INPUT)
+COMMON_ERROR_INPUTS = (*SENSOR_ERROR_INPUTS, MODEL_ERROR_INPUT)  # All errors that a set shares
 #: Errors of the sensors that all rows share, in the order of their columns of the residual system,
 #: after those of the monomials. Files without `COMMON_ERROR_INPUTS` have the first only.
 SENSOR_ERROR_COLUMNS = (
@@ -63,8 +61,7 @@ MODEL_ERROR_COLUMNS = (
     "sinkage_by_slip",
     "drawbar_pull_by_slip",
 )
-#: All columns of errors.
-ERROR_COLUMNS = (*SENSOR_ERROR_COLUMNS, *MODEL_ERROR_COLUMNS)
+ERROR_COLUMNS = (*SENSOR_ERROR_COLUMNS, *MODEL_ERROR_COLUMNS)  # All columns of errors
 #: Channels in the order in which a response surface predicts them.
 RESPONSE_CHANNELS = ("torque", "sinkage", "drawbar_pull")
 #: Names under which the noise of a file, or of a user, is declared.

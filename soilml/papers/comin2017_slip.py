@@ -38,8 +38,7 @@ from soilml.systems.wheel_legs.stances import (
     vibration_amplitude,
 )
 
-#: Width (m) and slip of the rover's wheel, neither printed.
-WIDTH, SLIP = 0.18, 0.2
+WIDTH, SLIP = 0.18, 0.2  # Width (m) and slip of the rover's wheel, neither printed
 #: Springs to which the vibration-slip models are fitted: N/m, rad, and the friction angle.
 STIFFNESSES = np.linspace(3000.0, 6000.0, 7)
 DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))

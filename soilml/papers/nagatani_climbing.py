@@ -25,8 +25,7 @@ from soilml.systems.climbing import (
 )
 from soilml.systems.climbing.simulated_rover import SLOPES
 
-#: Slopes from which the paper predicts, and repetitions of each.
-GENTLE, REPEATS = SLOPES[:2], 4
+GENTLE, REPEATS = SLOPES[:2], 4  # Slopes from which the paper predicts, and repetitions of each
 
 
 @cache

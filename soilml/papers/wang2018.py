@@ -14,8 +14,7 @@ from soilml.physics.soils import soil
 from soilml.systems.tracked_robot.group_identification import implied_points
 from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
-#: Slips over which the drawbar pull is averaged as its plateau.
-LEVEL = np.linspace(0.5, 0.9, 9)
+LEVEL = np.linspace(0.5, 0.9, 9)  # Slips over which the drawbar pull is averaged as its plateau
 
 
 @cache

@@ -140,8 +140,7 @@ def _least_readings(method: str, free: tuple[str, ...]) -> float:
     return float("nan")
 
 
-#: Keys of inputs of the simplified wheel.
-INPUTS = frozenset({"load", "theta_m", "theta_2"})
+INPUTS = frozenset({"load", "theta_m", "theta_2"})  # Keys of inputs of the simplified wheel
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {

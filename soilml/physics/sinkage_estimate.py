@@ -15,13 +15,11 @@ from soilml.physics.forces import forces_at_sinkage, load_at_sinkage
 from soilml.physics.load_case import LoadCase, merge_rows, merged_position, rows, single_precision
 from soilml.row_status import Status
 
-#: Most evaluations of the load. The last step is not evaluated.
-COARSE_EVALUATIONS = 4
+COARSE_EVALUATIONS = 4  # Most evaluations of the load. The last step is not evaluated.
 #: The search ends, from the second evaluation on, where the steps in log sinkage of all rows are
 #: below this: the next ones are of the order of its square.
 SMALL_STEP = 0.02
-#: Rows whose last step in log sinkage is larger than this are not solved.
-MAX_LAST_STEP = 0.3
+MAX_LAST_STEP = 0.3  # Rows whose last step in log sinkage is larger than this are not solved
 #: Changes of log sinkage below this leave the slope as it is: rounding would spoil it.
 COARSE_MIN_CHANGE = 3e-3
 #: The search starts below the largest sinkage by this much in log sinkage at least.
@@ -29,14 +27,12 @@ INITIAL_MARGIN = 0.1
 #: Bounds of the slope of log load against log sinkage, and of a step.
 SLOPES, COARSE_MAX_STEP = (0.05, 20.0), 3.0
 
-#: Evaluations after which a row is solved by the ordinary search instead.
-MAX_EVALUATIONS = 6
+MAX_EVALUATIONS = 6  # Evaluations after which a row is solved by the ordinary search instead
 #: A row is solved where the logarithm of the load carried over the load is below the first figure,
 #: and its product with that of the evaluation before below the second: the error of the
 #: interpolation between the two is of the order of the product.
 MAX_LOG_RATIO, MAX_PRODUCT = 1e-5, 1e-11
-#: A change of that logarithm below this is mostly rounding and gives no slope.
-MIN_CHANGE = 1e-9
+MIN_CHANGE = 1e-9  # A change of that logarithm below this is mostly rounding and gives no slope
 #: The estimate may be off by this much in log sinkage at most; larger steps leave its vicinity.
 MAX_STEP = 2.0
 

@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 #: Version of the entry `report` in the JSON files: raised where a key changes its meaning or goes.
 FORMAT_VERSION = 2
 _BLOCK = 1 << 20
-#: Most rows of a table on a page; the JSON file has all.
-MOST_ROWS = 200
+MOST_ROWS = 200  # Most rows of a table on a page; the JSON file has all
 
 
 @dataclass(frozen=True)

@@ -19,10 +19,8 @@ if TYPE_CHECKING:
 
 #: Range of the prior; the same grey as in every figure.
 PRIOR = "#d9d9d9"
-#: Most results that are lines with labels; more are points over their number.
-MOST_LINES = 12
-#: Characters of a label from which on all are small, so that room is left for the panels.
-_LONG = 41
+MOST_LINES = 12  # Most results that are lines with labels; more are points over their number
+_LONG = 41  # Characters of a label from which on all are small, so that room is left for the panels
 
 
 @dataclass(frozen=True)

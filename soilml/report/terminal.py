@@ -11,8 +11,7 @@ from soilml.report.numbers import decimal
 _UNITS = {"Pa": (1e-3, "kPa"), "rad": (180.0 / math.pi, "deg"), "m": (1e3, "mm")}
 #: Such a unit in the name of a column: torque_Nm and speed_m_s are left.
 _UNIT_IN_COLUMN = re.compile(r"_(Pa|rad|m)(?!_s2?(?:_|$))(?=_|$)")
-#: Sizes outside which a number is written with a power of ten.
-_LEAST, _MOST = 1e-4, 1e7
+_LEAST, _MOST = 1e-4, 1e7  # Sizes outside which a number is written with a power of ten
 
 
 def shown_unit(unit: str, size: float = 0.0) -> tuple[float, str]:

@@ -18,8 +18,7 @@ from soilml.serve.jobs import Jobs
 from soilml.serve.uploads import LARGEST_FILE, Upload, Uploads
 from soilml.serve.worker import KINDS
 
-#: The page's own files.
-STATIC = Path(__file__).parent / "static"
+STATIC = Path(__file__).parent / "static"  # The page's own files
 #: Largest body of a request that is no file, bytes: a model file and a map with room to spare.
 LARGEST_BODY = 2 << 20
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript",

@@ -23,13 +23,11 @@ what was dropped on the page is removed then.
   soilml serve
   soilml serve --port 9000 --no-browser
 """
-#: The page is for this machine alone.
-HOST = "127.0.0.1"
+HOST = "127.0.0.1"  # The page is for this machine alone
 #: What needs a library, and the extra that brings it.
 _LIBRARIES = ((("tornado", "serve"), ("scipy", "ground"), ("jinja2", "ground"),
                ("matplotlib", "ground"), ("pint", "ground")))  # fmt: skip
-#: Where the page is served unless --port says otherwise.
-PORT = 8642
+PORT = 8642  # Where the page is served unless --port says otherwise
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -23,8 +23,7 @@ HEADERS = {
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
 }
-#: Methods that only read.
-_READING = ("GET", "HEAD")
+_READING = ("GET", "HEAD")  # Methods that only read
 
 
 #: What a part of a request must be; each may be missing, or null.

@@ -17,8 +17,7 @@ from typing import Any
 from soilml.errors import InputError
 from soilml.serve.answers.job_files import OUTPUT
 
-#: Jobs that are remembered; the oldest are forgotten with their files.
-_MOST_JOBS = 24
+_MOST_JOBS = 24  # Jobs that are remembered; the oldest are forgotten with their files
 #: Longest line of a worker, bytes: an answer with its pictures and tables.
 _LONGEST_LINE = 64 << 20
 _CRASHED = "the analysis ended without an answer: the machine may have too little memory"

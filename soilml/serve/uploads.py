@@ -10,8 +10,7 @@ from pathlib import Path
 
 from soilml.errors import InputError
 
-#: Largest file, and all files together, bytes.
-LARGEST_FILE, LARGEST_SUM = 256 << 20, 1 << 30
+LARGEST_FILE, LARGEST_SUM = 256 << 20, 1 << 30  # Largest file, and all files together, bytes
 #: Bytes of a name and of its ending; file systems take 255 in all.
 _LONGEST_NAME, _LONGEST_ENDING = 120, 16
 

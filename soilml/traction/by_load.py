@@ -20,14 +20,11 @@ from soilml.traction.soil_draws import SoilDraws
 
 #: Extrapolation beyond the measured slips (difference) and loads (factor) that is reported.
 SLIP_MARGIN, LOAD_FACTOR = 0.1, 1.25
-#: Slope, rad (45 degrees), beyond which vehicles overturn.
-OVERTURNING_SLOPE = 0.7854
-#: What no band includes.
-_NOT_INCLUDED = "all wheels equal, no load transfer, no side slope"
+OVERTURNING_SLOPE = 0.7854  # Slope, rad (45 degrees), beyond which vehicles overturn
+_NOT_INCLUDED = "all wheels equal, no load transfer, no side slope"  # What no band includes
 #: Relative difference up to which loads of rows count as equal: noise of a nominal load.
 SAME_LOAD = 0.1
-#: Number of loads predicted by default: the lightest, one between, the heaviest.
-MOST_LOADS = 3
+MOST_LOADS = 3  # Number of loads predicted by default: the lightest, one between, the heaviest
 #: Default highest slip where no row has a higher one, and number of slips of a curve.
 DEFAULT_SLIP_LIMIT, SLIPS = 0.6, 12
 

@@ -16,10 +16,8 @@ from soilml.physics.operating_point import Operating
 from soilml.traction.pull_and_slope import on_a_vehicle
 from soilml.traction.soil_draws import SoilDraws
 
-#: Loads (N) that agree to this share are those of one wheel, solved once.
-SAME_LOAD = 1e-9
-#: Steepest slope that is looked at, rad (60 degrees).
-LARGEST_SLOPE = np.deg2rad(60.0)
+SAME_LOAD = 1e-9  # Loads (N) that agree to this share are those of one wheel, solved once
+LARGEST_SLOPE = np.deg2rad(60.0)  # Steepest slope that is looked at, rad (60 degrees)
 #: Slips below the first of a grid, as shares of it: pull rises steeply there.
 FIRST_SHARES = (0.05, 0.1, 0.2, 0.4, 0.7)
 

@@ -17,8 +17,7 @@ from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.traction.presentation import Presentation, band_columns
 from soilml.traction.rover_report import SIZE, RoverReport
 
-#: Share of draws that climb a slope below which nothing is said of the slip there.
-FEWEST = 0.5
+FEWEST = 0.5  # Share of draws that climb a slope below which nothing is said of the slip there
 
 
 def rover_text(rover: WheeledRover, report: RoverReport) -> str:
@@ -179,8 +178,7 @@ def rover_page(
     )
 
 
-#: Most pictures of a page.
-MOST_PICTURES = 6
+MOST_PICTURES = 6  # Most pictures of a page
 
 
 def _moves(report: RoverReport) -> bool:

@@ -26,12 +26,10 @@ from soilml.traction.report import POSTERIOR, PRIOR
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import SoilDraws, measured_soil, prior_draws
 
-#: Slopes that are looked at by default, rad.
-SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])
+SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])  # Slopes that are looked at by default, rad
 #: Gravity, m/s^2, and relative difference from it, from which on it is not the Earth's.
 EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
-#: Width and height of the figure, inches.
-SIZE = (10.0, 6.4)
+SIZE = (10.0, 6.4)  # Width and height of the figure, inches
 
 
 @dataclass(frozen=True)

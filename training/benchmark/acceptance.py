@@ -22,8 +22,7 @@ SHEAR_SYMBOLS = ("c", "phi", "K")
 
 #: Largest accepted RMSE over that of the Bayes limit: of one row, and of every size of set.
 MAX_RATIO_ONE_ROW, MAX_RATIO = 1.01, 1.05
-#: Accepted coverage of 90 % intervals and regions.
-COVERAGE_RANGE = (0.88, 0.92)
+COVERAGE_RANGE = (0.88, 0.92)  # Accepted coverage of 90 % intervals and regions
 #: Rows of the largest sets, and the RMSE of SHEAR (Pa, rad, m) accepted there, for true cohesions
 #: (Pa) in a range.
 LARGEST_SET = 18

@@ -20,8 +20,7 @@ from soilml.quantities import column
 
 #: Quantiles that are stored: ends of the 90 % and of the 50 % interval.
 FRACTIONS = (0.05, 0.25, 0.75, 0.95)
-#: Posterior draws that estimate the HPD level of the truth: its resolution is 1/200.
-HPD_DRAWS = 200
+HPD_DRAWS = 200  # Posterior draws that estimate the HPD level of the truth: its resolution is 1/200
 
 
 @dataclass(frozen=True)
@@ -46,8 +45,7 @@ class PosteriorSummary:
     flagged: bool
 
 
-#: Columns that identify the set of a row.
-KEY_COLUMNS = ("effect", "design", "set", "rows_hash")
+KEY_COLUMNS = ("effect", "design", "set", "rows_hash")  # Columns that identify the set of a row
 #: Columns of one number per set: log density at the truth, HPD level of the truth, flag.
 SCALAR_COLUMNS = ("log_density", "denser", "flagged")
 HINT = "compute it again: soilml compare --limit FILE.parquet"

@@ -14,8 +14,7 @@ from soilml.numerics.prior import Prior
 from training.benchmark.designs import Design
 from training.benchmark.methods import MethodEstimates, MethodKind
 
-#: Nominal coverage of intervals, ellipsoids and highest-density regions.
-NOMINAL = 0.9
+NOMINAL = 0.9  # Nominal coverage of intervals, ellipsoids and highest-density regions
 
 
 @dataclass(frozen=True)

@@ -41,12 +41,10 @@ def columns_of_rows(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
     return columns
 
 
-#: Titles of the columns.
-TITLES = ("cohesion c", "friction angle phi", "shear modulus K")
+TITLES = ("cohesion c", "friction angle phi", "shear modulus K")  # Titles of the columns
 
 
-#: Width and height of the figure, inches.
-SIZE = (12.5, 12.0)
+SIZE = (12.5, 12.0)  # Width and height of the figure, inches
 
 
 def plot_benchmark(results: Sequence[PairedResult], ax: Any = None) -> NDArray[Any]:
@@ -345,5 +343,4 @@ def benchmark_report(results: Sequence[PairedResult]) -> Report:
     )
 
 
-#: Most sentences of the page; the table of goals has all.
-MOST_SENTENCES = 6
+MOST_SENTENCES = 6  # Most sentences of the page; the table of goals has all

@@ -32,8 +32,7 @@ from training.benchmark.paired_results import PairedResult
 
 Progress = Callable[[str, int, int], None]
 
-#: The packaged recipe whose sets the benchmark has.
-RECIPE = "benchmark"
+RECIPE = "benchmark"  # The packaged recipe whose sets the benchmark has
 #: Label of the exact posterior. On sets with an unmodelled effect it is no limit, and has the label
 #: of the analytic method that it is.
 LIMIT_LABEL, POSTERIOR_LABEL = "Bayes limit", f"{ANALYTIC_PREFIX}posterior"

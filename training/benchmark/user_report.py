@@ -20,8 +20,7 @@ from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import MethodResult
 from training.benchmark.report import columns_of_rows, format_number
 
-#: Most characters of the name of a method on a terminal.
-_MOST_NAME = 24
+_MOST_NAME = 24  # Most characters of the name of a method on a terminal
 
 
 def csv_columns(scores: Sequence[MethodResult], names: Sequence[str]) -> dict[str, list[Any]]:

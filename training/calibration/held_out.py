@@ -19,12 +19,10 @@ from training.dataset import Dataset
 #: Mean, standard deviation (n, q) and in-range flag (n,) of features (n, d), as in the file.
 Predict = Callable[[Floats], tuple[Floats, Floats, NDArray[np.bool_]]]
 
-#: Most rows that a file carries.
-MOST_ROWS = 2000
+MOST_ROWS = 2000  # Most rows that a file carries
 #: Numbers of repeated readings at which the error of their mean is measured.
 REPEATS = (1, 2, 4, 8, 16)
-#: A target counts as the same in all rows of a run up to this share of its range.
-SAME_TARGET = 0.01
+SAME_TARGET = 0.01  # A target counts as the same in all rows of a run up to this share of its range
 
 
 def carry_errors(

@@ -28,12 +28,10 @@ LENGTHS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 #: Least number of groups for a 90 % quantile, and most groups of one run, so that none dominates.
 LEAST_GROUPS = 50
 MOST_GROUPS_OF_A_RUN = 4
-#: Share of consistent sets that may be rejected as inconsistent.
-FALSE_REJECTION_RATE = 0.002
+FALSE_REJECTION_RATE = 0.002  # Share of consistent sets that may be rejected as inconsistent
 #: A condition counts as steady up to this variation, see `RunConditions`, and as free from that.
 STEADY, FREE = 0.1, 0.5
-#: Limit of inconsistency that no run exceeds, where none could be measured.
-NO_LIMIT = 1e9
+NO_LIMIT = 1e9  # Limit of inconsistency that no run exceeds, where none could be measured
 #: Candidate shares of a row's information that is independent of the other rows.
 INFORMATION_SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08, 0.05, 0.03)
 

@@ -13,12 +13,10 @@ from training.calibration.row_pooling import OPERATING_CONDITIONS
 from training.onnx_graph.builder import Graph
 from training.regressors.standardisation import Standardisation
 
-#: Largest number of knots along the first and the second operating condition.
-MOST_KNOTS = (24, 8)
+MOST_KNOTS = (24, 8)  # Largest number of knots along the first and the second operating condition
 #: Rows per knot, at least, so that the extremes of a cell are close to those of the population.
 LEAST_ROWS = 60
-#: Margin added to the bounds, as a share of their distance.
-BOUNDS_MARGIN = 0.02
+BOUNDS_MARGIN = 0.02  # Margin added to the bounds, as a share of their distance
 
 
 @dataclass(frozen=True)
@@ -117,8 +115,7 @@ def _add_interpolation(graph: Graph, weights: list[str], bound: Floats) -> str:
 #: Number of balls, and of the rows that their centres are selected from: more cost time and bytes.
 CENTRES = 128
 CANDIDATES = 6000
-#: Rows whose distances to the centres are computed at a time.
-CHUNK = 4096
+CHUNK = 4096  # Rows whose distances to the centres are computed at a time
 #: Margin of box and balls, as a share of their size: rows do not reach the very ends of the range.
 MARGIN = 0.005
 

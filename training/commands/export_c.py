@@ -29,8 +29,7 @@ Functions, with NAME the name of OUT.c:
 
 docs/c-export.md describes them, with an example in C and one in C++.
 """
-#: Rows of one step that the working memory may be asked for.
-MOST_ROWS = 4096
+MOST_ROWS = 4096  # Rows of one step that the working memory may be asked for
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

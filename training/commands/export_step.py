@@ -18,8 +18,7 @@ for compilers that need fixed shapes, such as those of accelerators.
 docs/onnx-interface.md says how its memory is fed from step to step. Python
 uses MODEL.onnx itself; soilml export-c writes C that needs no library.
 """
-#: Rows that one step may take.
-MOST_ROWS = 4096
+MOST_ROWS = 4096  # Rows that one step may take
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

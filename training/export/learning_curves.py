@@ -16,8 +16,7 @@ from training.train import TrainedModel
 
 #: Shares of the training rows at which the validation error is plotted.
 SHARES = (0.01, 0.03, 0.1, 0.3, 1.0)
-#: Fewest training rows of a point of the curve.
-LEAST_ROWS = 40
+LEAST_ROWS = 40  # Fewest training rows of a point of the curve
 
 
 def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) -> None:

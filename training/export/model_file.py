@@ -219,8 +219,7 @@ def _data_digest(path: Path) -> str:
     return digest.hexdigest()
 
 
-#: Largest allowed difference to the float64 original, in prior standard deviations.
-TOLERANCE = 1e-4
+TOLERANCE = 1e-4  # Largest allowed difference to the float64 original, in prior standard deviations
 #: Readings that the difference is measured on: quasi-random ones, and about as many training rows.
 PARITY_ROWS = 8192
 #: Readings of one call, which bounds the memory for files of many prototypes.

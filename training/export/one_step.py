@@ -18,8 +18,7 @@ from soilml.onboard.set_contract import (
 )
 from training.onnx_graph.builder import SHORTCUT, needed_nodes
 
-#: Names of constants of the graph.
-ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"
+ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"  # Names of constants of the graph
 
 
 def one_step_graph(model: Any, name: str, rows: int) -> Any:

@@ -11,10 +11,8 @@ from numpy.typing import NDArray
 
 from training.export_c.tensor import Expression, Shape, Size, Tensor, strides
 
-#: Width of the lines that hold the numbers of an array.
-WIDTH = 100
-#: The largest whole number that every C compiler's int holds (32 bits).
-LARGEST_INT = 2**31 - 1
+WIDTH = 100  # Width of the lines that hold the numbers of an array
+LARGEST_INT = 2**31 - 1  # The largest whole number that every C compiler's int holds (32 bits)
 
 
 def number(value: Any, kind: str) -> str:

@@ -25,8 +25,7 @@ DTYPES = {"double": np.float64, "float": np.float32, "int": np.int32, "bool": np
 ROWS, KEPT = "rows", "kept"
 #: Outputs that a step needs: the state, the counts, and which rows are in range.
 STEP_OUTPUTS = (*MEMORY_OUTPUTS, ROW_IN_RANGE)
-#: Width of lines of C.
-WIDTH = 100
+WIDTH = 100  # Width of lines of C
 
 
 @dataclass(frozen=True)

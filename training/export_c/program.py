@@ -14,8 +14,7 @@ from soilml.errors import ModelFileError
 from training.export_c.c_text import element_loops, leaves_of
 from training.export_c.tensor import Expression, Shape, Size, Tensor, kind_of_array, total
 
-#: Tensors that one expression reads at most; longer ones are hard to read.
-LONGEST_EXPRESSION = 6
+LONGEST_EXPRESSION = 6  # Tensors that one expression reads at most; longer ones are hard to read
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,7 @@ class Statement:
     names: tuple[str, ...]
 
 
-#: Name, elements and C type of a constant array.
-Constant = tuple[str, NDArray[Any], str]
+Constant = tuple[str, NDArray[Any], str]  # Name, elements and C type of a constant array
 
 
 @dataclass

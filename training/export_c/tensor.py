@@ -152,8 +152,7 @@ def kind_of_array(values: NDArray[Any], name: str) -> str:
 class Expression:
     """A computation of one element from elements of other tensors."""
 
-    #: a C expression in which ``{0}``, ``{1}``, ... stand for the operands.
-    text: str
+    text: str  # a C expression in which ``{0}``, ``{1}``, ... stand for the operands
     #: all broadcast to the shape of the tensor that the expression belongs to
     operands: tuple[Tensor, ...]
 

@@ -21,14 +21,12 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.onboard.set_contract import SET_SWITCH
 
-#: Element type and shape of a graph's output.
-Output = tuple[int, list[Any]]
+Output = tuple[int, list[Any]]  # Element type and shape of a graph's output
 
 #: ONNX's numbers of the element types of inputs and outputs (onnx.TensorProto.DataType).
 FLOAT, BOOL = 1, 9
 
-#: Mark of If nodes whose else branch is right for every condition.
-SHORTCUT = "shortcut"
+SHORTCUT = "shortcut"  # Mark of If nodes whose else branch is right for every condition
 
 OPSET = 18
 IR_VERSION = 9

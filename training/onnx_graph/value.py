@@ -39,8 +39,7 @@ class Value:
     #: numpy.float32 or numpy.float64: the type of constants that it is combined with
     dtype: type = np.float32
 
-    #: numpy leaves `array + value` to the operators below.
-    __array_ufunc__ = None
+    __array_ufunc__ = None  # numpy leaves `array + value` to the operators below
 
     def __add__(self, other: Operand) -> Value:
         return self._binary("Add", self, other)
@@ -176,8 +175,7 @@ class Value:
         return Value(self.graph, name, self.dtype)
 
 
-#: What stands on either side of an operator.
-Operand = Value | float | NDArray[Any]
+Operand = Value | float | NDArray[Any]  # What stands on either side of an operator
 
 
 def constant(graph: Graph, value: Any, dtype: type = np.float32) -> Value:

@@ -76,8 +76,7 @@ WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 GAMMAS = tuple(10.0 ** (0.5 * k) for k in range(-6, 17))
 #: Most rows whose kernel matrix is decomposed, which takes some thirty times as long as a factor.
 EIGENSYSTEM_ROWS = 1500
-#: Passes over the tiles: factor, diagonal of the inverse, factor for the log-variance.
-PASSES = 3
+PASSES = 3  # Passes over the tiles: factor, diagonal of the inverse, factor for the log-variance
 
 
 @dataclass(frozen=True)

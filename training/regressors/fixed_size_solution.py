@@ -30,8 +30,7 @@ WIDTHS = (0.5, 1.0, 1.5, 2.0, 3.0)
 GAMMAS = tuple(10.0**k for k in range(-6, 9))
 #: Rows on which the width is selected, and on which the range of the log-variance is measured.
 SEARCH_ROWS, RANGE_ROWS = 8000, 50000
-#: Passes over the rows: of the Gram matrix, of the residuals, and of the log-variance.
-PASSES = 3
+PASSES = 3  # Passes over the rows: of the Gram matrix, of the residuals, and of the log-variance
 
 
 @dataclass(frozen=True)
@@ -165,8 +164,7 @@ def _errors(
     return np.asarray(errors)
 
 
-#: Arrays and objects that grow neither with the rows nor with the prototypes.
-SMALL_BYTES = 1 << 20
+SMALL_BYTES = 1 << 20  # Arrays and objects that grow neither with the rows nor with the prototypes
 
 
 class _Steps:

@@ -21,8 +21,7 @@ Singles = NDArray[np.float32]
 WEIGHT_DECAY = 1e-4
 #: Norm to which larger gradients are scaled down, so that no batch with outliers disrupts the fit.
 LARGEST_GRADIENT = 5.0
-#: First weights of the output layer, as a share of those of the others.
-FIRST_OUTPUTS = 0.1
+FIRST_OUTPUTS = 0.1  # First weights of the output layer, as a share of those of the others
 #: Log-variances of standardised outputs in the loss: standard deviations from 0.0025 to 20.
 LOG_VARIANCE_RANGE = (-12.0, 6.0)
 
@@ -59,14 +58,9 @@ class GaussianMLP(GaussianRegressor):
         validation: float = 0.1,
         random_state: int = 0,
     ) -> None:
-        self.hidden = hidden
-        self.epochs = epochs
-        self.batch = batch
-        self.learning_rate = learning_rate
-        self.warm_up = warm_up
-        self.patience = patience
-        self.validation = validation
-        self.random_state = random_state
+        self.hidden, self.epochs, self.batch = hidden, epochs, batch
+        self.learning_rate, self.warm_up = learning_rate, warm_up
+        self.patience, self.validation, self.random_state = patience, validation, random_state
 
     def _set_aside(self, X: Floats, Y: Floats) -> tuple[Floats, Floats, Any]:
         """A share of the rows is for early stopping."""

@@ -17,8 +17,7 @@ from training.regressors.standardisation import Standardisation
 
 Progress = Callable[[int, int], None]
 
-#: Share of the training rows whose log-variances are clipped at either end.
-TAIL = 0.001
+TAIL = 0.001  # Share of the training rows whose log-variances are clipped at either end
 
 
 @dataclass(frozen=True)

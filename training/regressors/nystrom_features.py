@@ -105,8 +105,7 @@ class RidgeEigensystem:
         return np.asarray(residual / (1.0 - self.leverage(projected, gamma))[:, None])
 
 
-#: Rows whose features are computed at a time in each thread.
-CHUNK = 4096
+CHUNK = 4096  # Rows whose features are computed at a time in each thread
 #: Eigenvalues of the centres' kernel matrix below this share of the largest are rounding errors.
 RANK_TOLERANCE = 1e-11
 

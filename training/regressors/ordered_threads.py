@@ -14,8 +14,7 @@ from datagen.processes import usable_cores
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-#: Called with the steps done and the total number of steps.
-Progress = Callable[[int, int], None]
+Progress = Callable[[int, int], None]  # Called with the steps done and the total number of steps
 
 
 def thread_count() -> int:

@@ -10,8 +10,7 @@ from soilml.arrays import Floats
 
 Rows = tuple[Floats, Floats]
 
-#: Expectation of the logarithm of a squared standard normal variable.
-LOG_CHI2 = -1.2703628454614782
+LOG_CHI2 = -1.2703628454614782  # Expectation of the logarithm of a squared standard normal variable
 #: Share of their mean that is added to squared residuals, so that their logarithms are finite.
 SQUARE_FLOOR = 1e-4
 
@@ -42,8 +41,7 @@ def median_distance(x: Floats, seed: int = 0) -> float:
 
 #: With fewer validation rows hyperparameters are selected by leave-one-out.
 LEAST_VALIDATION_ROWS = 200
-#: Most validation rows that they are selected on.
-MOST_VALIDATION_ROWS = 4000
+MOST_VALIDATION_ROWS = 4000  # Most validation rows that they are selected on
 
 
 #: Kernel width, gammas and mean squared errors of each width that was searched.

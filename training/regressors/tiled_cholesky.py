@@ -12,8 +12,7 @@ from soilml.arrays import Floats
 from training.regressors.ordered_threads import Progress, ordered_map, thread_count
 from training.regressors.rbf_expansion import rbf
 
-#: Rows of a tile: large enough for matrix products at full speed.
-TILE = 512
+TILE = 512  # Rows of a tile: large enough for matrix products at full speed
 
 
 def factor_bytes(rows: int) -> int:

@@ -14,8 +14,7 @@ from training.set_posterior.families.wheel_family import SMALLEST, ContextValues
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.response_surface import Response
 
-#: The unknown that is a strength, beside the bearing modulus.
-COHESION = "cohesion"
+COHESION = "cohesion"  # The unknown that is a strength, beside the bearing modulus
 #: Place of the first error that one channel has alone, and how those that grow with slip are named.
 OF_CHANNELS, GROWS = MODEL_ERROR_COLUMNS.index("sinkage"), "_by_slip"
 

@@ -12,8 +12,7 @@ from soilml.arrays import Floats
 #: 1.
 Terms = tuple[tuple[int, ...], ...]
 
-#: The factor 1 of a monomial.
-ONE = 0
+ONE = 0  # The factor 1 of a monomial
 
 
 def monomial_terms(

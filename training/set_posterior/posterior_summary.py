@@ -13,16 +13,14 @@ from training.set_posterior.families.wheel_family import ContextValues, WheelFam
 from training.set_posterior.importance_sampler import WeightedSample
 from training.set_posterior.misfit_test import Consistency
 
-#: Probabilities of the ends of the interval.
-INTERVAL = (0.05, 0.95)
+INTERVAL = (0.05, 0.95)  # Probabilities of the ends of the interval
 #: Distances from the mean, in standard deviations, at which the distribution function is evaluated.
 #: The 5 % quantile of a normal distribution lies 1.64 below the mean, that of a uniform one 1.56,
 #: and those of an exponential one 0.95 below and 2.0 above; the grid leaves room on both sides of
 #: them. All are multiples of their spacing.
 SPACING = 0.25
 DISTANCES = np.arange(0.5, 3.3, SPACING)
-#: Least share of the sample between two grid points that is divided by.
-LEAST_SHARE = 1e-6
+LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is divided by
 
 
 def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> Value:
@@ -74,8 +72,7 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
     return gemm(passed.clip(0.0, 1.0), of_end, first_points) * spacing
 
 
-#: Stands for a factor of zero, of which the logarithm is taken.
-ZERO_FACTOR = 1e-30
+ZERO_FACTOR = 1e-30  # Stands for a factor of zero, of which the logarithm is taken
 #: Quantiles of the prior, in equal steps of probability, over which its moments are computed.
 PRIOR_POINTS = 4096
 

@@ -89,8 +89,7 @@ def _by_channel(layer: Floats, terms: int) -> Floats:
 
 #: Points of the unknowns at which each design is simulated, for each term of the polynomial.
 POINTS_PER_TERM = 2.5
-#: Designs simulated at a time, which bounds the memory needed.
-SIMULATED_AT_A_TIME = 512
+SIMULATED_AT_A_TIME = 512  # Designs simulated at a time, which bounds the memory needed
 #: Designs of a step of the training, and the share held out to measure the error.
 BATCH, HELD_OUT = 256, 0.08
 #: Learning rates of the one-cycle schedule: the first, the largest, which is reached after a tenth

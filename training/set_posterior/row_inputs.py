@@ -46,12 +46,10 @@ FileNoise = Mapping[str, Sequence[float]]
 LARGEST_SUM, LARGEST_CONTEXT, LARGEST_MEMORY = 3e38, 1e9, 1e30
 #: Readings of channels are limited to this: they are as impossible, and their squares are finite.
 LARGEST_READING = 1e12
-#: Slip of a row that is not finite: out of every range.
-IMPOSSIBLE_SLIP = -1.0
+IMPOSSIBLE_SLIP = -1.0  # Slip of a row that is not finite: out of every range
 #: Values of a row that is not finite.
 HARMLESS = np.asarray([[IMPOSSIBLE_SLIP if name == "slip" else 1.0] for name in ROWS])
-#: Readings below this share of the marker were not measured.
-MARKER_SHARE = 0.5
+MARKER_SHARE = 0.5  # Readings below this share of the marker were not measured
 #: Standard deviation of a reading that was not measured: on the scale of every response, also of
 #: drawbar pull over any load, it is far beyond what is used, and its square is finite.
 NO_WEIGHT_STD = 1e15

@@ -40,8 +40,7 @@ USES = {
     "dask": "generate --engine dask",
     "distributed": "generate --engine dask",
 }
-#: The libraries without which nothing works.
-NEEDED = ("numpy", "onnxruntime")
+NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -41,8 +41,7 @@ of a model file. A map that cannot be right is refused with the likely cause;
 _SHOWN = ("run", "slip", "slip_std", "load_N", "torque_Nm", "torque_Nm_std", "drawbar_pull_N",
           "sinkage_m")  # fmt: skip
 _MOST_SHOWN = 40
-#: Most logs that the next command names.
-_MOST_NAMED = 4
+_MOST_NAMED = 4  # Most logs that the next command names
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -64,8 +64,7 @@ measurement. A value with a warning that it is not known is no more accurate
 than the prior. The CSV file has a row for each load and slip, in SI units.
 --report writes a page to read and print.
 """
-#: Largest number of loads.
-MAX_LOADS = 8
+MAX_LOADS = 8  # Largest number of loads
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -34,8 +34,7 @@ MAX_DISCRIMINATION = 10.0
 MIN_DISCRIMINATION = 0.5
 #: Largest difference, in sigma of a reading, of two predictions that count as equal.
 SAME_PREDICTION = 0.1
-#: Explanations that are compared.
-COMPARED = 5
+COMPARED = 5  # Explanations that are compared
 #: Relative singular value below which the rival's parameters cannot be determined by the rows.
 LEAST_SQUARES_TOLERANCE = 1e-10
 

@@ -231,8 +231,7 @@ POWER_QUANTILE = 0.8416
 #: Separation, in sigma, from which an effect can be named, and below which two effects are
 #: indistinguishable.
 NAMEABLE_SIGMA, SAME_CLASS_SIGMA = 3.0, 2.0
-#: Rivals that are listed for each effect.
-LISTED_RIVALS = 3
+LISTED_RIVALS = 3  # Rivals that are listed for each effect
 
 
 class Rival(NamedTuple):

@@ -74,8 +74,7 @@ DRIVEN = (
 )
 #: All kinds of runs and checks that can be proposed.
 KINDS = (*DRIVEN, SMOOTH_GEAR, *SIZES, *SOIL_TESTS, *SENSOR_CHECKS)
-#: Proposals that are listed.
-LISTED = 8
+LISTED = 8  # Proposals that are listed
 
 
 def check_costs(costs: Mapping[str, float]) -> dict[str, float]:

@@ -18,8 +18,7 @@ from soilml.parameters import declared
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 
-#: Rows of a proposed run, and the fewest that make a run.
-ROWS_PER_RUN, FEWEST_ROWS = 8, 3
+ROWS_PER_RUN, FEWEST_ROWS = 8, 3  # Rows of a proposed run, and the fewest that make a run
 #: Highest slip that is proposed: near 1 a wheel digs itself in before its readings are steady.
 HIGHEST_SLIP = 0.8
 #: Highest speed that is proposed, m/s: no rover, and hardly a rig, drives faster.
@@ -180,8 +179,7 @@ def _unvaried(value: object) -> bool:
 
 #: Effects of lugs, which a smooth gear does not have.
 LUG_EFFECTS = frozenset({"grousers", "track-grousers"})
-#: Kind of a run on such a gear.
-SMOOTH_GEAR = "smooth gear"
+SMOOTH_GEAR = "smooth gear"  # Kind of a run on such a gear
 #: Another size of the gear: kind of run -> (parameter, factor, effects that this separates). Half
 #: as wide or half as large again: other wheels of a small rig, whose effect exceeds the noise.
 SIZES = {

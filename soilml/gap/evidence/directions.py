@@ -24,8 +24,7 @@ from soilml.remarks import Remark
 #: Step of the secant that gives a signature, in reference sizes. A secant is used because some
 #: effects start with a square root, whose derivative at zero is infinite.
 SECANT_STEP = 0.5
-#: A signature below this fraction of every reading's noise counts as zero.
-MIN_CHANGE = 1e-6
+MIN_CHANGE = 1e-6  # A signature below this fraction of every reading's noise counts as zero
 
 
 @dataclass(frozen=True)
@@ -35,8 +34,7 @@ class Signature:
     name: str
     kind: str
     column: Floats
-    #: 1 or -1 where the size can only change in that direction, 0 where it can in both
-    sign: int
+    sign: int  # 1 or -1 where the size can only change in that direction, 0 where it can in both
 
 
 def current_size(case: Case, path: str, unit: float) -> float:

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 
-#: Divisions that are kept: fits share them, because amplitudes are those of a grid.
-KEPT = 64
+KEPT = 64  # Divisions that are kept: fits share them, because amplitudes are those of a grid
 
 
 @dataclass(frozen=True)
@@ -136,8 +135,7 @@ class LinearisedFit:
 #: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
 #: about 1.6, which change the evidence by less than 1 near its maximum.
 AMPLITUDES = np.asarray([0.0, 0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
-#: Prior probability that a channel has no discrepancy at all.
-NO_DISCREPANCY = 0.5
+NO_DISCREPANCY = 0.5  # Prior probability that a channel has no discrepancy at all
 #: Prior probability that the discrepancy of a channel has a cause which the catalogue lacks, and
 #: the scale of its amplitude, in usual ones: 20 % of a range.
 UNKNOWN_CAUSE, UNKNOWN_SCALE = 0.02, 10.0

@@ -29,8 +29,7 @@ TAIL_POWER = 2.0
 #: at their maximum and estimated covariances overstate it. With it, the stated probabilities of
 #: 300 sets of `datagen.blind_sets` (seed 7, not the published benchmark's) met the frequencies.
 TEMPERING = 0.5
-#: Decrease of -2 ln p by a sweep below which the search for amplitudes ends.
-ENOUGH = 0.1
+ENOUGH = 0.1  # Decrease of -2 ln p by a sweep below which the search for amplitudes ends
 #: Sweeps over the channels; the amplitudes of different channels depend little on each other.
 SWEEPS = 2
 
@@ -208,8 +207,7 @@ def _size_prior(x: float, *, two_sided: bool) -> tuple[float, float, float]:
 
 #: Distance from a bound, as a fraction of the prior, at which a coordinate counts as fixed by it.
 AT_BOUND = 1e-6
-#: Smallest precision by the likelihood alone: the likelihood is flat over the prior.
-FLAT = 1e-3
+FLAT = 1e-3  # Smallest precision by the likelihood alone: the likelihood is flat over the prior
 #: Distance beyond a bound, in standard deviations, from which an asymptotic series is used.
 FAR = 6.0
 

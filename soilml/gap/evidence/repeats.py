@@ -12,8 +12,7 @@ from soilml.fitting.readings import Readings
 from soilml.quantities import QUANTITIES, column
 from soilml.remarks import Remark
 
-#: Probability by chance below which repeats scatter less than declared.
-SIGNIFICANCE = 0.01
+SIGNIFICANCE = 0.01  # Probability by chance below which repeats scatter less than declared
 #: Ratio of the scatter of repeats to the declared noise below which the noise is overstated: the
 #: declared variance is then more than four times as large as the measured one.
 OVERSTATED_BELOW = 0.5

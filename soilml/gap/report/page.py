@@ -268,8 +268,7 @@ def _strip(old: EstimatedValue, new: EstimatedValue) -> list[dict[str, str]]:
 #: Scores of the lightest and of the darkest shade, and those shades (red, green, blue).
 _LOWEST, _HIGHEST = 1.0, 100.0
 _LIGHT, _DARK = (255, 250, 240), (122, 28, 16)
-#: Family-wise p value below which a region is marked.
-_SIGNIFICANT = 0.05
+_SIGNIFICANT = 0.05  # Family-wise p value below which a region is marked
 
 
 def discrepancy_maps(report: GapReport) -> list[dict[str, Any]]:

@@ -33,8 +33,7 @@ _MARKER_PATHS = {
     "v": "M8 14l6 -11h-12z",
     "P": "M6 2h4v4h4v4h-4v4h-4v-4h-4v-4h4z",
 }
-#: Most runs in a figure.
-MOST_RUNS = 6
+MOST_RUNS = 6  # Most runs in a figure
 
 
 def prediction_curves(curves: ReadingsAndPredictions, changed: bool) -> dict[str, Any]:

@@ -40,8 +40,7 @@ class NamedEffect:
 
     name: str
     parameters: dict[str, EstimatedValue]
-    #: effects of the other explanations that the data do not reject
-    alternatives: tuple[str, ...]
+    alternatives: tuple[str, ...]  # effects of the other explanations that the data do not reject
     #: sigma that distinguish the effect, at its size, from the soil and its nearest rival
     separating_snr: float
     nearest_rival: str
@@ -67,8 +66,7 @@ class RemainingDiscrepancy:
     after_value: float
     before_sigma: float
     after_sigma: float
-    #: where the discrepancy after is largest, in words
-    description: str
+    description: str  # where the discrepancy after is largest, in words
 
 
 @dataclass(frozen=True)

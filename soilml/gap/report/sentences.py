@@ -12,12 +12,10 @@ from soilml.report.numbers import decimal, format_residual
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
-#: Suspects that the sentence lists.
-LISTED_SUSPECTS = 3
+LISTED_SUSPECTS = 3  # Suspects that the sentence lists
 #: Logarithm of odds below which they are called even, and the largest odds that are stated.
 EVEN_ODDS, MOST_ODDS = 0.1, 10_000
-#: Discrepancy in sigma from which the sentence states it.
-NOTABLE_DISCREPANCY = 0.3
+NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which the sentence states it
 
 
 def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:

@@ -87,8 +87,7 @@ def noise_only_gains(
 #: Effects are selected if their predicted gain is within this margin of the largest, and so many of
 #: the largest in any case; the prediction is linear and can be wrong by that much.
 GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
-#: So many effects more: those that would explain most by a law of their own.
-FITTED_BY_OWN_LAW = 6
+FITTED_BY_OWN_LAW = 6  # So many effects more: those that would explain most by a law of their own
 #: Beside a large discrepancy, so many effects more: those that explain most under noise alone.
 FITTED_HIDDEN = 6
 #: Amplitude, in usual ones, from which a discrepancy can hide an effect that explains it.

@@ -30,8 +30,7 @@ from soilml.gap.search.screening import (
 )
 from soilml.remarks import Remark
 
-#: Family-wise significance level of the test for a gap.
-GAP_LEVEL = 0.03
+GAP_LEVEL = 0.03  # Family-wise significance level of the test for a gap
 #: Significance level of the test for a remainder that the best explanation does not account for.
 LACK_OF_FIT_LEVEL = 0.001
 #: Predicted gain, net of the penalty for one more effect, from which an extension is fitted.
@@ -39,8 +38,7 @@ MIN_NET_GAIN = -2.0
 #: Largest number of effects in a candidate; sets that are extended by one effect in each step, and
 #: effects that each of them is extended by.
 MAX_EFFECTS, EXTENDED_SETS, EXTENSIONS = 3, 3, 3
-#: Steps of a search: the test for a gap, and the sets of each size.
-STEPS = 1 + MAX_EFFECTS
+STEPS = 1 + MAX_EFFECTS  # Steps of a search: the test for a gap, and the sets of each size
 #: Upper bound of the improvement by free shapes, in linearised gains; the full fit can exceed the
 #: linearised gain because the size changes with the shape.
 SHAPE_GAIN_FACTOR = 3.0

@@ -27,10 +27,8 @@ from soilml.report.numbers import decimal
 NOISE_SCALED_UP = 1.3
 #: Run-to-run standard deviation, in usual ones, above which runs disagree with each other.
 UNUSUAL_RUN_EFFECT = 3.0
-#: Significance level of the test of the region that a fit to the rest predicts.
-REGION_LEVEL = 0.001
-#: Significance level of the test of replicate rows.
-REPEAT_LEVEL = 0.001
+REGION_LEVEL = 0.001  # Significance level of the test of the region that a fit to the rest predicts
+REPEAT_LEVEL = 0.001  # Significance level of the test of replicate rows
 
 
 def disagreements(problem: FitProblem, soil: Solution) -> list[Remark]:

@@ -36,14 +36,11 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity
 
-#: Outliers that a note lists by name.
-LISTED_OUTLIERS = 6
-#: Suspects that are listed.
-LISTED_SUSPECTS = 8
+LISTED_OUTLIERS = 6  # Outliers that a note lists by name
+LISTED_SUSPECTS = 8  # Suspects that are listed
 #: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
 AT_BOUND = 1e-3
-#: Factor on the declared noise above which a note is made.
-NOTABLE_NOISE_SCALE = 1.25
+NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
 
 
 def gap_reductions(

@@ -111,8 +111,7 @@ def _size_posterior(
     return size, log + (TEMPERING - 1.0) * total - 0.5 * EFFECT_PENALTY
 
 
-#: Probability of the interval by which a mixture is summarised.
-COVERAGE = 0.90
+COVERAGE = 0.90  # Probability of the interval by which a mixture is summarised
 #: Halvings of the interval in which the half width is sought: a relative error of 1e-9.
 HALVINGS = 30
 
@@ -142,8 +141,7 @@ def equivalent_std(offset: Floats, std: Floats, weight: Floats) -> float:
     return 0.5 * (low + high) / Z_90
 
 
-#: Half width of the prior of an effect's size, in standard deviations.
-PRIOR_HALF_WIDTH = 3.0
+PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
 
 
 def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> Case:

@@ -27,8 +27,7 @@ from soilml.physics.soils import Soil
 MOST_POINTS = 25
 #: Points of the loading curve that an exponent needs: two for the line, one to see a misfit.
 LEAST_POINTS = 3
-#: Variation of a plate's size within a test above which the rows are not one test.
-SAME_SIZE = 0.01
+SAME_SIZE = 0.01  # Variation of a plate's size within a test above which the rows are not one test
 #: Usual standard deviations of repeated plate tests in a carefully prepared bed: of the logarithm
 #: of the pressure at one depth, and of the exponent. Loose beds scatter more, and their repeats
 #: show it.

@@ -15,19 +15,16 @@ from soilml.remarks import Remark
 #: Change of the exponent between the shallower and the deeper half of a curve from which the law is
 #: said not to fit: the law's pressure is then wrong by 10 % within a factor of three in depth.
 NOTABLE_BEND = 0.2
-#: Relative residual of a law from which it is said not to fit.
-NOTABLE_MISFIT = 0.1
+NOTABLE_MISFIT = 0.1  # Relative residual of a law from which it is said not to fit
 #: Ratio of peak to end from which a shear curve is said to have a peak; and mobilised fraction of
 #: the strength at the end below which a curve is said to rise still.
 NOTABLE_PEAK, NOTABLE_RISE = 1.1, 0.9
 #: Ratio of the end of a shear curve to the fitted one from which it is said to rise still.
 NOTABLE_END = 1.05
-#: Variation of the normal stress within a test that is remarked on.
-NOTABLE_VARIATION = 0.05
+NOTABLE_VARIATION = 0.05  # Variation of the normal stress within a test that is remarked on
 #: Ratio of shear strength to normal stress, and pressure (Pa), that suggest a wrong unit.
 ODD_RATIO, ODD_PRESSURE = 6.0, 500.0
-#: Names that a remark lists.
-LISTED = 4
+LISTED = 4  # Names that a remark lists
 
 
 def _kpa(stress: float) -> str:

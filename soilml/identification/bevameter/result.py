@@ -19,8 +19,7 @@ from soilml.physics.soils.soil_tests import SoilTest
 from soilml.remarks import Remark
 from soilml.report.figure_style import save_png, short_label, take_axes
 
-#: Tests that a legend lists.
-LISTED = 6
+LISTED = 6  # Tests that a legend lists
 
 
 @dataclass(frozen=True)

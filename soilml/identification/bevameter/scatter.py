@@ -16,12 +16,9 @@ DRAWS = 20000
 #: Degrees of freedom of the scatter that is usual: it counts as two repeats would, so that
 #: one test alone is no certainty and six repeats decide for themselves.
 USUAL_FREEDOM = 2.0
-#: Seed of the draws: the same tables give the same file.
-SEED = 0
-#: Sizes or loads that differ by less than this factor are meant to be the same.
-SAME_LEVEL = 1.03
-#: Rounds in which the weights follow the fit; they settle in two or three.
-ROUNDS = 4
+SEED = 0  # Seed of the draws: the same tables give the same file
+SAME_LEVEL = 1.03  # Sizes or loads that differ by less than this factor are meant to be the same
+ROUNDS = 4  # Rounds in which the weights follow the fit; they settle in two or three
 #: Least fitted value, as a fraction of the measured one, that is used for a weight.
 LEAST_FITTED = 1e-3
 

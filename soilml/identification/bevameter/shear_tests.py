@@ -19,8 +19,7 @@ from soilml.identification.bevameter.scatter import (
 )
 from soilml.io.table import Table
 
-#: Points of a shear curve that its two parameters need.
-LEAST_POINTS = 2
+LEAST_POINTS = 2  # Points of a shear curve that its two parameters need
 #: Usual standard deviations of repeated shear tests: of the logarithms of strength and of K.
 USUAL_SCATTER = np.asarray([0.08, 0.3])
 #: Ratio of the largest to the smallest normal stress below which cohesion and friction are not told
@@ -29,10 +28,8 @@ LEAST_STRESS_RATIO = 1.15
 #: Candidates of K, from a tenth of the smallest displacement to the upper limit; steps of 1 %.
 UPPER_MODULUS = 2.0  # in largest displacements: beyond, a curve is a straight line
 STEP = 0.01
-#: Last part of a curve, as a fraction of its displacement, whose mean is its end.
-END = 0.2
-#: Loads from which on a bend of the failure line, or a trend of K, is looked for.
-LEAST_LOADS = 4
+END = 0.2  # Last part of a curve, as a fraction of its displacement, whose mean is its end
+LEAST_LOADS = 4  # Loads from which on a bend of the failure line, or a trend of K, is looked for
 #: Studentised size of a bend or trend from which it is reported: chance gives it in 1 of 50 tables
 #: of five tests.
 SIGNIFICANT = 3.0
@@ -49,8 +46,7 @@ class ShearTest:
     normal_stress: float
     displacement: Floats
     stress: Floats
-    #: largest relative deviation of the normal stress from its mean
-    normal_variation: float
+    normal_variation: float  # largest relative deviation of the normal stress from its mean
 
 
 def read_shear_tests(table: Table) -> list[ShearTest]:

@@ -26,14 +26,12 @@ BEARING, SHEARING = ("kc", "kphi", "n"), ("cohesion", "friction_angle", "shear_m
 #: Least modulus of a width, as a fraction of the estimate, where tests at other widths leave it
 #: open down to zero.
 LEAST_MODULUS = 0.01
-#: A prior above zero is logarithmic where its ends differ by this factor or more.
-LOG_FACTOR = 3.0
+LOG_FACTOR = 3.0  # A prior above zero is logarithmic where its ends differ by this factor or more
 #: Least width of a prior, as a fraction of its value: a test is not read better than this.
 LEAST_WIDTH = 1e-3
 #: Standard deviations that the range of 95 % of a normal distribution reaches from its middle.
 Z_95 = 1.96
-#: Least scatter that is stated: no two places are more alike.
-LEAST_SCATTER = 0.02
+LEAST_SCATTER = 0.02  # Least scatter that is stated: no two places are more alike
 
 Section = tuple[dict[str, float], dict[str, Prior], list[Remark]]
 

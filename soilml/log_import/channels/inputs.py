@@ -25,14 +25,12 @@ from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error
 from soilml.remarks import Remark
 
-#: Span of the derivative of places and angles, s.
-SMOOTH = 0.5
+SMOOTH = 0.5  # Span of the derivative of places and angles, s
 #: Share of the usual rotation speed below which a wheel stands still; shortest rest, and what is
 #: left out before the start, s.
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
 _PLACES = ("wheel_angle", "position")
-#: Share of the usual torque or current that is more than noise and offset.
-_EFFORT = 0.1
+_EFFORT = 0.1  # Share of the usual torque or current that is more than noise and offset
 
 
 @dataclass

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 
-#: Most points of a grid, and its shortest step in s.
-MOST_POINTS, SHORTEST_STEP = 20_000, 0.002
+MOST_POINTS, SHORTEST_STEP = 20_000, 0.002  # Most points of a grid, and its shortest step in s
 #: A gap is bridged up to this many sampling intervals, long intervals (the 90th percentile), or
 #: seconds.
 _BRIDGED_SAMPLES, _BRIDGED_LONG, _BRIDGED_SECONDS = 3.5, 2.0, 0.05

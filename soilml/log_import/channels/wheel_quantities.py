@@ -12,8 +12,7 @@ from soilml.log_import.mapping.channel_map import GEARED
 from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.log_import.mapping.uncertain_value import Uncertain
 
-#: Value of a constant of the map by name, such as "vehicle.mass".
-Constants = Callable[[str], float]
+Constants = Callable[[str], float]  # Value of a constant of the map by name, such as "vehicle.mass"
 
 
 def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertain]:

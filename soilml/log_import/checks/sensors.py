@@ -12,10 +12,8 @@ from soilml.remarks import Remark
 
 #: Sensors that respond when a wheel drives.
 _RESPONDING = ("torque", "motor_current", "load", "drawbar_pull", "sinkage")
-#: A sensor is dead below this share of its usual level in the other runs.
-_DEAD_LEVEL = 0.05
-#: Share of the radius to which a wheel sinks in at rest.
-_SUNK = 0.5
+_DEAD_LEVEL = 0.05  # A sensor is dead below this share of its usual level in the other runs
+_SUNK = 0.5  # Share of the radius to which a wheel sinks in at rest
 #: A reading at rest counts as an offset above this share of the reading while driving.
 _OFFSET = 0.05
 #: Longest share of the load that a lifted wheel shows, least share that is an offset, shortest

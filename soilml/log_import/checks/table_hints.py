@@ -20,10 +20,8 @@ from soilml.remarks import Remark
 
 #: Range of T / (W r) of driving wheels on soil, and its usual value.
 LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
-#: Slip from which a driving wheel has a torque worth judging.
-_SLIPS = 0.05
-#: Range of the usual sinkage over the radius.
-_USUAL_SINKAGE = (0.02, 0.7)
+_SLIPS = 0.05  # Slip from which a driving wheel has a torque worth judging
+_USUAL_SINKAGE = (0.02, 0.7)  # Range of the usual sinkage over the radius
 #: Mistakes that make T / (W r) too large, by factor.
 _TOO_LARGE = (
     (9.80665, "the load is in kg and was taken as N"),

@@ -16,17 +16,14 @@ from soilml.log_import.mapping.log_map import FileKind
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
-#: Lowest score of a clock, and most runs of one file.
-_LEAST, _MOST_RUNS = 0.5, 1000
-#: Shortest pause between two runs, s.
-_PAUSE = 5.0
+_LEAST, _MOST_RUNS = 0.5, 1000  # Lowest score of a clock, and most runs of one file
+_PAUSE = 5.0  # Shortest pause between two runs, s
 #: Words of a column of wheels, those of its number; most wheels, and share of lines that change it.
 _OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "rad", "actuator"}
 _NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
 _MOST_WHEELS, _TURNS = 12, 0.2
 Log = Sequence[Recording]
-#: Most rows of a table that somebody has made of runs.
-_MOST = 400
+_MOST = 400  # Most rows of a table that somebody has made of runs
 
 
 def guess_clock(recordings: Sequence[Recording]) -> tuple[str, str]:

@@ -45,10 +45,8 @@ _UNIT_SUFFICES = {
     ("torque", "N m"), ("motor_current", "A"), ("wheel_speed", "rad/s"), ("ground_speed", "m/s"),
     ("position", "m"), ("load", "N"), ("wheel_angle", "count"),
 }  # fmt: skip
-#: Score from which a name says the role whatever the topic is called.
-_CLEAR = 4.0
-#: Most columns of text that are listed.
-_MOST_TEXTS = 12
+_CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
+_MOST_TEXTS = 12  # Most columns of text that are listed
 
 
 def words_of(name: str) -> list[str]:

@@ -49,10 +49,8 @@ from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 
-#: Shortest window for long runs, s, and its share of short ones.
-_USUAL, _SHARE = 2.0, 0.15
-#: Most columns that are listed, and runs that are looked at.
-_MOST_LISTED, _LOOKED = 40, 8
+_USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
+_MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
 

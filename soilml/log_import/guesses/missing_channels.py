@@ -10,8 +10,7 @@ from soilml.log_import.guesses.draft import Marked, key_line, toml_value
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.mapping.channel_map import ROLES
 
-#: Words of a place in degrees.
-_GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}
+_GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}  # Words of a place in degrees
 #: Words of a torque, also in the name of the force that measures it on a lever.
 _OF_TORQUE = {"torque", "moment", "drehmoment", "couple", "par", "coppia"}
 

@@ -23,8 +23,7 @@ _RIVALS = (
     ("ground_speed", "position"),
     ("torque", "motor_current"),
 )
-#: What a measured torque is worth over a current, whose constants no log shows.
-_MEASURED = 3.0
+_MEASURED = 3.0  # What a measured torque is worth over a current, whose constants no log shows
 #: Roles that each wheel has of its own.
 _PER_WHEEL = ("wheel_speed", "wheel_angle", "rim_speed", "torque", "motor_current", "load",
               "drawbar_pull", "sinkage", "slip")  # fmt: skip

@@ -10,8 +10,7 @@ from soilml.log_import.channels.inputs import Inputs, moving, resting
 from soilml.log_import.guesses.columns import words_of
 from soilml.log_import.guesses.draft import Draft, Marked
 
-#: Share of the reading while driving from which a reading at rest is an offset.
-_OFFSET = 0.01
+_OFFSET = 0.01  # Share of the reading while driving from which a reading at rest is an offset
 #: A sensor that reads more than this, m, has its zero elsewhere; how far a wheel sinks at rest, m.
 _FAR, _SUNK = 0.08, 0.01
 #: Share of the radius that no wheel sinks in at rest; fall of a reading, and reading at rest, m,

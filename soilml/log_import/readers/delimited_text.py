@@ -34,10 +34,8 @@ _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?", re.ASCII)
 _GROUPED = re.compile(r"(?<=\d)[\u00a0\u202f\u2009'\u2019](?=\d{3}(?!\d))", re.ASCII)
 _SPACED = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?", re.ASCII)
-#: Most signals, and fewest readings of each.
-_MOST, _FEWEST = 200, 8
-#: Share of the lines at which the name changes; runs and states change seldom.
-_CHANGES = 0.2
+_MOST, _FEWEST = 200, 8  # Most signals, and fewest readings of each
+_CHANGES = 0.2  # Share of the lines at which the name changes; runs and states change seldom
 
 
 def read_delimited_text(path: Path) -> list[Recording]:

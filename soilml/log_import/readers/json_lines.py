@@ -14,8 +14,7 @@ from soilml.log_import.readers.text_layout import decode_text
 from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
 
-#: Fewer samples are none, as in text logs.
-_FEWEST = 3
+_FEWEST = 3  # Fewer samples are none, as in text logs
 
 
 def read_json_log(path: Path) -> list[Recording]:

@@ -15,8 +15,7 @@ from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 
 _DEEPEST = 6
-#: Shorter arrays are constants, not samples.
-_SHORTEST = 8
+_SHORTEST = 8  # Shorter arrays are constants, not samples
 
 
 def read_matlab(path: Path) -> list[Recording]:

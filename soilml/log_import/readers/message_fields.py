@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 
 _DEEPEST = 6
-#: Longer arrays (images, point clouds, laser scans) are no channels.
-_LONGEST = 24
+_LONGEST = 24  # Longer arrays (images, point clouds, laser scans) are no channels
 
 
 class TopicColumns:

@@ -13,8 +13,7 @@ from soilml.remarks import Remark
 
 #: Ends of the ranges of integers, which converters without a signal show.
 _ENDS = (32767.0, -32768.0, 65535.0, 2147483647.0, -2147483648.0, 4294967295.0)
-#: From this size on no reading of a rig is meant; squares of smaller ones are finite.
-_HUGE = 1e30
+_HUGE = 1e30  # From this size on no reading of a rig is meant; squares of smaller ones are finite
 #: How often a code must stand in a column, and how many ranges of all other readings away.
 _LEAST, _RANGES = 2, 3.0
 

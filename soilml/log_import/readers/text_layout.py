@@ -44,10 +44,8 @@ _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*"
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
-#: Name of the column that distinguishes the blocks.
-BLOCK = "block"
-#: Fewest samples of a block, and most blocks.
-_SHORTEST, _MOST = 20, 1000
+BLOCK = "block"  # Name of the column that distinguishes the blocks
+_SHORTEST, _MOST = 20, 1000  # Fewest samples of a block, and most blocks
 
 
 def decode_text(data: bytes, file: Path) -> tuple[str, str]:

@@ -11,8 +11,7 @@ from soilml.arrays import Floats
 
 #: Numbers of values whose means show the long-run noise, and fewest such means.
 _WIDTHS, _FEWEST_MEANS = (2, 4, 8, 12), 16
-#: Factor of the penalty, for long-run noise that is not fully seen.
-_PENALTY = 2.0
+_PENALTY = 2.0  # Factor of the penalty, for long-run noise that is not fully seen
 #: Quantities whose transients count, number of means that a window is divided into, and the
 #: largest share of it that is cut off at the beginning and at the end.
 _WATCHED, _MEANS = ("slip", "torque"), 50

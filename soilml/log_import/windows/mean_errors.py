@@ -8,16 +8,13 @@ from soilml.arrays import Floats
 
 #: Samples are first averaged to at most this many, which lowers the noise in their correlations.
 _MOST_VALUES = 256
-#: Correlation below which samples count as having a ripple.
-_RIPPLE = -0.3
-#: Cosines that measure slow noise: few enough to lie below the frequency of grousers.
-_COSINES = 6
+_RIPPLE = -0.3  # Correlation below which samples count as having a ripple
+_COSINES = 6  # Cosines that measure slow noise: few enough to lie below the frequency of grousers
 #: Fewest independent samples, and degrees of freedom, that an error counts with.
 _FEWEST, _LEAST_FREEDOM = 4.0, 4.0
 #: Degrees of freedom of a window's own error, and those that the usual error counts with.
 _OWN, _USUAL = 8.0, 4.0
-#: Fewest windows that tell what is usual.
-_FEWEST_WINDOWS = 4
+_FEWEST_WINDOWS = 4  # Fewest windows that tell what is usual
 
 
 def time_and_window(values: Floats) -> tuple[float, int, float]:

@@ -21,12 +21,9 @@ _WATCHED = {"rim_speed": 0.01, "speed": 0.015, "slip": 0.01, "torque": 0.03, "lo
             "drawbar_pull": 0.04}  # fmt: skip
 #: Most values in the search, and shortest stretch over which samples are averaged for it, s.
 _MOST_VALUES, _SHORTEST_MEAN = 500, 0.1
-#: Largest share of missing samples in a window.
-_MISSING = 0.2
-#: A change within a window counts where it is this many standard errors.
-_SIGNIFICANT = 4.0
-#: How much more sensitive the second search is, in a piece that drifts.
-_FINER = 3.0
+_MISSING = 0.2  # Largest share of missing samples in a window
+_SIGNIFICANT = 4.0  # A change within a window counts where it is this many standard errors
+_FINER = 3.0  # How much more sensitive the second search is, in a piece that drifts
 #: Share of the usual speed of the rim, or of the usual torque, below which a wheel is at rest.
 _AT_REST = 0.1
 #: Beginning of a log in which the wheel may rest, s, and a slip that is another than there.

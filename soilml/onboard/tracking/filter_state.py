@@ -14,10 +14,8 @@ from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import ABSENT_STD, OPTIONAL_READINGS
 from soilml.onboard.tracking.misfit import ROWS_JUDGED, Rows
 
-#: Blocks of a window that is full; one more grows until the oldest is forgotten.
-BLOCKS = 16
-#: Rows after which one that disagreed is a glitch.
-MOST_ROWS = 8
+BLOCKS = 16  # Blocks of a window that is full; one more grows until the oldest is forgotten
+MOST_ROWS = 8  # Rows after which one that disagreed is a glitch
 #: Rows that must disagree with those before, and agree with each other, for another soil.
 LEAST_ROWS = 3
 #: Rows in succession that disagree with those before, after which these are given up even if the
@@ -29,8 +27,7 @@ WATCHED = ("torque", *OPTIONAL_READINGS)
 REPETITIONS = 2
 Arrays = dict[str, NDArray[Any]]
 
-#: Version of the arrays.
-FORMAT = 1
+FORMAT = 1  # Version of the arrays
 
 
 @dataclass(frozen=True)

@@ -15,19 +15,16 @@ from soilml.onboard.estimator import Estimator
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_posterior import estimate_of_set
 
-#: Standard normal quantile beyond which a misfit is not chance: 1 in 10 000.
-QUANTILE = 3.72
+QUANTILE = 3.72  # Standard normal quantile beyond which a misfit is not chance: 1 in 10 000
 #: Degrees of freedom by which two spans of a drive differ: those of the unknowns, and so many of
 #: the errors of sensors, which each span may explain in its own way.
 ERROR_DEGREES = 1.0
 #: Readings, and rows, with the stated noise that are assumed before the first one.
 ASSUMED_READINGS, ASSUMED_ROWS = 8.0, 3
-#: Rows from whose misfit the size of the model error is estimated.
-ROWS_JUDGED = 16
+ROWS_JUDGED = 16  # Rows from whose misfit the size of the model error is estimated
 #: Most variance of the residuals over that of the stated noise for which a model is still used.
 MOST_EXCESS = 10.0
-#: Row inputs of the graph (m,) by name.
-Rows = dict[str, NDArray[np.float64]]
+Rows = dict[str, NDArray[np.float64]]  # Row inputs of the graph (m,) by name
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,7 @@ from soilml.onboard.tracking.misfit import (
 
 #: Blocks of recent rows that are compared with all earlier ones, one number after another.
 RECENT_BLOCKS = (2, 4, 8)
-#: Rows that a tracker remembers by default.
-DEFAULT_LENGTH = 100
+DEFAULT_LENGTH = 100  # Rows that a tracker remembers by default
 
 
 class Event(IntEnum):

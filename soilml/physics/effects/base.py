@@ -34,8 +34,7 @@ REFERENCE_SLIP, REFERENCE_LOAD = 0.3, 100.0
 #: Slip ratio added where a size is a power of slip, so that it stays finite at zero slip.
 SLIP_OFFSET = 0.03
 
-#: Where the cause of an effect may lie.
-KINDS = ("soil", "wheel", "rig", "sensor")
+KINDS = ("soil", "wheel", "rig", "sensor")  # Where the cause of an effect may lie
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.soils import Soil
 
-#: Diameter (m) from which the curve of a plate holds for wheels.
-LARGE = 0.5
+LARGE = 0.5  # Diameter (m) from which the curve of a plate holds for wheels
 
 
 @final

@@ -145,8 +145,7 @@ class WheelArc:
     shear_radius: Real  # m, radius at which soil is sheared; larger than the rim's with lugs
     lever: Real  # m, lever arm of the shear stress about the axle
     width: Real  # m
-    #: radius by which the slip is reckoned, over the shear radius
-    travel: Real = 1.0
+    travel: Real = 1.0  # radius by which the slip is reckoned, over the shear radius
 
     def travelled(self, slip: Array, law: BrakingLaw) -> Array:
         """Travel of the axle over that of the shearing surface, of slip ratios (batch,)."""

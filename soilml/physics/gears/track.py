@@ -19,8 +19,7 @@ from soilml.physics.soils import Soil
 #: Nodes of the arc that enters the soil, of each part of the middle arc, and of each short
 #: segment; their accuracy is tested against dense quadrature.
 ENTRY_NODES, MIDDLE_NODES, SHORT_NODES = 16, 16, 8
-#: Enough for the load to a few per cent.
-COARSE_NODES = 4
+COARSE_NODES = 4  # Enough for the load to a few per cent
 
 
 @final

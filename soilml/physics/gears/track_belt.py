@@ -9,8 +9,7 @@ from soilml.numerics.quadrature import Nodes, columns, crowded_ends, crowded_sta
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
 from soilml.physics.operating_point import Operating
 
-#: The three arcs of the belt.
-FRONT, MIDDLE, REAR = range(3)
+FRONT, MIDDLE, REAR = range(3)  # The three arcs of the belt
 #: Fraction of the peak pressure over which the shear of unloading soil fades out.
 FADING_PRESSURE = 0.05
 

@@ -26,8 +26,7 @@ BRAKING_NODES = 24
 #: more than twice this number, a part of the contact ends at this number over the ratio, as a
 #: fraction of the way to the maximum stress: errors at slips below -0.9 fall from 3e-5 to 4e-6.
 MOBILISED_WITHIN = 5.0
-#: Enough for the load to a few per cent.
-COARSE_NODES = 5
+COARSE_NODES = 5  # Enough for the load to a few per cent
 
 
 @final

@@ -18,8 +18,7 @@ from soilml.row_status import Status
 
 #: Nodes in each part of the contact, two parts when driving and three when braking.
 NODES, COARSE_NODES = 16, 5
-#: Largest initial sinkage, as a fraction of the radius.
-LARGEST_INITIAL = 0.5
+LARGEST_INITIAL = 0.5  # Largest initial sinkage, as a fraction of the radius
 
 
 @dataclass(frozen=True)

@@ -22,8 +22,7 @@ from soilml.physics.gears.base import Gear
 from soilml.physics.model import Model
 from soilml.physics.soils import soil, soil_catalogue
 
-#: Name of a model file in messages.
-MODEL_FILE = "MODEL.toml"
+MODEL_FILE = "MODEL.toml"  # Name of a model file in messages
 #: Kinds of effects that the page offers; those of sensors belong to a log.
 _OPERATING: tuple[str, ...] = ("slip", "load")
 OFFERED_KINDS = ("soil", "wheel", "rig")
@@ -88,8 +87,7 @@ WHEELS: dict[str, WheelChoice] = {
         637.6,
     ),
 }
-#: What the page shows first.
-FIRST_WHEEL, FIRST_SOIL = "example", "wong1989/dry_sand"
+FIRST_WHEEL, FIRST_SOIL = "example", "wong1989/dry_sand"  # What the page shows first
 
 
 def choices() -> dict[str, Any]:

@@ -20,12 +20,9 @@ from soilml.serve.answers.chosen_case import FIRST_WHEEL, WHEELS, forward_case, 
 #: Slips of the curves when driving, and the braking ones, which are added where the wheel brakes.
 DRIVING = np.linspace(0.0, 0.9, 46)
 BRAKING = np.linspace(-0.9, -0.02, 45)
-#: Points along the contact, and fewest of a profile that is drawn.
-POINTS, FEWEST_POINTS = 97, 8
-#: Digits of a value on the page.
-_DIGITS = 4
-#: Reference sizes of an effect up to which its slider reaches.
-_REACH = 2.5
+POINTS, FEWEST_POINTS = 97, 8  # Points along the contact, and fewest of a profile that is drawn
+_DIGITS = 4  # Digits of a value on the page
+_REACH = 2.5  # Reference sizes of an effect up to which its slider reaches
 
 
 @dataclass(frozen=True)

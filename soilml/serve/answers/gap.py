@@ -21,8 +21,7 @@ from soilml.report.numbers import format_estimate, format_p_value
 from soilml.serve.answers.estimate import read_rows
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
-#: Most next runs that the page shows; the report has all.
-_SHOWN_RUNS = 5
+_SHOWN_RUNS = 5  # Most next runs that the page shows; the report has all
 
 
 def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:

@@ -21,8 +21,7 @@ from soilml.remarks import texts
 from soilml.report.page import json_text
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
-#: The table that an import writes.
-RUNS_FILE = "runs.csv"
+RUNS_FILE = "runs.csv"  # The table that an import writes
 #: Columns by two of which a table of runs is known, and rows that are drawn.
 _KNOWN, _DRAWN = {*RUNS, "drawbar_pull_N", "sinkage_m"}, 2000
 

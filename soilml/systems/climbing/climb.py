@@ -15,8 +15,7 @@ from soilml.systems.force_sensor_wheel import StressProfile
 
 #: Cohesion (Pa), friction angle (rad), shear modulus (m).
 ShearParameters = tuple[float, float, float]
-#: The wheels of one side; both sides carry and pull equally.
-WHEELS = ("front", "rear")
+WHEELS = ("front", "rear")  # The wheels of one side; both sides carry and pull equally
 
 
 @final
@@ -142,8 +141,7 @@ class Uncertainty:
 
 #: Slopes that differ by less than this many standard deviations of a difference are one condition.
 SLOPE_SIGMAS = 3.0
-#: Smallest difference of slopes that counts, rad: about half a degree.
-MIN_SLOPE_DIFFERENCE = 0.009
+MIN_SLOPE_DIFFERENCE = 0.009  # Smallest difference of slopes that counts, rad: about half a degree
 
 
 def group_by_slope(climbs: Sequence[Climb], slope_std: float) -> list[list[int]]:

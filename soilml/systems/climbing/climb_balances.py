@@ -21,8 +21,7 @@ from soilml.systems.force_sensor_wheel import StressProfile
 
 #: Values of k_x, evenly spaced in the logarithm, between which forces are interpolated linearly.
 KNOTS = 256
-#: Extension of the table of ln k_x beyond both ends of the prior, against rounding.
-MARGIN = 1e-6
+MARGIN = 1e-6  # Extension of the table of ln k_x beyond both ends of the prior, against rounding
 #: Lower limit of the standard deviation of a balance, as a fraction of the weight.
 MIN_STD_FRACTION = 1e-4
 

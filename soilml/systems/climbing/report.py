@@ -27,14 +27,11 @@ from soilml.systems.climbing.tables import ClimbData
 
 #: Fraction of samples whose slope still rises at the highest slip, above which a warning is given.
 MAX_STILL_RISING = 0.05
-#: Slips within this many standard deviations of zero have no certain sign.
-ZERO_SLIP_SIGMAS = 2.0
-#: Distance from the curve's range at which the slip of a climb counts as outside.
-SLIP_MARGIN = 0.02
+ZERO_SLIP_SIGMAS = 2.0  # Slips within this many standard deviations of zero have no certain sign
+SLIP_MARGIN = 0.02  # Distance from the curve's range at which the slip of a climb counts as outside
 #: Relative error of the speeds assumed for the table of k_x by run, as in Fig. 9.
 SPEED_ERROR = 0.015
-#: Width and height of the figure, inches.
-FIGURE_SIZE = (9.0, 3.8)
+FIGURE_SIZE = (9.0, 3.8)  # Width and height of the figure, inches
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,7 @@ from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared
 from soilml.systems.climbing.climb import Rover, Uncertainty
 
-#: Noise of the stress where [noise] has no normal_Pa.
-DEFAULT_STRESS_NOISE = Noise(share=0.05)
+DEFAULT_STRESS_NOISE = Noise(share=0.05)  # Noise of the stress where [noise] has no normal_Pa
 
 
 @final

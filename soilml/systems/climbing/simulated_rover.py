@@ -25,8 +25,7 @@ from soilml.systems.force_sensor_wheel import StressProfile
 #: Slopes of the test field and artificial slips on the flat, as in Nagatani et al., sections 3, 5.
 SLOPES = tuple(np.deg2rad([0.0, 4.0, 8.0, 10.0, 12.0]).tolist())
 ARTIFICIAL_SLIPS = (0.04, 0.13, 0.36, 0.68)
-#: rad between samples: a rim speed of 9.15 mm/s, r = 0.055 m, sampled every 50 ms.
-SAMPLING = 0.0083
+SAMPLING = 0.0083  # rad between samples: a rim speed of 9.15 mm/s, r = 0.055 m, sampled every 50 ms
 
 
 @dataclass(frozen=True)

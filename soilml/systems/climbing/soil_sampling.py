@@ -27,8 +27,7 @@ MAX_MISS = 6.0
 MAX_NOISE_SCALE = 5.0
 #: Standard deviations of the reduced chi-square above which the noise is scaled up.
 MISFIT_LIMIT = 2.5
-#: Distance of the corner soils from the edges of the unit cube.
-EDGE = 1e-6
+EDGE = 1e-6  # Distance of the corner soils from the edges of the unit cube
 
 
 @dataclass(frozen=True)

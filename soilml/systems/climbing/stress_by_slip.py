@@ -12,8 +12,7 @@ from soilml.errors import FitError
 from soilml.systems.climbing.climb import WheelRun
 from soilml.systems.force_sensor_wheel import StressProfile
 
-#: Points from exit to entry that represent the shape of a profile.
-POINTS = 41
+POINTS = 41  # Points from exit to entry that represent the shape of a profile
 #: Slips closer than this count as one; highest degree of the polynomials in slip.
 MIN_SLIP_DIFFERENCE, MAX_DEGREE = 0.05, 3
 

@@ -19,8 +19,7 @@ from soilml.systems.force_sensor_wheel import StressProfile
 #: Required columns; in addition slip, or speed_m_s and rim_speed_m_s.
 CLIMB_COLUMNS = ("run", "wheel", "slope_rad")
 STRESS_COLUMNS = ("run", "wheel", "angle_rad", "normal_Pa")
-#: Largest difference between the slips of a run in both tables.
-SLIP_TOLERANCE = 1e-3
+SLIP_TOLERANCE = 1e-3  # Largest difference between the slips of a run in both tables
 
 Key = tuple[str, str]
 

@@ -11,8 +11,7 @@ from soilml.errors import FitError
 from soilml.systems.force_sensor_wheel.sensor_readings import BinnedStress, SensingWheel
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
-#: Fewest bins that show a shape of seven numbers.
-LEAST_BINS = 12
+LEAST_BINS = 12  # Fewest bins that show a shape of seven numbers
 #: ln of the two exponents a and of n where the search begins, and the weight with which the fit is
 #: regularised towards them: where a bin's noise is this share of the largest stress, a deviation of
 #: one weighs as much as one bin.
@@ -20,12 +19,10 @@ START_SHAPE, SHAPE_WEIGHT = np.asarray([0.4, 0.4, 0.0]), 1e-3
 #: Points across the diameter of a sensor.
 CHORDS = 24
 STEPS, LONGEST_STEP = 60, 0.2
-#: A step that promises less than this share of the misfit is not worth taking.
-ENOUGH = 1e-4
+ENOUGH = 1e-4  # A step that promises less than this share of the misfit is not worth taking
 #: Root mean square misfit, as a share of the peak, from which on the stress is no single arc.
 ROUGH = 0.1
-#: Points of the answer on each side of its peak.
-POINTS = 41
+POINTS = 41  # Points of the answer on each side of its peak
 
 
 def deconvolve(

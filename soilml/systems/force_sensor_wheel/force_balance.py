@@ -209,8 +209,7 @@ def _no_solution(excess: Floats, at: SteadyRun) -> str:
     )
 
 
-#: Bisection steps for the middle of an arc.
-HALVINGS = 40
+HALVINGS = 40  # Bisection steps for the middle of an arc
 
 
 def parabolic_arc(

@@ -14,8 +14,7 @@ from soilml.errors import InputError
 from soilml.parameters import Parameter, check
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
-#: Points across the diameter of a sensor.
-CHORDS = 48
+CHORDS = 48  # Points across the diameter of a sensor
 
 
 @final

@@ -27,8 +27,7 @@ from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 #: Step of the central differences, in standard deviations of the measured quantity: large enough
 #: for the solver's tolerance, small enough for a first-order formula.
 STEP_IN_STD = 0.25
-#: Fewest turns for a jackknife: two degrees of freedom.
-MIN_TURNS = 3
+MIN_TURNS = 3  # Fewest turns for a jackknife: two degrees of freedom
 
 
 def jackknife_covariance(

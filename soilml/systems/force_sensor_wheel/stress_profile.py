@@ -127,8 +127,7 @@ def _refuse(angle: Floats, normal: Floats) -> None:
         )
 
 
-#: Points of the profile from entry to exit.
-POINTS = 201
+POINTS = 201  # Points of the profile from entry to exit
 
 
 def bekker_stress_profile(

@@ -18,8 +18,7 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 
 GRAVITY = 9.81
-#: Bisection steps for the settling between 0 and 0.5: 0.5 / 2^16 is below 1e-5.
-BISECTIONS = 16
+BISECTIONS = 16  # Bisection steps for the settling between 0 and 0.5: 0.5 / 2^16 is below 1e-5
 
 
 @dataclass(frozen=True)

@@ -16,16 +16,14 @@ from numpy.typing import ArrayLike, NDArray
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError, MissingLibraryError
 
-#: Samples by which a signal is extended at its ends before it is filtered.
-PADDING = 9
+PADDING = 9  # Samples by which a signal is extended at its ends before it is filtered
 #: Lowest cutoff as a fraction of the sampling rate; below it the coefficients lose their digits.
 MIN_CUTOFF = 1e-5
 #: Blocks into which a signal is divided, and the fewest consecutive ones of a stationary part.
 BLOCKS, MIN_BLOCKS = 40, 8
 #: Robust standard deviations from the median at which a block mean is an outlier.
 MAX_DEVIATION = 4.0
-#: Standard deviations by which von Neumann's ratio may fall below 1.
-RATIO_SIGMAS = 2.0
+RATIO_SIGMAS = 2.0  # Standard deviations by which von Neumann's ratio may fall below 1
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,7 @@ import numpy as np
 from soilml.arrays import Array
 from soilml.errors import InputError
 
-#: Largest number of legs: neighbouring feet must not load the same soil.
-MAX_LEGS = 6
+MAX_LEGS = 6  # Largest number of legs: neighbouring feet must not load the same soil
 
 
 @final

@@ -19,8 +19,7 @@ GRAVITY = 9.81
 #: Speed below which the direction of motion is regularised, as a fraction of the speed of the leg's
 #: end: 1 mm/s for the paper's wheel-leg.
 FADING = 0.02
-#: A step has converged when the forces balance to this fraction of the weight.
-TOLERANCE = 1e-6
+TOLERANCE = 1e-6  # A step has converged when the forces balance to this fraction of the weight
 #: Newton iterations of a step, and halvings of one Newton update that does not reduce the
 #: imbalance.
 MAX_NEWTON_STEPS, MAX_HALVINGS = 25, 8
@@ -199,8 +198,7 @@ def explicit_step(
     return HubState(hub.x + vx * dt, hub.z + vz * dt, vx, vz), reaction, np.isfinite(vz)
 
 
-#: Bisection steps for the height of the hub at the start.
-HALVINGS = 40
+HALVINGS = 40  # Bisection steps for the height of the hub at the start
 
 
 class WalkStatus(IntEnum):

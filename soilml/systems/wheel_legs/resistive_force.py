@@ -88,8 +88,7 @@ def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, 
     )
 
 
-#: Depth at which the paper states the normal stiffness sigma_1, m.
-LUMPED_AT = 0.01
+LUMPED_AT = 0.01  # Depth at which the paper states the normal stiffness sigma_1, m
 
 
 @final

@@ -19,10 +19,8 @@ from soilml.systems.wheel_legs.slip_models import (
     spring_soil,
 )
 
-#: Smallest range of slips for a regression, in standard deviations of the slip.
-MIN_RANGE = 1.0
-#: Standard deviations from the physical range at which an estimate is refused.
-MAX_EXCESS = 3.0
+MIN_RANGE = 1.0  # Smallest range of slips for a regression, in standard deviations of the slip
+MAX_EXCESS = 3.0  # Standard deviations from the physical range at which an estimate is refused
 
 Law = TypeVar("Law", TorqueSlip, VibrationSlip)
 

@@ -174,8 +174,7 @@ def _check_ranges(slip: Floats, static: Floats, gap: Floats) -> None:
 FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
 #: Load, N: a third of the printed 3.75 kg, which one foot does not carry on two of the four soils.
 LOAD = 12.0
-#: The commanded slips of the source's tests.
-SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])
+SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])  # The commanded slips of the source's tests
 
 #: Table I: name, K_A, sigma_0 (Pa) and alpha_z (Pa/m) of the four soils.
 PRINTED = (

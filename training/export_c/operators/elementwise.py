@@ -22,8 +22,7 @@ TRUTH = {
     "Equal": "==", "Greater": ">", "GreaterOrEqual": ">=", "Less": "<", "LessOrEqual": "<=",
     "And": "&&", "Or": "||",
 }  # fmt: skip
-#: Kernels of two operands that keep their type.
-PAIRS = {"Max": "larger", "Min": "smaller"}
+PAIRS = {"Max": "larger", "Min": "smaller"}  # Kernels of two operands that keep their type
 
 
 def translate_function(program: Program, node: Node) -> list[Tensor]:

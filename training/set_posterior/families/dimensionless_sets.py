@@ -44,8 +44,7 @@ SHARE_KNOWN_BEARING, LEAST_BEARING_STD = 1.0 / 3.0, 0.1
 TORQUE_NOISE, SINKAGE_NOISE, PULL_NOISE = (0.01, 0.08), 0.05, 0.03
 #: Share of sets with a bias of the torque sensor, and the largest standard deviation of the bias.
 SHARE_BIASED, MOST_BIAS = 1.0 / 3.0, 0.04
-#: Share of sets in which sinkage and drawbar pull are measured as well.
-SHARE_ALL_CHANNELS = 0.3
+SHARE_ALL_CHANNELS = 0.3  # Share of sets in which sinkage and drawbar pull are measured as well
 
 
 def simulate_sets(

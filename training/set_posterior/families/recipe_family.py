@@ -49,8 +49,7 @@ SHARE_ALL_CHANNELS = 0.3
 #: Up to this many unknowns all terms have a degree of up to four; beyond, those of the estimated
 #: unknowns alone.
 FEW_UNKNOWNS = 4
-#: Least relative noise in the scale of torque where its noise is constant.
-LEAST_SHARE = 0.2
+LEAST_SHARE = 0.2  # Least relative noise in the scale of torque where its noise is constant
 #: Without a logarithm, a torque is used whatever its noise; that of an absent reading is larger.
 ANY_NOISE = 1e5
 
