@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate, rates_at, values_at
 from soilml.fitting.covariance import Whitening
@@ -24,8 +24,6 @@ from soilml.fitting.readings import Readings
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.physics.sinkage_estimate import SinkageEstimate
 from soilml.physics.soils.soil_tests import deviation_rates, deviations
-
-Floats = NDArray[np.float64]
 
 #: Residual, in standard deviations, of a reading without equilibrium at a trial: large enough that
 #: the trial is rejected, finite so that trials can still be compared.

@@ -14,8 +14,8 @@ from graphlib import CycleError
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
@@ -30,8 +30,6 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.sinkage_estimate import SinkageEstimate
 from soilml.quantities import CHANNELS
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 T = TypeVar("T")
 
 #: Step of the difference quotients, in units of the coordinate: rounding errors of a reading at

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.levels import Levels, load_levels, replicate_rows, slip_levels
@@ -21,8 +22,6 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 #: Standard deviation, as a fraction of a channel's largest reading, up to which it counts as zero:

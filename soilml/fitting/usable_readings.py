@@ -6,14 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.errors import FitError
 from soilml.fitting.operating_points import operating_points, with_rover_columns
 from soilml.fitting.readings import (
     LEAST_RELATIVE_STD,
-    Booleans,
     Readings,
     declared_std,
     stack_readings,
@@ -47,9 +45,7 @@ def usable_readings(case: Case, table: Table) -> Readings:
     found = stack_readings(case, table)
     if not found.channels:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
-    std, replaced, more = _without_zeros(case, table, found)
-    own = found.from_case & ~replaced
-    found = replace(found, std=std, from_case=own, notes=(*notes, *more))
+    found = with_zeros_replaced(case, table, replace(found, notes=tuple(notes)))
     unknown = found.undeclared
     kept = [i for i, name in enumerate(found.channels) if column(name) not in unknown]
     if not kept or not unknown:
@@ -83,12 +79,12 @@ def _grouser_remark(case: Case, table: Table, owner: str) -> list[Remark]:
     return []
 
 
-def _without_zeros(
-    case: Case, table: Table, readings: Readings
-) -> tuple[Floats, Booleans, list[Remark]]:
-    """Standard deviations (m,) with zeros replaced by the median of their channel, and where.
+def with_zeros_replaced(
+    case: Case, table: Table, readings: Readings, *, refuse: bool = True
+) -> Readings:
+    """The readings with standard deviations of zero replaced by the median of their channel.
 
-    Raises `FitError` where all of a channel are zero.
+    A channel where all are zero raises `FitError`, or counts as undeclared without `refuse`.
     """
     std, replaced, remarks = readings.std.copy(), np.zeros(len(readings), bool), []
     for i, name in enumerate(readings.channels):
@@ -101,6 +97,8 @@ def _without_zeros(
         first = int(np.argmax(zero))
         where = f"{table.place(int(readings.row[own][first]))}, column {key}"
         others = declared[declared > least]
+        if others.size == 0 and not refuse:
+            continue
         if others.size == 0:
             raise FitError(
                 f"{where}: standard deviation {declared[first]:.3g}, and no row has a larger one; "
@@ -115,4 +113,5 @@ def _without_zeros(
             f"{median:.3g}{f'; {more} more rows likewise' if more else ''}"
         )
         remarks.append(Remark("zero-noise", text, (key,)))
-    return std, replaced, remarks
+    notes = (*readings.notes, *remarks)
+    return replace(readings, std=std, from_case=readings.from_case & ~replaced, notes=notes)

@@ -13,6 +13,7 @@ from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import Readings, stack_readings
+from soilml.fitting.usable_readings import with_zeros_replaced
 from soilml.gap.candidate_effects import candidate_effects, effect_names
 from soilml.gap.checks import (
     DataCheckResult,
@@ -165,9 +166,10 @@ def gap(
     soil = free_soil_parameters(case, free)
 
     readings = stack_readings(case, split.analysed)
+    readings = with_zeros_replaced(case, split.analysed, readings, refuse=False)
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
-    notes += exclusions
+    notes += [*readings.notes, *exclusions]
     checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
     if checks.errors:
         errors = (*checks.errors, *checks.naming_obstacles)

@@ -1,15 +1,17 @@
 """What identification takes from a table: noise, and rows that count."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import MODEL
 
-from soilml import Operating, identify, read_case
+from soilml import Noise, Operating, gap, identify, read_case, simulate
 from soilml.errors import FitError, TableError
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
-from soilml.remarks import texts
+from soilml.remarks import about, texts
 
 SHEAR = ["friction_angle", "shear_modulus"]
 
@@ -125,3 +127,16 @@ def test_rows_cannot_be_grouped_by_blank_cells(table):
     time[5] = np.nan
     with pytest.raises(TableError, match=r"log\.csv line 7, column time_s: the cell is blank"):
         list(changed(table, time_s=time).groups("time_s"))
+
+
+def test_a_relative_noise_is_the_median_one_at_a_reading_of_zero_for_gap_too(case):
+    slip, load = np.tile(np.linspace(0.05, 0.6, 8), 3), np.repeat([40.0, 60.0, 90.0], 8)
+    known = replace(case, noise={"torque_Nm": Noise(share=0.02), "sinkage_m": Noise(share=0.02)})
+    rows = simulate(known, slip, load, run=load, seed=3)
+    sinkage = rows["sinkage_m"].copy()
+    sinkage[5] = 0.0
+    rows = replace(rows, columns=rows.columns | {"sinkage_m": sinkage})
+    report = gap(known, rows)
+    (note,) = [remark for remark in report.notes if remark.code == "zero-noise"]
+    assert note.about == ("sinkage_m",) and "row 6" in note.text
+    assert about(report.notes, "unused-channel") == {"drawbar_pull_N"}  # its noise is not declared
