@@ -11,11 +11,11 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.features import as_numbers
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.narrower_prior import LEAST_MASS, within_box
+from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 
 #: A mean closer to an end of the prior than so many standard deviations is at the edge.

@@ -11,7 +11,6 @@ from typing import Any, NoReturn, final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.features import flatten_readings, without_copies
@@ -19,6 +18,7 @@ from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
 from soilml.onboard.model_file import Session, find_model, open_model
+from soilml.onboard.set_contract import Floats
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
 NoiseModels = Mapping[str, tuple[float, float]]

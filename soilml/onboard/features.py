@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
+from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS, Floats
 from soilml.quantities import QUANTITIES
 
 #: Quantities that a model can read, with the open interval of possible readings.

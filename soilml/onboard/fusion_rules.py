@@ -17,8 +17,8 @@ from itertools import combinations
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.onboard.set_contract import Floats
 
 RIDGE = 1e-9  # Ridge that keeps the correlation matrix of two equal estimators invertible
 

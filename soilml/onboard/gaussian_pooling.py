@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import READABLE
 from soilml.onboard.held_out_errors import HeldOutErrors
+from soilml.onboard.set_contract import Floats
 
 #: Least ratio of a row's standard deviation to the prior's, along any direction.
 LEAST_STD_RATIO = 1e-3

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
+from soilml.onboard.set_contract import Floats
 
 #: Keys of the metadata entry, which are the names of the arrays: those of whole numbers, of single
 #: readings, of averages of repeated readings, and by number of readings.

@@ -8,9 +8,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import best_linear
 from soilml.onboard.held_out_errors import HeldOutErrors
+from soilml.onboard.set_contract import Floats
 
 #: Fewest held-out rows that two files must have in common, and fewest averages of repeated ones.
 LEAST_COMMON_ROWS, LEAST_AVERAGES = 200, 100

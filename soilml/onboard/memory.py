@@ -11,9 +11,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.features import as_numbers
+from soilml.onboard.set_contract import Floats
 
 Singles = NDArray[np.float32]
 

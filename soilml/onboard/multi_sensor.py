@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.fusion_rules import BEST_LINEAR, RULES
 from soilml.onboard.gaussian_pooling import pool
 from soilml.onboard.joint_errors import are_comparable, fuse_rows
+from soilml.onboard.set_contract import Floats
 from soilml.quantities import Z_90
 
 #: Fusion by variance and by the correlation of the errors, which the files carry.

@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 
-from soilml.arrays import Floats
+from soilml.onboard.set_contract import Floats
 
 POINTS = 2048  # Points drawn
 #: Standard deviations to which the cumulative normal distribution is tabulated, and its entries.

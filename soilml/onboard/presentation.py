@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
 from soilml.report.figure_style import picture

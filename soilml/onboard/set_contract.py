@@ -12,6 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]  # the board does without soilml.arrays
+
+
 #: Version of what a caller of the graph may feed and reads, in the metadata as `soilml_interface`;
 #: files without that entry have version 1. docs/onnx-interface.md lists the changes.
 INTERFACE = "4"

@@ -14,7 +14,6 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings, parts_of_rows
@@ -40,6 +39,7 @@ from soilml.onboard.set_contract import (
     SET_PREFIX,
     SET_SWITCH,
     STD_INPUTS,
+    Floats,
     empty_memory,
 )
 

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.report.figure_style import AFTER, short_label, take_axes
 from soilml.report.numbers import display_unit, parameter_name
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+
+Floats = NDArray[np.float64]
 
 #: Range of the prior; the same grey as in every figure.
 PRIOR = "#d9d9d9"
