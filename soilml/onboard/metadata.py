@@ -50,7 +50,7 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     alone = sets is not None and sets.sets_only  # without estimates of single rows
     if pooling.single_row_coverage_factor.size != len(outputs) and not alone:
         raise ValueError("together: not of these outputs")
-    if not (pooling.patterns or per_row or alone):
+    if not (pooling.patterns or per_row or sets is not None):
         raise ValueError("together: no kinds of runs")
     return {
         "inputs": tuple(entry["name"] for entry in inputs),

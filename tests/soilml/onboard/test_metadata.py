@@ -112,6 +112,16 @@ def test_a_set_of_a_graph_without_one_is_refused(tmp_path):
     assert "\n" not in str(caught.value)
 
 
+def test_a_file_with_a_set_posterior_needs_no_pooling_of_rows(tmp_path):
+    """As it is trained now; `CHANGES` has the same without the set posterior, which is refused."""
+    entries = put("together", "kinds", [])
+    file = signed(ROOT / "exported" / "wheel.onnx", tmp_path / "m.onnx", **entries)
+    found = Estimator.load(file).run(slip=[0.1, 0.3], torque=[1.5, 2.6], load=60.0)
+    whole = Estimator.load(ROOT / "exported" / "wheel.onnx")
+    expected = whole.run(slip=[0.1, 0.3], torque=[1.5, 2.6], load=60.0)
+    assert found.mean.tolist() == expected.mean.tolist()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", released_models())
 def test_released_files_signed_again_are_read(tmp_path, name):
