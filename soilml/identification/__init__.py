@@ -40,7 +40,7 @@ METHODS: dict[str, Method] = {
 #: Methods that need the closed form of a rigid wheel with linear stresses.
 CLOSED_FORM = ("linear", "newton")
 #: Most rows of one fit by a closed form, whose equations are all held at a time. Other methods
-#: condense rows that were driven alike, and take any table.
+#: condense near replicates, and take any table.
 MOST_ROWS = 100_000
 
 

@@ -111,7 +111,7 @@ def _all_columns(fit: Solution, difference: Difference, changed: Solution) -> Di
 
 
 def _predictions(option: RunOption, readings: Readings, fits: Mapping[str, Solution]) -> Floats:
-    """Predictions (1 or 2, fits, m) of a run, and of the run driven as usual where that differs."""
+    """Predictions (1 or 2, fits, m) of a run, and of the plain run where that differs."""
     ways = [option.at] if option.plain is None else [option.at, option.plain]
     requests = [
         PredictionRequest(
@@ -128,7 +128,7 @@ def _predictions(option: RunOption, readings: Readings, fits: Mapping[str, Solut
 
 
 def _is_plain_repeat(readings: Readings, y: Floats) -> bool:
-    """Whether every explanation predicts for a run what it predicts for the run driven as usual."""
+    """Whether every explanation predicts for a run what it predicts for the plain run."""
     return len(y) > 1 and not np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std)
 
 

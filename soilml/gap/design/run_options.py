@@ -34,7 +34,7 @@ HEAVIER, LIGHTER = (1.5, 1.25), 0.6
 class RunOption:
     """A possible run: its kind, a description, its operating points and the gear it needs.
 
-    `plain` are the same slips and loads driven as usual, where the run differs by a covariate:
+    `plain` are the same slips and loads at usual covariates, where the run differs by one:
     the run adds more than a repeat only if some model predicts other readings for it.
     """
 
