@@ -42,7 +42,7 @@ test: $(VENV)/.ready ## all checks and tests
 test-long: $(VENV)/.ready ## tests that `make test` leaves out: all versions of the runtime, larger samples
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m long
 
-test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, about two minutes
+test-fast: $(VENV)/.ready ## checks, and the tests that neither train nor run a whole workflow, about a minute
 	@$(MAKE) --no-print-directory check
 	@$(BIN)/python -m pytest -n 2 --dist loadfile -m "not slow and not network and not long"
 

@@ -11,6 +11,8 @@ from soilml.cli import main
 from soilml.remarks import Remark
 from soilml.report import page as pages
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("jinja2")
 pytest.importorskip("matplotlib")
 

@@ -16,6 +16,8 @@ from datagen.recipe import read_recipe
 from datagen.simulation import pieces
 from soilml.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 dask = pytest.importorskip("dask")
 distributed = pytest.importorskip("distributed")
 
@@ -45,7 +47,6 @@ def refuse(number):
     raise InputError(f"{number} is refused")
 
 
-@pytest.mark.slow
 def test_a_killed_worker_changes_no_result(scheduler, tmp_path):
     task = functools.partial(die_once, tmp_path / "died")
     with dask_map(task, range(40), scheduler=scheduler) as results:
@@ -62,7 +63,6 @@ def test_errors_of_a_task_are_those_of_the_function(scheduler):
         list(results)
 
 
-@pytest.mark.slow
 def test_rows_that_kill_every_worker_are_named(scheduler):
     with (
         pytest.raises(InputError, match="several workers died of the same rows"),
@@ -71,7 +71,6 @@ def test_rows_that_kill_every_worker_are_named(scheduler):
         list(results)
 
 
-@pytest.mark.slow
 def test_the_bytes_are_those_of_the_other_engine(scheduler, tmp_path, monkeypatch):
     monkeypatch.setattr("datagen.generate.pieces", functools.partial(pieces, size=256))
     blocks = "[[runs]]\nrows = 1\nshare = 0.5\n[[runs]]\nrows = 8\nshare = 0.5\n"

@@ -24,6 +24,8 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.sinkage_estimate import SinkageEstimate
 
+pytestmark = pytest.mark.slow
+
 WHEEL_EFFECTS = [
     name
     for name, effect in EFFECTS.items()

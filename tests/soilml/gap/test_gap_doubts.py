@@ -19,6 +19,8 @@ from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.remarks import texts
 
+pytestmark = pytest.mark.slow
+
 TWICE = (40.0, 40.0, 60.0, 60.0, 90.0, 90.0)
 
 
@@ -34,7 +36,6 @@ def changed(table, name, values):
     return Table(table.columns | {name: values})
 
 
-@pytest.mark.slow
 def test_noise_far_above_the_scatter_of_repeats_is_noted():
     table = driven(case_of(), loads=TWICE)
     report = gap(case_of(times(MODEL, 5.0)), table)
@@ -59,7 +60,6 @@ def test_understated_noise_is_undecided():
     assert any("as much as their declared noise" in reason for reason in texts(report.reasons))
 
 
-@pytest.mark.slow
 def test_a_false_alarm_that_nothing_explains_is_undecided(monkeypatch):
     monkeypatch.setattr("soilml.gap.search.stepwise.GAP_LEVEL", 1.01)
     report = gap(case_of(), driven(case_of()))
@@ -70,7 +70,6 @@ def test_a_false_alarm_that_nothing_explains_is_undecided(monkeypatch):
         assert report.soil_after[name].value == before.value
 
 
-@pytest.mark.slow
 def test_a_strange_but_repeatable_response_leaves_the_soil_where_it_was():
     table = driven(case_of(), loads=TWICE, seed=2)
     bump = np.exp(-0.5 * ((table["slip"] - 0.4) / 0.06) ** 2)
@@ -106,7 +105,6 @@ def waved(table, share=0.015):
     return Table(columns)
 
 
-@pytest.mark.slow
 def test_what_is_within_the_declared_discrepancy_is_no_gap():
     case, table = case_of(), waved(driven(case_of(), seed=4))
     assert gap(case, table).status not in ("no-gap", "undecided")
@@ -120,7 +118,6 @@ def test_what_is_within_the_declared_discrepancy_is_no_gap():
     )
 
 
-@pytest.mark.slow
 def test_an_effect_is_named_beside_a_declared_discrepancy_and_then_nothing_is_left():
     case = case_of()
     table = waved(driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=4))
@@ -130,7 +127,6 @@ def test_an_effect_is_named_beside_a_declared_discrepancy_and_then_nothing_is_le
     assert again.status == "no-gap"
 
 
-@pytest.mark.slow
 def test_a_cause_by_a_law_far_from_the_catalogue_is_suspected():
     case = case_of()
     other = EFFECTS["slip-sinkage"](n1=0.2, by_slip=7.0)

@@ -14,6 +14,8 @@ from soilml.gap.report.results import NextRun
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 
+pytestmark = pytest.mark.slow
+
 
 def explained(effect, names, seed=2, **how):
     """A problem on rows with an effect, and the fits of several candidates."""
@@ -81,7 +83,6 @@ def test_the_gear_is_changed_only_where_an_effect_depends_on_it():
     assert half == pytest.approx(0.5 * case.model.gear.width, rel=0.02)
 
 
-@pytest.mark.slow
 def test_a_shear_test_is_proposed_where_the_soils_of_explanations_differ():
     rivals = explained(EFFECTS["bulldozing"](share=1.0), ("bulldozing", "drawbar-gain"))
     found = {run.kind: run for run in next_runs(*rivals)}

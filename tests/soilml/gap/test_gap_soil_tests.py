@@ -19,6 +19,8 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
 from soilml.remarks import texts
 
+pytestmark = pytest.mark.slow
+
 SAND = soil("wong1989/dry_sand")
 KNOWN = {
     "kc": SAND.kc,
@@ -79,7 +81,6 @@ def test_tests_of_the_soil_add_to_the_odds_of_the_cause(reports):
     assert both.soil_after["cohesion"].std < alone.soil_after["cohesion"].std
 
 
-@pytest.mark.slow
 def test_report_compares_the_soil_with_its_tests(reports):
     plate, shear = reports[1].as_json()["soil_tests"]
     assert shear["label"] == "shear strength under 7.5 kPa"
@@ -99,7 +100,6 @@ def test_runs_that_agree_with_the_tests_have_no_gap():
     assert all(abs(t.sigma_after) < 2.0 for t in report.soil_tests)
 
 
-@pytest.mark.slow
 def test_runs_on_another_soil_than_that_of_the_tests_are_remarked_on():
     _, shear = sand_tests()
     other = replace(shear, strength=2.0 * shear.strength)
@@ -107,7 +107,6 @@ def test_runs_on_another_soil_than_that_of_the_tests_are_remarked_on():
     assert any("disagree with a test of the soil" in note for note in texts(report.notes))
 
 
-@pytest.mark.slow
 def test_audit_knows_that_tests_hold_the_soil():
     design = runs()
     absorbed = [
@@ -164,7 +163,6 @@ def test_bevameter_hands_its_tests_on():
     assert bevameter(one_size, None, narrow).tests == ()
 
 
-@pytest.mark.slow
 def test_runs_that_agree_are_no_gap_only_where_the_tests_agree_too():
     plate, shear = sand_tests()
     known = {name: prior for name, prior in CASE.prior.items() if name != "kphi"}

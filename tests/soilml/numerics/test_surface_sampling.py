@@ -14,6 +14,8 @@ from soilml.numerics.surrogate_density import (
     term_count,
 )
 
+pytestmark = pytest.mark.slow
+
 SLIP = np.linspace(0.1, 0.9, 12)
 
 

@@ -11,6 +11,8 @@ from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import are_comparable, joint_errors
 from soilml.onboard.multi_sensor import fuse_estimates
 
+pytestmark = pytest.mark.slow
+
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.2]), np.asarray([-0.9]), np.asarray([1.5]))
 ROWS, REPEATS = 2000, 8
 

@@ -12,6 +12,8 @@ from served_page import page as page
 from soilml import Model, Operating, Wheel, read_case, soil
 from soilml.io.text_tables import csv_text
 
+pytestmark = pytest.mark.slow
+
 RUNS = "run,slip,load_N,torque_Nm\n"
 
 
@@ -27,7 +29,6 @@ def runs_text(count=6):
     return csv_text(columns).encode()
 
 
-@pytest.mark.slow
 def test_a_table_of_runs_is_known_and_estimated(page):
     key = page.put("RUNS.csv", runs_text())
     job = page.job(kind="look", files=[key])
@@ -49,7 +50,6 @@ def test_a_table_of_runs_is_known_and_estimated(page):
     assert values["friction_angle"]["value"] == pytest.approx(angle["si"])
 
 
-@pytest.mark.slow
 def test_one_reading_leaves_a_parameter_unknown_in_words(page):
     key = page.put("one.csv", (RUNS + "a,0.3,60,2.26\n").encode())
     job = page.job(kind="estimate", files=[key], model={"values": {}})
@@ -82,7 +82,6 @@ def test_a_fault_of_the_model_file_names_it(page):
     assert status == 422 and "MODEL.toml" in wrong["error"]
 
 
-@pytest.mark.slow
 def test_a_gap_runs_with_progress_and_its_files_are_there(page):
     key = page.put("RUNS.csv", runs_text(7))
     job = page.job(kind="gap", files=[key], model={"values": {}})
@@ -115,7 +114,6 @@ def test_a_job_can_be_cancelled_and_the_page_stays_live(page):
     assert again["state"] == "cancelled" and again["result"] is None
 
 
-@pytest.mark.slow
 def test_a_raw_log_is_guessed_edited_and_imported(page, tmp_path):
     sys.path.insert(0, str(ROOT / "examples" / "import"))
     from rig import write_logs
@@ -135,7 +133,6 @@ def test_a_raw_log_is_guessed_edited_and_imported(page, tmp_path):
     assert again["result"]["kind"] == "runs" and again["result"]["rows"] == 4
 
 
-@pytest.mark.slow
 def test_one_run_is_estimated_alone_and_the_saved_model_holds_its_soil(page, tmp_path):
     key = page.put("RUNS.csv", runs_text(3))
     job = page.job(kind="estimate", files=[key], model={"values": {}}, run="heavy")
@@ -167,7 +164,6 @@ def test_a_wrong_job_is_refused_in_one_line(page, request_, said):
     assert status in (400, 422) and said in wrong["error"]
 
 
-@pytest.mark.slow
 def test_the_pull_is_that_of_usual_errors_and_of_each_wheel(page):
     """Wider than as if the model file were right; with several wheels, a curve for each of them."""
     lines = runs_text(6).decode().replace("\r", "").splitlines()

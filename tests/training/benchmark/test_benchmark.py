@@ -35,6 +35,8 @@ from training.benchmark.suite import (
     benchmark,
 )
 
+pytestmark = pytest.mark.slow
+
 FEW = 4
 EXPORTED = Path(__file__).parents[3] / "exported"
 
@@ -96,7 +98,6 @@ def test_the_first_sets_do_not_depend_on_their_number(recipe):
             assert set_hash(a, recipe.case) == set_hash(b, recipe.case)
 
 
-@pytest.mark.slow
 def test_the_packaged_limit_is_the_exact_posterior(recipe):
     """Some sets again, by the model itself and not by its surrogate."""
     every = benchmark_sets(recipe, SHEAR)
@@ -144,7 +145,6 @@ def test_the_limit_is_calibrated(recipe):
     assert np.mean(stored.flagged) < 0.01
 
 
-@pytest.mark.slow
 def test_a_stale_limit_is_refused_with_a_hint(recipe, tmp_path, capsys, monkeypatch):
     wanted = benchmark_sets(recipe.sized(seed=recipe.seed + 1), SHEAR, 1)
     with pytest.raises(InputError, match=r"stale.*soilml compare --limit FILE\.parquet"):
@@ -222,7 +222,6 @@ def test_a_model_file_is_one_method_whose_kind_is_in_its_metadata(small_model):
     assert (of_sets.label, of_sets.kind) == ("wheel", MethodKind.SET_POSTERIOR)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("file", "kind"),
     [
@@ -240,7 +239,6 @@ def test_the_kind_of_a_file_is_read_from_its_metadata(tmp_path, file, kind):
         assert classify_estimator(Estimator.load(copied)) is kind
 
 
-@pytest.mark.slow
 def test_goals_do_not_depend_on_the_name_of_a_file(tmp_path):
     names = {"wheel": "my_mlp", "wheel_mlp": "wheel", "wheel_linear": "best_lssvm"}
     copies = {

@@ -30,6 +30,8 @@ from training.set_posterior.monomials import monomials
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import ResponseSettings, fit_response
 
+pytestmark = pytest.mark.slow
+
 #: A soil at which the columns are taken.
 SOIL = np.asarray([0.5, -0.6, 0.4])
 SLIP, LOAD = np.asarray([0.08, 0.2, 0.35, 0.55]), np.asarray([40.0, 60.0, 100.0, 80.0])
@@ -98,7 +100,6 @@ def test_a_stronger_soil_under_a_heavier_load_responds_alike():
     assert np.asarray(forces[1]) == pytest.approx(np.asarray(forces[0]), rel=1e-7)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
 def test_columns_of_the_bearing_are_changes_with_its_logarithm(kind, request):
     posterior, step = request.getfixturevalue(kind), 1e-4

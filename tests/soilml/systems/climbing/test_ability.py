@@ -19,6 +19,8 @@ from soilml.systems.climbing.climb import WheelRun
 from soilml.systems.climbing.simulated_rover import StressArc
 from soilml.systems.force_sensor_wheel import StressProfile
 
+pytestmark = pytest.mark.slow
+
 SAND = {"cohesion": 0.0, "friction_angle": float(np.deg2rad(38.0))}
 
 
@@ -80,7 +82,6 @@ def test_resampled_stress_scatters_as_the_readings(true, stresses):
     assert 1e-4 < np.std(entries) < 0.01
 
 
-@pytest.mark.slow
 def test_steep_slopes_are_predicted_from_gentle_ones(true, ability):
     slope = quantile_band(ability.slope)
     for driven in np.deg2rad([8.0, 10.0, 12.0]):
@@ -92,7 +93,6 @@ def test_steep_slopes_are_predicted_from_gentle_ones(true, ability):
     assert best.upper - best.lower < 0.06
 
 
-@pytest.mark.slow
 def test_the_steepest_slope_is_the_largest_of_the_curve(ability):
     assert np.all(ability.steepest >= ability.slope.max(axis=1))
     assert np.all(ability.steepest_within(0.3) <= ability.steepest)
@@ -139,7 +139,6 @@ def test_a_profile_keeps_its_shape_whatever_its_height():
     np.testing.assert_allclose(low.profiles(at)[0].normal, high.profiles(at)[0].normal, atol=1e-9)
 
 
-@pytest.mark.slow
 def test_the_example_on_the_page_runs():
     page = (Path(__file__).parents[4] / "docs/papers/nagatani_climbing.md").read_text()
     names: dict = {}

@@ -12,6 +12,8 @@ from soilml.numerics.prior import Prior
 from soilml.systems.climbing import SimulatedRover, Uncertainty, identify_ground, modulus_per_climb
 from soilml.systems.climbing.climb import group_by_slope
 
+pytestmark = pytest.mark.slow
+
 SAND = {"cohesion": 0.0, "friction_angle": float(np.deg2rad(38.0))}
 SLOPES = np.deg2rad([0.0, 4.0, 8.0, 12.0]).tolist()
 
@@ -41,7 +43,6 @@ def test_the_shear_modulus_is_identified_with_known_strength(true, climbs):
     assert np.all(ground.samples[:, 0] == 0.0)
 
 
-@pytest.mark.slow
 def test_friction_angle_and_shear_modulus_are_correlated(true, climbs):
     fit = identify_ground(true.rover, climbs, fixed={"cohesion": 0.0}).fit
     assert fit.correlation[0, 1] > 0.8
@@ -127,7 +128,6 @@ def test_no_shear_modulus_balances_a_slope_beyond_the_largest_pull(true, climbs)
     assert np.isnan(modulus_per_climb(true.rover, [cliff], **size)).all()
 
 
-@pytest.mark.slow
 def test_intervals_cover_the_truth_of_random_rovers(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[4] / "bench"))
     from climbing_coverage import simulate_coverage

@@ -14,6 +14,8 @@ from soilml.systems.wheel_legs.stances import (
     vibration_amplitude,
 )
 
+pytestmark = pytest.mark.slow
+
 LEG = SpringLeg(stiffness=4000.0, bending=0.5)
 PHI, GAP = np.deg2rad(40.0), np.deg2rad(10.0)
 SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])
@@ -77,7 +79,6 @@ def test_more_slip_shakes_the_hub_of_a_leg_that_bends_easily_more():
     assert found[-1] > 1.1 * found[1] > 10.0 * found[0]
 
 
-@pytest.mark.slow
 def test_the_amplitude_does_not_depend_on_the_step(monkeypatch):
     coarse = vibration_amplitude(LEG, SLIPS, PHI, GAP)
     monkeypatch.setattr(stances, "STEPS_PER_PERIOD", 240)
@@ -88,7 +89,6 @@ def test_a_friction_that_does_not_drop_lets_the_foot_slide_more_smoothly():
     assert vibration_amplitude(LEG, 0.3, PHI, 0.0) < 0.3 * vibration_amplitude(LEG, 0.3, PHI, GAP)
 
 
-@pytest.mark.slow
 def test_cases_are_independent():
     one = vibration_amplitude(LEG, 0.25, PHI, GAP)
     many = vibration_amplitude(LEG, SLIPS[:, None], PHI, np.asarray([0.05, GAP]))

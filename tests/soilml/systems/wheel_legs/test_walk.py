@@ -15,6 +15,8 @@ from soilml.systems.wheel_legs.integrator import FADING, WalkStatus, explicit_st
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 from soilml.systems.wheel_legs.walk import plate_stresses, walk
 
+pytestmark = pytest.mark.slow
+
 SAND = LinearGround(stiffness=0.7e6)
 WEIGHT = 3.75 * 9.81
 STRIDE = 2 * np.pi / 5
@@ -32,7 +34,6 @@ def slipping():
     return walk(wheel_leg("LTF"), SAND, slip=[0.0, 0.125, 0.25, 0.375, 0.5], turns=1, steps=500)
 
 
-@pytest.mark.slow
 def test_softer_ground_is_sunk_into_deeper_and_slips_more(soft_to_firm):
     found = gait_metrics(soft_to_firm)
     assert np.all(np.diff(found.max_sinkage) < 0)
@@ -45,12 +46,10 @@ def test_every_stride_of_a_steady_walk_is_like_the_last(soft_to_firm):
     assert np.ptp(z, axis=0).max() < 1e-5
 
 
-@pytest.mark.slow
 def test_walking_on_level_ground_takes_work(soft_to_firm):
     assert np.all(gait_metrics(soft_to_firm).mean_torque > 0)
 
 
-@pytest.mark.slow
 def test_the_ground_carries_the_weight_over_a_stride():
     fine = walk(wheel_leg("LTF"), SAND, turns=1, steps=1000)
     given = batch_plates([wheel_leg("LTF")], [SAND])
@@ -61,7 +60,6 @@ def test_the_ground_carries_the_weight_over_a_stride():
     assert np.mean(up[-200:]) == pytest.approx(WEIGHT, rel=1e-3)
 
 
-@pytest.mark.slow
 def test_a_commanded_slip_is_the_slip_that_comes_out(slipping):
     late = slipping.after(STRIDE)
     np.testing.assert_allclose(
@@ -74,13 +72,11 @@ def test_more_slip_takes_more_torque_at_midstance(slipping):
     assert np.all(np.diff(late.at_midstance(late.torque)) > 0)
 
 
-@pytest.mark.slow
 def test_the_leg_nearest_to_straight_down_passes_it_once_a_stride(slipping):
     assert slipping.midstance.sum(axis=0).tolist() == [6] * 5
     assert np.all(np.abs(slipping.attack - np.pi / 2) <= STRIDE / 2 + 1e-9)
 
 
-@pytest.mark.slow
 def test_a_case_does_not_depend_on_the_batch():
     cases = [wheel_leg("none", legs=3), wheel_leg("CIF"), wheel_leg("LTF", legs=6)]
     together = walk(cases, SAND, turns=0.5, steps=500)
@@ -90,7 +86,6 @@ def test_a_case_does_not_depend_on_the_batch():
         np.testing.assert_allclose(together.x[:, i], alone.x[:, 0], atol=1e-6)
 
 
-@pytest.mark.slow
 def test_long_steps_agree_with_the_papers_short_ones():
     short = round(2 * np.pi / 0.3 / 1e-4)
     slow = walk(wheel_leg("LTF"), SAND, turns=0.05, steps=short, step=explicit_step, fading=1e-9)
@@ -101,7 +96,6 @@ def test_long_steps_agree_with_the_papers_short_ones():
     assert fast.x[-1, 0] == pytest.approx(slow.x[-1, 0], rel=0.02)
 
 
-@pytest.mark.slow
 def test_shorter_steps_change_little():
     cases = [wheel_leg(foot) for foot in FEET]
     coarse, fine = (gait_metrics(walk(cases, SAND, turns=1.2, steps=n)) for n in (500, 1000))
@@ -152,7 +146,6 @@ def test_ground_too_soft_to_carry_takes_the_hub_down():
     assert names == ["SUNK", "SUNK", "OK", "INVALID", "INVALID"]
 
 
-@pytest.mark.slow
 def test_a_start_too_high_for_the_time_never_touches_the_ground():
     walked = walk(wheel_leg("LTF"), SAND, height=100.0, turns=0.02)
     assert WalkStatus(walked.status[0]) is WalkStatus.NO_CONTACT
@@ -174,7 +167,6 @@ def test_invalid_settings_are_refused(call, message):
         call()
 
 
-@pytest.mark.slow
 def test_the_offset_of_the_normal_stress_carries_too():
     with_it = walk(wheel_leg("LTF"), GROUNDS["SSC-1"], turns=0.6, steps=500)
     without = walk(wheel_leg("LTF"), replace(GROUNDS["SSC-1"], offset=0.0), turns=0.6, steps=500)
@@ -201,7 +193,6 @@ def test_a_walk_at_a_tenth_of_the_speed_leaves_the_same_track():
     assert slow.x[-1, 0] == pytest.approx(quick.x[-1, 0], rel=0.01)
 
 
-@pytest.mark.slow
 def test_the_example_on_the_page_runs():
     page = (Path(__file__).parents[4] / "docs/papers/comin2017.md").read_text()
     names: dict = {}
