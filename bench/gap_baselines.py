@@ -24,7 +24,7 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
     known, _ = effect_signatures(soil_only, readings, effects)
     y = predict(soil_only, [], np.zeros((1, 0)), readings)[0]
-    r = (readings.reading - y) / readings.std
+    r = (readings.measured - y) / readings.std
     g = np.stack([s.column for s in known], axis=1) / readings.std[:, None]
     labels = [s.name for s in known]
     free = select_free(case, None)

@@ -12,5 +12,5 @@ def channel_readings(points, channels, **changes):
     n = np.asarray(points.slip).size
     reading = np.concatenate([np.broadcast_to(own[0], n) for own in channels.values()])
     std = np.concatenate([np.broadcast_to(own[1], n) for own in channels.values()])
-    every = Readings.of_every_row(points, list(channels), reading=reading, std=std)
+    every = Readings.of_every_row(points, list(channels), measured=reading, std=std)
     return replace(every.subset(np.isfinite(reading)), **changes)

@@ -88,7 +88,7 @@ def fit_problem(case, table, run_effects=(0.0, 0.0)) -> FitProblem:
 
 def with_readings(fit, reading):
     """The same point of a fit beside other readings; its residuals stay as they are."""
-    readings = replace(fit.problem.readings, reading=reading)
+    readings = replace(fit.problem.readings, measured=reading)
     return replace(fit, problem=replace(fit.problem, readings=readings))
 
 

@@ -135,7 +135,7 @@ def discrepancy_process(
     columns, channel, usual = [np.zeros((len(readings), 0))], [np.zeros(0, np.int64)], []
     for i, name in enumerate(readings.channels):
         own, in_channel = declared.get(column(name), default), readings.channel == i
-        usual.append(own.amplitude(range_with_zero(readings.reading[in_channel])))
+        usual.append(own.amplitude(range_with_zero(readings.measured[in_channel])))
         if usual[-1] == 0.0:
             continue
         lengths = own.slip_length, own.log_load_length
@@ -157,7 +157,7 @@ def included_discrepancy(case: Case, readings: Readings) -> list[Remark]:
     texts = []
     for i, name in enumerate(readings.channels):
         own = case.discrepancy.get(column(name), Discrepancy())
-        amplitude = own.amplitude(range_with_zero(readings.reading[readings.channel == i]))
+        amplitude = own.amplitude(range_with_zero(readings.measured[readings.channel == i]))
         if amplitude > 0.0:
             texts.append(f"{name} {amplitude:.3g} {QUANTITIES[name].unit}")
     text = f"errors of the model are included in std: {', '.join(texts)}"

@@ -116,7 +116,7 @@ class LeastSquaresProblem:
 
     def residual(self, prediction: Floats) -> Floats:
         """Residuals (..., m) in the units of the readings."""
-        residual = self.readings.reading - prediction
+        residual = self.readings.measured - prediction
         return np.where(np.isfinite(residual), residual, NO_EQUILIBRIUM * self.readings.std)
 
     def whitened(self, prediction: Floats) -> Floats:
@@ -183,9 +183,9 @@ class Solution:
         return self.problem.coordinates
 
     @property
-    def reading(self) -> Floats:
-        """The readings, (m,)."""
-        return self.problem.readings.reading
+    def measured(self) -> Floats:
+        """The measured values, (m,)."""
+        return self.problem.readings.measured
 
     @property
     def prediction(self) -> Floats:
@@ -237,7 +237,7 @@ class Solution:
         return replace(
             self,
             problem=replace(self.problem, whiten=whiten),
-            residual=np.asarray(whiten @ (self.reading - self.prediction)),
+            residual=np.asarray(whiten @ (self.measured - self.prediction)),
             jacobian=np.asarray(whiten @ self.derivatives),
         )
 

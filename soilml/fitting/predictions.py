@@ -314,7 +314,7 @@ def _linearise_joined(requests: Sequence[PredictionRequest]) -> list[Linearisati
     linearisations, start = [], 0
     for request, part, step in zip(requests, parts, steps, strict=True):
         rows = slice(start, start + part.sets * part.points)
-        y = _stacked(request.readings, response.reading, rows)
+        y = _stacked(request.readings, response.force, rows)
         log_sinkage = response.sinkage.log_sinkage[rows].reshape(part.sets, part.points)
         linearisations.append(
             Linearisation(

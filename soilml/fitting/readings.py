@@ -66,8 +66,9 @@ class Readings:
         Names of the channels.
     row, channel
         Row, and index in `channels`, of each reading, (m,).
-    reading, std
-        Readings (m,) and their noise: as declared, NaN where it is not; in a fit, as it is taken.
+    measured, std
+        Measured values (m,), of planned rows the expected ones, and their noise: as declared, NaN
+        where it is not; in a fit, as it is taken.
     noise, from_case
         Noise of each channel that the case declares, and of which readings (m,) it is the noise;
         that of others stands in the table.
@@ -93,7 +94,7 @@ class Readings:
     channels: tuple[str, ...]
     row: Integers
     channel: Integers
-    reading: Floats
+    measured: Floats
     std: Floats
     noise: tuple[Noise | None, ...]
     from_case: Booleans
@@ -109,7 +110,7 @@ class Readings:
     def of_every_row(
         at: Operating,
         channels: Sequence[str] = CHANNELS,
-        reading: Floats | None = None,
+        measured: Floats | None = None,
         std: Floats | None = None,
         noise: Sequence[Noise | None] | None = None,
         run: Integers | None = None,
@@ -126,7 +127,7 @@ class Readings:
             channels=tuple(channels),
             row=np.tile(np.arange(n), c),
             channel=np.repeat(np.arange(c), n),
-            reading=unknown if reading is None else reading,
+            measured=unknown if measured is None else measured,
             std=unknown if std is None else std,
             noise=(None,) * c if noise is None else tuple(noise),
             from_case=np.ones(n * c, bool),
@@ -135,7 +136,7 @@ class Readings:
         )
 
     def __len__(self) -> int:
-        return len(self.reading)
+        return len(self.measured)
 
     @property
     def row_slip(self) -> Floats:
@@ -236,7 +237,7 @@ class Readings:
             self,
             row=self.row[selected],
             channel=self.channel[selected],
-            reading=self.reading[selected],
+            measured=self.measured[selected],
             std=self.std[selected],
             from_case=self.from_case[selected],
             sensor_std=None if self.sensor_std is None else self.sensor_std[selected],
@@ -338,7 +339,7 @@ def stack_readings(case: Case, table: Table) -> Readings:
         rows = np.flatnonzero(number == r)
         order[rows[np.argsort(time[rows], kind="stable")]] = np.arange(rows.size)
     parts: dict[str, list[Any]] = {
-        name: [np.zeros(0)] for name in ("row", "channel", "reading", "std", "from_case")
+        name: [np.zeros(0)] for name in ("row", "channel", "measured", "std", "from_case")
     }
     for i, name in enumerate(names):
         key = column(name)
@@ -346,7 +347,7 @@ def stack_readings(case: Case, table: Table) -> Readings:
         own = table[f"{key}_std"] if f"{key}_std" in table else np.full(len(table), np.nan)
         parts["row"].append(kept)
         parts["channel"].append(np.full(kept.size, i))
-        parts["reading"].append(table[key][kept])
+        parts["measured"].append(table[key][kept])
         parts["std"].append(positive_std(case, table, key)[kept])
         parts["from_case"].append(~np.isfinite(own[kept]))
     joined = {name: np.concatenate(own) for name, own in parts.items()}
@@ -358,7 +359,7 @@ def stack_readings(case: Case, table: Table) -> Readings:
         channels=names,
         row=joined["row"].astype(np.int64),
         channel=joined["channel"].astype(np.int64),
-        reading=joined["reading"],
+        measured=joined["measured"],
         std=joined["std"],
         noise=tuple(case.noise.get(column(name)) for name in names),
         from_case=joined["from_case"].astype(bool),

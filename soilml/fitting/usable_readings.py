@@ -90,7 +90,7 @@ def with_zeros_replaced(
     for i, name in enumerate(readings.channels):
         key, own = column(name), readings.channel == i
         declared = declared_std(case, table, key)[readings.row[own]]
-        least = LEAST_RELATIVE_STD * float(np.abs(readings.reading[own]).max())
+        least = LEAST_RELATIVE_STD * float(np.abs(readings.measured[own]).max())
         zero = declared <= least
         if not zero.any():
             continue

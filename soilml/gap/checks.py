@@ -81,7 +81,7 @@ def _check_channels(data: CheckedData) -> Iterator[Finding]:
                 f'it from: give [noise] {key}, as in {key} = "2 %", or a column {key}_std'
             )
             yield Consequence.ERROR, Remark("noise-undeclared", text, (key,))
-        values = readings.reading[in_channel]
+        values = readings.measured[in_channel]
         largest = float(np.abs(values).max(initial=0.0))
         std = float(np.nanmax(readings.std[in_channel], initial=0.0))
         if 0.0 < std <= LEAST_RELATIVE_STD * largest:
@@ -158,13 +158,13 @@ def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Re
             continue
         _, group = np.unique(readings.replicates[undeclared], return_inverse=True)
         count = np.bincount(group)
-        mean = np.bincount(group, readings.reading[undeclared]) / count
+        mean = np.bincount(group, readings.measured[undeclared]) / count
         degrees_of_freedom = int((count - 1).sum())
         if degrees_of_freedom < MIN_REPEAT_DEGREES_OF_FREEDOM:
             continue
-        squares = float(np.sum((readings.reading[undeclared] - mean[group]) ** 2))
+        squares = float(np.sum((readings.measured[undeclared] - mean[group]) ** 2))
         std = float(np.sqrt(squares / degrees_of_freedom))
-        if std <= LEAST_RELATIVE_STD * float(np.abs(readings.reading[undeclared]).max()):
+        if std <= LEAST_RELATIVE_STD * float(np.abs(readings.measured[undeclared]).max()):
             text = (
                 f"noise of {column(name)} is not declared, and its repeated rows are equal: none "
                 "can be estimated from them"

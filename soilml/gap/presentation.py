@@ -19,17 +19,20 @@ SUSPECTED_FILE = "model_suspected.toml"
 
 
 def gap_files(
-    report: GapReport, model: str, runs: str, origin: Provenance | None = None
+    report: GapReport, model_name: str, runs_name: str, origin: Provenance | None = None
 ) -> dict[str, str]:
-    """The content of the files of a report by their names; `model` and `runs` were analysed."""
+    """The content of a report's files by their names.
+
+    model_name, runs_name: Names of the analysed files.
+    """
     from soilml.config.write_case import case_as_toml
     from soilml.gap.report.page import page, summary
 
     if origin is None:
-        origin = Provenance.of(["gap", model, runs], [])
-    entry = {"report": summary(report, model, runs).as_json(origin)}
+        origin = Provenance.of(["gap", model_name, runs_name], [])
+    entry = {"report": summary(report, model_name, runs_name).as_json(origin)}
     texts = {
-        "report.html": page(report, model, runs, origin),
+        "report.html": page(report, model_name, runs_name, origin),
         "gap.json": json_text(report.as_json() | entry),
         "model.toml": case_as_toml(report.model, [report.sentence]),
         "next_runs.csv": csv_text(_next_runs(report)),

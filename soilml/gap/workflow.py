@@ -236,16 +236,16 @@ def _build_report(
 
     before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
     shown = decision.shown.best if decision.shown else before
-    after = shown if decision.claimed else beside  # what model.toml contains
+    written = shown if decision.claimed else beside  # what model.toml contains
     figures = gap_reductions(analysis, before, shown, seed)
     if held_out is not None and len(held_out):
         figures[split.name] = predict_held_out(
             problem, result.soil, shown.fit, held_out, split.description
         )
     replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
-    intervals = with_uncertain_discrepancy(problem, after)
+    intervals = with_uncertain_discrepancy(problem, written)
     if smooth_gap:
-        left = discrepancy_amplitudes(problem, after)
+        left = discrepancy_amplitudes(problem, written)
         spread = among_candidates(intervals, result.candidates, result.posterior)
     else:
         left = None
@@ -263,7 +263,7 @@ def _build_report(
         soil_after=soil_estimates(intervals, spread),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable=dict(result.untestable),
-        notes=(*checks.notes, *analysis_notes(analysis, after.fit, shown.fit, replicates)),
+        notes=(*checks.notes, *analysis_notes(analysis, written.fit, shown.fit, replicates)),
         variance_components=variance_component_entries(analysis),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,

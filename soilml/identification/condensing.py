@@ -72,9 +72,9 @@ def _condensed_at(
     n, has = len(readings.row_slip), np.isfinite(residual)
     solved = np.zeros(n, bool)
     solved[readings.row[has]] = True
-    measured = np.zeros(n, bool)
-    measured[readings.row] = True
-    unsolved = np.flatnonzero(measured & ~solved)
+    has_reading = np.zeros(n, bool)
+    has_reading[readings.row] = True
+    unsolved = np.flatnonzero(has_reading & ~solved)
     kept = unsolved[:: len(unsolved) // MOST_UNSOLVED + 1]
     number = np.full(n, -1)
     number[solved] = np.unique(cell[solved], return_inverse=True)[1]
@@ -99,10 +99,10 @@ def _condensed_at(
         left = np.flatnonzero((position[readings.row] >= 0) & (readings.channel == i))
         counted += own.size + left.size
         full = np.flatnonzero(total > 0.0)
-        reading = np.append((getattr(middle, name) + mean)[full], readings.reading[left])
+        measured = np.append((getattr(middle, name) + mean)[full], readings.measured[left])
         row = np.append(full, position[readings.row[left]])
-        parts.append((row, np.full(row.size, i), reading, np.append(narrow[full], std[left])))
-    rows, channel, reading, own_std = (np.concatenate(part) for part in zip(*parts, strict=True))
+        parts.append((row, np.full(row.size, i), measured, np.append(narrow[full], std[left])))
+    rows, channel, measured, own_std = (np.concatenate(part) for part in zip(*parts, strict=True))
     count = cells + len(kept)
     return replace(
         readings,
@@ -112,7 +112,7 @@ def _condensed_at(
         order=np.arange(count),
         row=rows,
         channel=channel,
-        reading=reading,
+        measured=measured,
         std=own_std,
         from_case=np.zeros(len(rows), bool),
         slip_std=np.zeros(count),
@@ -130,7 +130,7 @@ def _residuals(known: Case, readings: Readings) -> tuple[Floats, Floats]:
     for block in _blocks(len(readings.row_slip)):
         selected, part = readings.of_rows(block)
         prediction = predict(known, [], np.zeros((1, 0)), part)[0]
-        residual[selected] = part.reading - prediction
+        residual[selected] = part.measured - prediction
         std[selected] = np.hypot(part.noise_at(prediction), noise_of_operation(known, part))
     for i in range(len(readings.channels)):
         own = readings.channel == i

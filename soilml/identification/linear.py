@@ -192,7 +192,7 @@ def _of_rows(readings: Readings, name: str) -> tuple[Floats, Floats]:
         )
     own = readings.channel == readings.channels.index(name)
     found = np.full((2, len(readings.row_slip)), np.nan)
-    found[:, readings.row[own]] = readings.reading[own], readings.std[own]
+    found[:, readings.row[own]] = readings.measured[own], readings.std[own]
     return found[0], found[1]
 
 

@@ -76,13 +76,13 @@ def newton(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
 
 def _solve(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     unknowns = _unknowns(case.soil)
-    reading, declared = readings.reading, readings.std
+    measured, declared = readings.measured, readings.std
     known = not readings.undeclared
-    std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(reading) + 1e-9)
+    std = np.where(np.isfinite(declared), declared, ASSUMED_NOISE * np.abs(measured) + 1e-9)
 
     def linearised(u: Floats) -> tuple[Floats, Floats]:
         prediction, jacobian = _central_differences(case, readings, unknowns, u)
-        return (prediction - reading) / std, jacobian / std[:, None]
+        return (prediction - measured) / std, jacobian / std[:, None]
 
     start = np.asarray([f.prior.fraction(f.nominal) for f in unknowns])
     u, residual, jacobian = _minimise(linearised, start)

@@ -119,7 +119,7 @@ class WeightedRows:
             case, readings.shared_errors, readings.row_load, free
         )
         std = np.where(np.isfinite(readings.std), readings.std, _initial_noise(readings))
-        shared = sensor_columns(readings, readings.reading[None, :])
+        shared = sensor_columns(readings, readings.measured[None, :])
         return WeightedRows(
             case=changed,
             readings=replace(readings, std=std),
@@ -255,7 +255,7 @@ def _few_rows(readings: Readings) -> NDArray[np.int64]:
 
 def _initial_noise(readings: Readings) -> Floats:
     """A fraction of each channel's RMS reading, (m,)."""
-    return _by_channel(readings, lambda own: INITIAL_NOISE * _rms(readings.reading[own]) + 1e-12)
+    return _by_channel(readings, lambda own: INITIAL_NOISE * _rms(readings.measured[own]) + 1e-12)
 
 
 def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
@@ -265,7 +265,7 @@ def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
         size = int(own.sum())
         freedom = max(size - p * size / len(readings), 1.0)
         scatter = float(np.sqrt(residual[own] @ residual[own] / freedom))
-        return max(scatter, 1e-6 * _rms(readings.reading[own]) + 1e-15)
+        return max(scatter, 1e-6 * _rms(readings.measured[own]) + 1e-15)
 
     return _by_channel(readings, noise)
 

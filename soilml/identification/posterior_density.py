@@ -73,7 +73,7 @@ class PosteriorDensity:
         self.errors = len(self.free) - len(free)
         #: how many predictions stand behind those of the readings: errors, and tests of the soil
         self.others = self.errors + len(case.soil_tests)
-        self.reading = np.append(readings.reading, np.zeros(self.others))
+        self.measured = np.append(readings.measured, np.zeros(self.others))
         self.columns = _by_channel(case, readings)
         self.noisy_input = bool(np.any(readings.slip_std) or np.any(readings.load_std))
         #: noise that slip and load cause, (m,); linearised at the best of the first samples
@@ -91,7 +91,7 @@ class PosteriorDensity:
         """The density of some of the rows alone."""
         part = copy(self)
         part.readings = self.readings.of_rows(rows)[1]
-        part.reading = np.append(part.readings.reading, np.zeros(self.others))
+        part.measured = np.append(part.readings.measured, np.zeros(self.others))
         part.columns = _by_channel(self.case, part.readings)
         part.input_std = None
         return part
@@ -139,7 +139,7 @@ class PosteriorDensity:
             groups = (np.concatenate([process, shared], axis=-1),)
         if self.errors:
             groups = (*groups, np.zeros((self.errors, 0)))
-        residual = y - self.reading
+        residual = y - self.measured
         squares, log_determinant, stop = np.zeros(len(y)), np.zeros(len(y)), 0
         for columns in groups:
             start, stop = stop, stop + columns.shape[-2]

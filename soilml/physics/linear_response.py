@@ -23,9 +23,9 @@ SINKAGE_STEP = 1e-5
 
 @dataclass(frozen=True)
 class LinearResponse:
-    """Readings of a batch of rows, linear in the distance to their base rows; arrays (batch,)."""
+    """Forces (batch,) as sensors read them, linear in the distance of rows to their base rows."""
 
-    reading: Force
+    force: Force
     #: sinkage of every row, to first order, and the slope at that of its base row
     sinkage: SinkageEstimate
 

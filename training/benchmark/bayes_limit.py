@@ -119,7 +119,7 @@ def exact_posterior(
         select_free(case, names),
     )
     surrogate = fit_chebyshev_surrogate(case, readings, free)
-    reading, noise = (readings.reading, readings.std)[0], case.noise[TORQUE]
+    reading, noise = (readings.measured, readings.std)[0], case.noise[TORQUE]
 
     def misfit_terms(u: Floats, noise_factor: float) -> tuple[Floats, Floats]:
         """Chi-square (n,), and the sum (n,) over rows of the logarithm of the noise."""

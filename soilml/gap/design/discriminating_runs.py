@@ -162,14 +162,12 @@ def _static_proposals(
     if not any(effect.about.kind == "soil" for effect in effects):
         return proposals
     values = {name: fit.values() for name, fit in fits.items()}
-    for kind, (text, after) in SOIL_TESTS.items():
-        names = [c.path for c in first.coordinates if c.path in after]
+    for kind, (text, stds) in SOIL_TESTS.items():
+        names = [c.path for c in first.coordinates if c.path in stds]
         if not names:
             continue
         sigmas = [
-            _discrimination(
-                rival, old, _soil_difference(first, rival, {k: after[k] for k in names})
-            )
+            _discrimination(rival, old, _soil_difference(first, rival, {k: stds[k] for k in names}))
             for rival, old in zip(rivals, present, strict=True)
         ]
         row: dict[str, float | str] = {
@@ -180,13 +178,13 @@ def _static_proposals(
 
 
 def _soil_difference(
-    first: Solution, rival: Solution, after: Mapping[str, tuple[float, bool]]
+    first: Solution, rival: Solution, stds: Mapping[str, tuple[float, bool]]
 ) -> Difference:
     """Whitened difference of two explanations in the soil parameters that a test determines."""
     own, others = first.values(), rival.values()
-    difference, jacobian = np.zeros(len(after)), np.zeros((len(after), len(rival.x)))
+    difference, jacobian = np.zeros(len(stds)), np.zeros((len(stds), len(rival.x)))
     rates = rates_at(rival.coordinates, rival.x)
-    for i, (name, (std, is_relative)) in enumerate(after.items()):
+    for i, (name, (std, is_relative)) in enumerate(stds.items()):
         std = std * abs(own[name]) if is_relative else std
         difference[i] = (own[name] - others[name]) / std
         for j, c in enumerate(rival.coordinates):

@@ -163,11 +163,10 @@ def audit(
             continue
         if not extended:
             continue
-        after = {e.name for e in extended if e.nameable}
-        gained = tuple(sorted(after - before))
+        gained = sorted(e.name for e in extended if e.nameable and e.name not in before)
         cost = known_costs.get(option.kind, 1.0) if known_costs else None
         nameable = len(before) + len(gained)
-        added_runs.append(AddedRun(option.kind, option.text, nameable, gained, cost))
+        added_runs.append(AddedRun(option.kind, option.text, nameable, tuple(gained), cost))
     added_runs.sort(key=lambda run: -len(run.gained) / (run.cost or 1.0))
     return Audit(
         effects=tuple(sorted(table, key=lambda e: -e.separating_snr)),

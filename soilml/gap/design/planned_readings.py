@@ -48,7 +48,7 @@ def planned_readings(case: Case, design: Table) -> Readings:
     return Readings.of_every_row(
         at,
         names,
-        reading=np.concatenate(readings),
+        measured=np.concatenate(readings),
         std=np.concatenate(stds),
         noise=[case.noise.get(column(n)) for n in names],
         run=number.astype(np.int64),
@@ -72,7 +72,7 @@ def expected_readings(at: Operating, like: Readings, case: Case, run: str = "nex
     return Readings.of_every_row(
         at,
         like.channels,
-        reading=np.concatenate(readings),
+        measured=np.concatenate(readings),
         std=np.concatenate(stds),
         noise=like.noise,
         runs=(run,),
@@ -100,7 +100,7 @@ def joined_readings(first: Readings, second: Readings) -> Readings:
         order=np.concatenate([first.order, second.order]),
         row=np.concatenate([first.row, second.row + sizes[0]]),
         channel=np.concatenate([first.channel, second.channel]),
-        reading=np.concatenate([first.reading, second.reading]),
+        measured=np.concatenate([first.measured, second.measured]),
         std=np.concatenate([first.std, second.std]),
         from_case=np.concatenate([first.from_case, second.from_case]),
         slip_std=np.concatenate([first.slip_std, second.slip_std]),

@@ -45,7 +45,7 @@ def gap_reduction(
     """
 
     def squares(y: Floats) -> Floats:
-        return np.nan_to_num(((readings.reading - y) / std) ** 2, nan=INFEASIBLE_SQUARE)
+        return np.nan_to_num(((readings.measured - y) / std) ** 2, nan=INFEASIBLE_SQUARE)
 
     old, new = squares(before), squares(after)
     channels = {}
@@ -58,7 +58,7 @@ def gap_reduction(
 
 
 def held_out(
-    problem: FitProblem, soil: MarginalFit, after: MarginalFit, seed: int
+    problem: FitProblem, soil: MarginalFit, shown: MarginalFit, seed: int
 ) -> dict[str, GapReduction]:
     """Cross-validation by runs, and extrapolation to the highest loads.
 
@@ -73,7 +73,7 @@ def held_out(
         name, out = region
         description = f"{name}, predicted from the rest"
         known["held_out_region"] = Folds(description, out.astype(np.int64), np.asarray([1]))
-    return dict(zip(known, _cross_validate(problem, soil, after, [*known.values()]), strict=True))
+    return dict(zip(known, _cross_validate(problem, soil, shown, [*known.values()]), strict=True))
 
 
 def _run_folds(readings: Readings, seed: int) -> Folds | None:
@@ -104,22 +104,22 @@ def held_out_region(readings: Readings) -> tuple[str, NDArray[np.bool_]] | None:
 
 
 def _cross_validate(
-    problem: FitProblem, soil: MarginalFit, after: MarginalFit, all_folds: Sequence[Folds]
+    problem: FitProblem, soil: MarginalFit, shown: MarginalFit, all_folds: Sequence[Folds]
 ) -> list[GapReduction]:
-    """Predict each fold by refits of both models to all readings outside it."""
-    models = [soil] if after is soil else [soil, after]
-    predicted = iter(_predict_folds(problem, [(m, d) for d in all_folds for m in models]))
+    """Predict each fold by both fits, repeated on all readings outside it."""
+    fits = [soil] if shown is soil else [soil, shown]
+    predicted = iter(_predict_folds(problem, [(fit, folds) for folds in all_folds for fit in fits]))
     reductions = []
     for folds in all_folds:
         before = next(predicted)
-        new = before if after is soil else next(predicted)
+        after = before if shown is soil else next(predicted)
         selected = np.isin(folds.fold, folds.predicted)
         reductions.append(
             gap_reduction(
                 problem.readings.subset(selected),
                 problem.covariance.std[selected],
                 before[selected],
-                new[selected],
+                after[selected],
                 folds.description,
             )
         )
@@ -129,7 +129,7 @@ def _cross_validate(
 def _predict_folds(
     problem: FitProblem, wanted: Sequence[tuple[MarginalFit, Folds]]
 ) -> list[Floats]:
-    """Predictions (m,) of each fold by the same model, refitted to all other readings.
+    """Predictions (m,) of each fold by the same fit, repeated to all other readings.
 
     The fits are made beside the same discrepancy, from its optimum. Readings of a fold without a
     fit, and those of other folds, are NaN.
@@ -155,13 +155,13 @@ def _predict_folds(
 
 
 def predict_held_out(
-    problem: FitProblem, soil: Solution, after: Solution, readings: Readings, description: str
+    problem: FitProblem, soil: Solution, shown: Solution, readings: Readings, description: str
 ) -> GapReduction:
     """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
-    old = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
-    new = predict(after.case, after.coordinates, after.x[None, :], readings)[0]
-    std = covariance_at(problem, after, readings).std
-    return gap_reduction(readings, std, old, new, description)
+    before = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
+    after = predict(shown.case, shown.coordinates, shown.x[None, :], readings)[0]
+    std = covariance_at(problem, shown, readings).std
+    return gap_reduction(readings, std, before, after, description)
 
 
 def covariance_at(problem: FitProblem, fit: Solution, readings: Readings) -> Covariance:

@@ -36,7 +36,10 @@ SWEEPS = 2
 
 @dataclass(frozen=True)
 class Evidence:
-    """-2 ln of a marginal posterior probability, up to a constant that all fits share.
+    """Evidence for a fit, at the most probable amplitudes of the discrepancy.
+
+    `value` is -2 ln of the marginal posterior probability, up to a constant that all fits share:
+    the smaller it is, the larger the evidence.
 
     `amplitude` has the amplitudes of the discrepancy by channel, in usual ones, at which the
     evidence is largest. `expected_amplitude` is their root mean square over the probability of each
@@ -138,11 +141,13 @@ class DiscrepancyModel:
         return Evidence(value, amplitude, step, expected)
 
 
-def _linearised(model: DiscrepancyModel, fit: Solution, extra: Floats | None) -> LinearisedFit:
-    whiten = model.noise_whitening
-    added = np.zeros((len(fit.reading), 0)) if extra is None else extra
+def _linearised(
+    discrepancy: DiscrepancyModel, fit: Solution, extra: Floats | None
+) -> LinearisedFit:
+    whiten = discrepancy.noise_whitening
+    added = np.zeros((len(fit.measured), 0)) if extra is None else extra
     jacobian = whiten @ np.column_stack([fit.derivatives, added])
-    block = np.column_stack([jacobian, whiten @ (fit.reading - fit.prediction)])
+    block = np.column_stack([jacobian, whiten @ (fit.measured - fit.prediction)])
     priors = [_prior(c, float(x)) for c, x in zip(fit.coordinates, fit.x, strict=True)]
     precision = [p for p, _, _ in priors]
     k = added.shape[1]
@@ -152,8 +157,8 @@ def _linearised(model: DiscrepancyModel, fit: Solution, extra: Floats | None) ->
     upper = np.asarray([c.upper for c in fit.coordinates])
     movable = (fit.x > lower) & (fit.x < upper)
     return LinearisedFit(
-        divisions=model._divisions,
-        cross=model.columns.T @ block,
+        divisions=discrepancy._divisions,
+        cross=discrepancy.columns.T @ block,
         plain=block.T @ block,
         precision=np.diag([*precision, *np.full(k, WEAK_PRECISION)]) + rates.T @ rates,
         prior_gradient=np.concatenate([[own for _, own, _ in priors], np.zeros(k)])

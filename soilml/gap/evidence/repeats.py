@@ -66,7 +66,7 @@ def repeat_disagreement(
     8b.
     """
     matrix = np.diag(readings.std**2) if covariance is None else covariance
-    value = readings.reading if expected is None else readings.reading - expected
+    value = readings.measured if expected is None else readings.measured - expected
     group_of = readings.replicates
     found = []
     for channel in range(len(readings.channels)):
@@ -147,13 +147,13 @@ def _pair_sentence(readings: Readings, i: int, j: int) -> str:
     """Two readings in words: where they were taken, their values and their difference."""
     names = [readings.runs[readings.run[readings.row[k]]] for k in (i, j)]
     quantity = QUANTITIES[readings.channels[readings.channel[i]]]
-    low, high = sorted((float(readings.reading[i]), float(readings.reading[j])), key=abs)
+    low, high = sorted((float(readings.measured[i]), float(readings.measured[j])), key=abs)
     slip = float(np.mean(readings.slip[[i, j]]))
     load = float(np.mean(readings.load[[i, j]]))
     who = f"run {names[0]} and run {names[1]}"
     if names[0] == names[1]:
         who = f"two rows of run {names[0]}"
-    first, second = readings.reading[i], readings.reading[j]
+    first, second = readings.measured[i], readings.measured[j]
     unit = "" if quantity.unit == "1" else f" {quantity.unit}"
     text = (
         f"{who} at slip {slip:.2f} under {load:.3g} N: {quantity.name.replace('_', ' ')} "

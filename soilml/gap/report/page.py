@@ -1,8 +1,7 @@
 """The report as one self-contained HTML page.
 
-A section consists of a template `section_NAME.html.j2`, which `gap_page.html.j2` includes,
-and, where it needs more than the report itself, a builder in a module of that name; `_content`
-calls it.
+Each section is a template `section_NAME.html.j2`, which `gap_page.html.j2` includes. What it needs
+besides the report, `_content` builds by functions of this module and of those for the figures.
 """
 
 from __future__ import annotations
@@ -34,21 +33,23 @@ from soilml.report.numbers import (
 from soilml.report.page import Provenance, Report, render
 
 
-def page(report: GapReport, model: str, runs: str, origin: Provenance | None = None) -> str:
+def page(
+    report: GapReport, model_name: str, runs_name: str, origin: Provenance | None = None
+) -> str:
     """The report as HTML.
 
-    model, runs: Names of the analysed files.
+    model_name, runs_name: Names of the analysed files.
     origin: The command and its files; by default the call of `soilml.gap.gap` in Python.
     """
     for library in ("jinja2", "matplotlib"):
         need(library, "gap")
     if origin is None:
-        origin = Provenance.of(["gap", model, runs], [])
-    content = {"page": summary(report, model, runs), "origin": origin, **_content(report)}
+        origin = Provenance.of(["gap", model_name, runs_name], [])
+    content = {"page": summary(report, model_name, runs_name), "origin": origin, **_content(report)}
     return render("gap_page.html.j2", "soilml.gap.report", "gap", **content)
 
 
-def summary(report: GapReport, model: str, runs: str) -> Report:
+def summary(report: GapReport, model_name: str, runs_name: str) -> Report:
     """What every report says: question, verdict, warnings, what to do."""
     notation = []
     if report.gap:
@@ -69,7 +70,7 @@ def summary(report: GapReport, model: str, runs: str) -> Report:
     sentence = report.sentence.replace(" -> ", " → ")
     return Report(
         kind="gap",
-        title=f"Gap report: {model} against {runs}",
+        title=f"Gap report: {model_name} against {runs_name}",
         badge=report.status,
         meaning=STATUSES.get(report.status, ""),
         answer=[f"No analysis: {sentence}" if report.status == "bad-data" else sentence],
@@ -89,7 +90,7 @@ def _content(report: GapReport) -> dict[str, Any]:
         "finite": math.isfinite,
         "changed": changed,
         "reasons": report.reasons or (report.sentence,),
-        "after": model_after(report),
+        "shown_model": shown_model(report),
         "known": effect_descriptions(report),
         "bars": gap_bars(report, changed),
         "causes": effect_tables(report),
@@ -138,8 +139,8 @@ def advice(report: GapReport) -> str:
     return _ADVICE.get(report.status, "")
 
 
-def model_after(report: GapReport) -> str:
-    """Description of the model after the analysis."""
+def shown_model(report: GapReport) -> str:
+    """The model whose figures are shown beside those of the soil alone, in words."""
     names = " + ".join(e.name for e in report.effects)
     if report.status == "class":
         return f"with {names}, one of the equally good explanations"
@@ -150,7 +151,8 @@ def model_after(report: GapReport) -> str:
 
 def effect_descriptions(report: GapReport) -> dict[str, str]:
     """One-line descriptions of effects by name, from the model and the catalogue."""
-    models = (report.model.model, *report.model.gears.values())
+    case = report.model
+    models = (case.model, *case.gears.values())
     cards = {e.name: e.about for model in models for e in model.effects}
     cards |= {name: e.about for name, e in EFFECTS.items() if name not in cards}
     return {name: card.text for name, card in cards.items()}

@@ -145,7 +145,7 @@ def _plot_run(
         axes.fill_between(slip, low, high, color=run.colour, alpha=0.18, lw=0)
     else:
         axes.vlines(slip, low, high, color=run.colour, alpha=0.3, lw=5)
-    axes.plot(slip, factor * curves.reading[here], run.marker, color=run.colour, ms=4.6, mew=1.0)
+    axes.plot(slip, factor * curves.measured[here], run.marker, color=run.colour, ms=4.6, mew=1.0)
 
 
 def _plot_residuals(
@@ -157,7 +157,7 @@ def _plot_residuals(
     for y, colour, marker in ((curves.before, BEFORE, "x"), (curves.after, AFTER, "o")):
         if marker == "x" and not changed:
             continue
-        residual = (curves.reading[here] - y[here]) / curves.std[here]
+        residual = (curves.measured[here] - y[here]) / curves.std[here]
         size, edge = (3.4, 0.0) if marker == "o" else (4.5, 1.1)
         axes.plot(curves.slip[here], residual, marker, color=colour, ms=size, mew=edge)
         finite = np.abs(residual[np.isfinite(residual)])

@@ -123,7 +123,7 @@ class ReadingsAndPredictions:
     run: tuple[str, ...]  # of each reading
     slip: Floats
     load: Floats
-    reading: Floats
+    measured: Floats
     std: Floats
     before: Floats
     after: Floats

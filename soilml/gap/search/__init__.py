@@ -1,1 +1,1 @@
-"""Search for missing effects: candidate fits, stepwise selection, cross-validation, verdict."""
+"""Search for missing effects: candidate fits, stepwise selection and posterior probabilities."""

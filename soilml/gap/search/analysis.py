@@ -152,7 +152,7 @@ def _reestimate_covariance(
             problem.discrepancy.process.columns[:, declared],
         ]
     )
-    residual = readings.reading - fit.prediction
+    residual = readings.measured - fit.prediction
     columns = run_effect_columns(case, readings)
 
     # noise that is a fraction of the reading is evaluated at a smoothed prediction

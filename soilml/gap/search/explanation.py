@@ -86,10 +86,10 @@ def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) ->
     beside a large one, a fit can stay where the effect is not needed. Sets that the
     model refuses are left out.
     """
-    none = np.zeros(len(problem.readings.channels))
+    no_discrepancy = np.zeros(len(problem.readings.channels))
     beside = [(_started(problem, r.names, r.start), r.amplitude) for r in requests]
     alone = [
-        (_started(problem, r.names, r.noise_start), none)
+        (_started(problem, r.names, r.noise_start), no_discrepancy)
         for r in requests
         if r.noise_start is not None
     ]
@@ -120,12 +120,12 @@ def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFi
 def fit_shapes(problem: FitProblem, candidates: Sequence[Explanation]) -> list[Explanation]:
     """The candidates with the shape coefficients of their effects estimated as well."""
     started, index = [], []
-    none = np.zeros(len(problem.readings.channels))
+    no_discrepancy = np.zeros(len(problem.readings.channels))
     for i, candidate in enumerate(candidates):
         shapes = problem.shape_coordinates(candidate.names)
         first = [(candidate.catalogue_law.fit, candidate.amplitude)]
         if candidate.noise_only is not None:
-            first.append((candidate.noise_only, none))
+            first.append((candidate.noise_only, no_discrepancy))
         for fit, amplitude in first if shapes else []:
             coordinates = [*fit.coordinates, *shapes]
             started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))

@@ -112,17 +112,17 @@ def _smallest(candidates: Sequence[Explanation]) -> tuple[Explanation, ...]:
 
 
 def posterior(
-    candidates: Sequence[Explanation], predicted: Mapping[str, float], none: Explanation
+    candidates: Sequence[Explanation], predicted: Mapping[str, float], soil_alone: Explanation
 ) -> Posterior:
     """Posterior probabilities of the candidates and of effects that were not fitted in full.
 
     predicted: Predicted decrease of the objective by each single effect.
-    none: The soil alone.
+    soil_alone: The soil alone, beside a smooth discrepancy.
     """
     objectives = {c.names: c.objective for c in candidates}
     for name, gain in predicted.items():
         if np.isfinite(gain):  # else its signature is that of rows without an equilibrium
-            objectives.setdefault((name,), none.objective - gain)
+            objectives.setdefault((name,), soil_alone.objective - gain)
     logs = {names: -0.5 * TEMPERING * value for names, value in objectives.items()}
     total = float(np.logaddexp.reduce(list(logs.values())))
     return Posterior({names: value - total for names, value in logs.items()})

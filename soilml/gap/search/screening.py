@@ -14,16 +14,16 @@ from soilml.numerics.subspaces import ROUNDING, project_out
 
 
 def predicted_with_and_without(
-    problem: FitProblem, none: Explanation, soil: Solution, signatures: Sequence[Signature]
+    problem: FitProblem, soil_alone: Explanation, soil: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """The larger of the gains predicted from the fit under a discrepancy, and under noise alone.
 
     A discrepancy of large amplitude can hide an effect that explains nearly everything.
     """
-    plain = MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
+    plain = MarginalFit(soil, problem.discrepancy.evidence(soil, soil_alone.amplitude))
     with_discrepancy, without = (
-        predicted_gains(problem, Explanation((), fit), none.objective, signatures)
-        for fit in (none.best, plain)
+        predicted_gains(problem, Explanation((), fit), soil_alone.objective, signatures)
+        for fit in (soil_alone.best, plain)
     )
     return {name: max(gain, without[name]) for name, gain in with_discrepancy.items()}
 
@@ -102,7 +102,7 @@ Starts = Mapping[tuple[str, ...], Explanation]
 
 def effects_to_fit(
     problem: FitProblem,
-    none: Explanation,
+    soil_alone: Explanation,
     soil: Solution,
     signatures: Sequence[Signature],
     gains: Mapping[str, float],
@@ -114,12 +114,14 @@ def effects_to_fit(
     the law of the cause may be another one. Several predictions are therefore made, and the best of
     each are selected, together with those that were within reach of the best in an earlier search.
 
-    none, soil: The soil alone, beside a discrepancy and under noise alone.
+    soil_alone, soil: The soil alone, beside a discrepancy and under noise alone.
     gains: Predicted decrease of the objective by each effect.
     """
     selected = _largest_gains(gains)
-    ranked = [_first(free_law_gains(problem, none, f, signatures)) for f in (none.fit, soil)]
-    if float(none.amplitude.max()) >= LARGE_DISCREPANCY:
+    ranked = [
+        _first(free_law_gains(problem, soil_alone, f, signatures)) for f in (soil_alone.fit, soil)
+    ]
+    if float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY:
         ranked.append(_first(noise_only_gains(problem, soil, signatures), FITTED_HIDDEN))
     lowest = min((c.objective for c in starts.values()), default=0.0)
     single = [c for names, c in starts.items() if len(names) == 1]

@@ -80,13 +80,13 @@ class SearchResult:
         return self.final_test.p_value >= LACK_OF_FIT_LEVEL
 
     @property
-    def none(self) -> Explanation | None:
+    def soil_alone(self) -> Explanation | None:
         """The soil alone beside a smooth discrepancy; None where no gap was searched."""
         return next((c for c in self.candidates if not c.names), None)
 
     @property
     def likeliest(self) -> Explanation | None:
-        """The candidate with effects of the largest evidence; None where no gap was searched."""
+        """The most probable candidate with effects, by its objective; None without a search."""
         return next((c for c in self.candidates if c.names), None)
 
 
@@ -129,11 +129,11 @@ def search(
     if soil_test.p_value >= GAP_LEVEL:
         return without_search(soil, soil_test, untestable)
     progress(1 / STEPS)
-    none = _soil_alone(problem, soil, starts)
-    gains = predicted_with_and_without(problem, none, soil, signatures)
-    fitted: dict[tuple[str, ...], Explanation] = {(): none}
-    selected = effects_to_fit(problem, none, soil, signatures, gains=gains, starts=starts)
-    level = _fit_level(problem, soil, none, {(n,): none for n in selected}, starts)
+    soil_alone = _fit_soil_alone(problem, soil, starts)
+    gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
+    fitted: dict[tuple[str, ...], Explanation] = {(): soil_alone}
+    selected = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+    level = _fit_level(problem, soil, soil_alone, {(n,): soil_alone for n in selected}, starts)
     fitted |= {c.names: c for c in level}
     for effects in range(1, MAX_EFFECTS):
         progress((1 + effects) / STEPS)
@@ -142,12 +142,12 @@ def search(
             break
         lowest = best.objective
         extensions = _extensions(problem, level, fitted, lowest)
-        level = _fit_level(problem, soil, none, extensions, starts)
+        level = _fit_level(problem, soil, soil_alone, extensions, starts)
         fitted |= {c.names: c for c in level}
         if not level or min(c.objective for c in level) > lowest - MIN_IMPROVEMENT:
             break
     candidates = tuple(sorted(fitted.values(), key=lambda c: c.objective))
-    found = posterior(candidates, gains, none)
+    found = posterior(candidates, gains, soil_alone)
     accepted = explanations(candidates, found)
     return SearchResult(
         soil=soil,
@@ -161,7 +161,7 @@ def search(
     )
 
 
-def _soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Explanation:
+def _fit_soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Explanation:
     """The empty set of effects: the soil alone with a smooth discrepancy."""
     start, amplitude = soil.start_values(), np.ones(len(problem.readings.channels))
     if () in starts:
@@ -176,7 +176,7 @@ def _soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Explanat
 def _fit_level(
     problem: FitProblem,
     soil: Solution,
-    none: Explanation,
+    soil_alone: Explanation,
     sets: Mapping[tuple[str, ...], Explanation],
     starts: Starts,
 ) -> list[Explanation]:
@@ -184,12 +184,12 @@ def _fit_level(
 
     Beside a large discrepancy, single effects are fitted under noise alone first.
     """
-    hidden = float(none.amplitude.max()) >= LARGE_DISCREPANCY
+    hidden = float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY
     single = all(not base.names for base in sets.values())
     requests = []
     for names, base in sets.items():
         base = starts.get(names, base)
-        smaller = np.minimum(base.amplitude, none.amplitude)
+        smaller = np.minimum(base.amplitude, soil_alone.amplitude)
         noise_start = None
         if hidden and single:
             alone = base.noise_only
@@ -199,7 +199,7 @@ def _fit_level(
     fitted = fit_candidates(problem, requests)
     if not fitted:
         return []
-    lowest = min(none.objective, *(c.objective for c in fitted))
+    lowest = min(soil_alone.objective, *(c.objective for c in fitted))
     promising = [
         c
         for c in fitted

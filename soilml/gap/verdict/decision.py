@@ -75,10 +75,10 @@ def decide(
     if is_left_open(result):
         return Decision("undecided", (), None)
     if naming_obstacles:
-        if not _likelier_than_none(result, SUSPECT_MARGIN):
+        if not _likelier_than_soil_alone(result, SUSPECT_MARGIN):
             return Decision("not-testable", (), None)
         return Decision("suspected", (), _first_suspect(result))
-    suspects = _likelier_than_none(result)
+    suspects = _likelier_than_soil_alone(result)
     accepted = result.accepted
     if not accepted or () in {c.names for c in accepted}:
         if not suspects:
@@ -110,17 +110,17 @@ def decide(
 
 def _large_remainder(problem: FitProblem, result: SearchResult, best: Explanation) -> str:
     """The channel with a large remainder beside an explanation of little evidence, or empty."""
-    none, worst = result.none, int(np.argmax(best.amplitude))
-    if none is None or none.objective >= best.objective + DECISIVE_GAIN:
+    soil_alone, worst = result.soil_alone, int(np.argmax(best.amplitude))
+    if soil_alone is None or soil_alone.objective >= best.objective + DECISIVE_GAIN:
         return ""
     name = problem.readings.channels[worst]
     return name if best.amplitude[worst] >= LARGE_REMAINDER else ""
 
 
-def _likelier_than_none(result: SearchResult, margin: float = 0.0) -> bool:
+def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool:
     """Whether an effect describes the data better than the soil alone beside its discrepancy."""
-    likeliest, none = result.likeliest, result.none
-    return bool(likeliest and none and likeliest.objective < none.objective + margin)
+    likeliest, soil_alone = result.likeliest, result.soil_alone
+    return bool(likeliest and soil_alone and likeliest.objective < soil_alone.objective + margin)
 
 
 def _first_suspect(result: SearchResult) -> Explanation | None:
@@ -138,10 +138,10 @@ def is_left_open(result: SearchResult) -> bool:
 
     The readings then scatter in a way that the estimated noise does not describe.
     """
-    none, likeliest = result.none, result.likeliest
-    if not result.has_gap or none is None or np.any(none.amplitude > 0.0):
+    soil_alone, likeliest = result.soil_alone, result.likeliest
+    if not result.has_gap or soil_alone is None or np.any(soil_alone.amplitude > 0.0):
         return False
-    return likeliest is None or none.objective <= likeliest.objective
+    return likeliest is None or soil_alone.objective <= likeliest.objective
 
 
 def with_refused_outside(result: SearchResult) -> SearchResult:
@@ -226,7 +226,7 @@ def law_matters(problem: FitProblem, candidate: Explanation) -> bool:
     difference = free.fit.prediction - candidate.catalogue_law.fit.prediction
     for i in range(len(readings.channels)):
         in_channel = readings.channel == i
-        values = readings.reading[in_channel]
+        values = readings.measured[in_channel]
         if not values.size:
             continue
         rms = float(np.sqrt(np.mean(difference[in_channel] ** 2)))

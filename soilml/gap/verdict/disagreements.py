@@ -107,7 +107,7 @@ def _region(problem: FitProblem, soil: Solution) -> list[Remark]:
         text = f"the region {name} cannot be predicted: no fit to the other rows carries its loads"
         return [Remark("region-not-predicted", text)]
     jacobian = found.jacobian[out]
-    residual = (problem.readings.reading - found.prediction)[out]
+    residual = (problem.readings.measured - found.prediction)[out]
     if not (np.isfinite(jacobian).all() and np.isfinite(residual).all()):
         text = f"a fit to the rows outside {name} has no equilibrium inside it"
         return [Remark("region-not-predicted", text)]

@@ -44,24 +44,26 @@ NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is
 
 
 def gap_reductions(
-    analysis: Analysis, soil: MarginalFit, after: MarginalFit, seed: int
+    analysis: Analysis, soil: MarginalFit, shown: MarginalFit, seed: int
 ) -> dict[str, GapReduction]:
     """Figures of the fitted rows and of cross-validation, as far as the runs allow it.
 
-    Before is the soil alone, fitted under noise and scatter; after is the explanation shown.
+    Before: the soil alone, fitted under noise and scatter. After: the explanation `shown`.
     """
     problem = analysis.problem
     std = problem.covariance.std
-    before, new = soil.fit.prediction, after.fit.prediction
-    fitted = gap_reduction(problem.readings, std, before, new, "all rows fitted")
-    return {"train": fitted, **held_out(problem, soil, after, seed)}
+    before, after = soil.fit.prediction, shown.fit.prediction
+    fitted = gap_reduction(problem.readings, std, before, after, "all rows fitted")
+    return {"train": fitted, **held_out(problem, soil, shown, seed)}
 
 
 def soil_marginal(analysis: Analysis) -> MarginalFit:
     """The soil alone under noise and scatter, without any discrepancy."""
     soil = analysis.result.soil
-    none = np.zeros(len(analysis.problem.readings.channels))
-    return MarginalFit(soil, Evidence(soil.objective, none, np.zeros(len(soil.x)), none))
+    no_discrepancy = np.zeros(len(analysis.problem.readings.channels))
+    return MarginalFit(
+        soil, Evidence(soil.objective, no_discrepancy, np.zeros(len(soil.x)), no_discrepancy)
+    )
 
 
 def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:
@@ -71,15 +73,15 @@ def soil_beside_discrepancy(analysis: Analysis) -> MarginalFit:
     go wherever the rest looks smoothest; it then stays where noise and scatter alone put it, as it
     does where no gap was found.
     """
-    problem, none = analysis.problem, analysis.result.none
-    if none is None:
+    problem, soil_alone = analysis.problem, analysis.result.soil_alone
+    if soil_alone is None:
         return MarginalFit(analysis.result.soil, problem.discrepancy.evidence(analysis.result.soil))
-    if not none.amplitude.any():
+    if not soil_alone.amplitude.any():
         return soil_marginal(analysis)
-    if none.amplitude.max() < AMPLITUDES[-1]:
-        return none.best
+    if soil_alone.amplitude.max() < AMPLITUDES[-1]:
+        return soil_alone.best
     soil = analysis.result.soil
-    return MarginalFit(soil, problem.discrepancy.evidence(soil, none.amplitude))
+    return MarginalFit(soil, problem.discrepancy.evidence(soil, soil_alone.amplitude))
 
 
 #: Codes of the verdicts on candidates, where a cause is claimed and where none is, in words.
@@ -94,7 +96,7 @@ _VERDICTS = {
 def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateSummary]:
     """All fitted candidates, the best first; `claimed`: whether the report claims a cause."""
     result = analysis.result
-    if result.none is None:
+    if result.soil_alone is None:
         return []
     lowest = min((c.objective for c in result.candidates if c.names), default=0.0)
     accepted = {c.names for c in result.accepted}
@@ -115,7 +117,7 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
             CandidateSummary(
                 effects=c.names,
                 predicted_gain=result.predicted_gain.get(c.names[0], 0.0) if single else np.nan,
-                achieved_gain=result.none.objective - c.objective,
+                achieved_gain=result.soil_alone.objective - c.objective,
                 excess=c.objective - lowest,
                 verdict=Remark(code, _VERDICTS[code][0 if claimed else 1], c.names, "note"),
             )
@@ -154,11 +156,11 @@ def competing_explanations(analysis: Analysis) -> list[Explanation]:
 
 
 def analysis_notes(
-    analysis: Analysis, after: Solution, shown: Solution, replicates: Sequence[Remark]
+    analysis: Analysis, written: Solution, shown: Solution, replicates: Sequence[Remark]
 ) -> list[Remark]:
     """Notes on outliers, estimates at a bound, sizes, repeats, noise and run-to-run variation.
 
-    `after` is the fit that model.toml contains, `shown` that of the explanation whose figures are
+    `written` is the fit that model.toml contains, `shown` that of the explanation whose figures are
     shown; `replicates` says which repeats disagree.
     """
     readings = analysis.problem.readings
@@ -182,7 +184,7 @@ def analysis_notes(
         )
         for text in far
     ]
-    notes += _bound_notes(after.coordinates, after.x.tolist())
+    notes += _bound_notes(written.coordinates, written.x.tolist())
     notes += size_notes(shown.coordinates, shown.x.tolist())
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
@@ -248,22 +250,22 @@ def variance_component_entries(analysis: Analysis) -> dict[str, float]:
     }
 
 
-def readings_and_predictions(analysis: Analysis, after: Solution) -> ReadingsAndPredictions:
-    """Readings, predictions before and after, and the standard deviations of both."""
+def readings_and_predictions(analysis: Analysis, shown: Solution) -> ReadingsAndPredictions:
+    """Readings, predictions by the soil alone and by the fit `shown`, and standard deviations."""
     problem, readings = analysis.problem, analysis.problem.readings
-    jacobian = after.derivatives
-    variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
-    prediction = predict(after.case, after.coordinates, after.x[None, :], readings)[0]
+    jacobian = shown.derivatives
+    variance = np.einsum("ij,jk,ik->i", jacobian, shown.covariance, jacobian)
+    after = predict(shown.case, shown.coordinates, shown.x[None, :], readings)[0]
     return ReadingsAndPredictions(
         channels=tuple(column(n) for n in readings.channels),
         channel=readings.channel,
         run=tuple(readings.runs[readings.run[r]] for r in readings.row),
         slip=readings.slip,
         load=readings.load,
-        reading=readings.reading,
+        measured=readings.measured,
         std=problem.covariance.std,
         before=analysis.result.soil.prediction,
-        after=prediction,
+        after=after,
         after_std=np.sqrt(np.maximum(variance, 0.0)),
     )
 

@@ -48,7 +48,7 @@ def posterior_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Floats:
     if not np.any(amplitude > 0.0):
         return np.zeros(len(problem.readings))
     whiten = problem.discrepancy.whiten(amplitude)
-    residual = problem.readings.reading - marginal.fit.prediction
+    residual = problem.readings.measured - marginal.fit.prediction
     weighted = (whiten @ process.columns).T @ (whiten @ residual)
     return np.asarray(process.columns @ (amplitude[process.channel] ** 2 * weighted))
 
@@ -154,7 +154,7 @@ def discrepancy_map(problem: FitProblem, fit: Solution, seed: int) -> list[Regio
         degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
         seed=seed,
     )
-    standardised = (problem.readings.reading - fit.prediction) / std
+    standardised = (problem.readings.measured - fit.prediction) / std
     found = []
     for i in np.argsort(-test.z):
         region, z = parts[i], float(test.z[i])

@@ -41,8 +41,8 @@ def test_noise_is_added_once():
     extra = 0.3 * readings.std
     once = readings.with_noise_of_operation(extra)
     assert once.std == pytest.approx(np.hypot(readings.std, extra))
-    again = once.with_noise_at(readings.reading).with_noise_of_operation(extra)
-    fresh = readings.with_noise_at(readings.reading).with_noise_of_operation(extra)
+    again = once.with_noise_at(readings.measured).with_noise_of_operation(extra)
+    fresh = readings.with_noise_at(readings.measured).with_noise_of_operation(extra)
     assert again.std == pytest.approx(fresh.std, rel=1e-12)
     own = np.arange(len(readings)) % 3 == 0
     assert once.subset(own).sensor_std == pytest.approx(readings.std[own])

@@ -182,7 +182,7 @@ def test_the_log_density_is_that_of_a_normal_with_noise_and_shared_errors(case):
     known = replace(case, discrepancy={"torque_Nm": wide}, noise={"torque_Nm": Noise(0.01, 0.05)})
     data = rows_of(case, shared_errors={"torque_gain": 0.1, "slip_bias": 0.02})
     noise = known.noise["torque_Nm"]
-    std = np.where(data.channel == 0, noise.std(data.reading), data.std)
+    std = np.where(data.channel == 0, noise.std(data.measured), data.std)
     data = replace(data, std=std, noise=(noise, None))
     density = PosteriorDensity(known, data, select_free(known, None), noise_scale=1.5)
     assert density.errors == 1
@@ -197,14 +197,14 @@ def test_the_log_density_is_that_of_a_normal_with_noise_and_shared_errors(case):
         gain = np.where(np.arange(7) < 4, 0.1 * prediction, 0.0)
         covariance += np.outer(gain, gain)
         log = multivariate_normal(np.zeros(7), 1.5**2 * covariance).logpdf(
-            prediction - data.reading
+            prediction - data.measured
         )
         error = 8.0 * (one[3] - 0.5)
         expected.append(log - 0.5 * error**2 / 1.5**2)
     found = density(u)
     np.testing.assert_allclose(found - found[0], np.asarray(expected) - expected[0], rtol=2e-3)
     part = density.of_rows(np.asarray([1, 2]))
-    assert len(part.reading) == 2 + 2 + 1 and part.columns[0].shape[0] == 2
+    assert len(part.measured) == 2 + 2 + 1 and part.columns[0].shape[0] == 2
     assert density(np.zeros((0, 4))).shape == (0,)
     with pytest.raises(FitError, match=r"needs the noise of sinkage_m: .*sinkage_m = '3 %'"):
         undeclared = replace(data, std=np.where(data.channel == 1, np.nan, data.std))
@@ -238,7 +238,7 @@ def test_standard_deviations_of_a_table_stand_before_those_of_the_case(case):
     assert data.row_count == data.reading_count == 4 and data.squares_within == 0.0
     assert data.from_case.tolist() == [False, True, False, False]
     part = data.of_rows(np.asarray([0, 2]))[1]
-    assert part.row_slip.tolist() == [0.1, 0.5] and part.reading.tolist() == [1.0, 3.0]
+    assert part.row_slip.tolist() == [0.1, 0.5] and part.measured.tolist() == [1.0, 3.0]
     zeros = Table(columns | {"torque_Nm_std": np.zeros(4)})
     with pytest.raises(FitError, match="row 1, column torque_Nm: standard deviation 0"):
         usable_readings(replace(case, noise={}), zeros)

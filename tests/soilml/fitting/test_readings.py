@@ -36,7 +36,7 @@ def test_finite_readings_are_stacked_by_channel():
     assert found.channels == ("torque", "sinkage") and len(found) == 8
     assert found.row.tolist() == [0, 1, 3, 4, 0, 1, 2, 3]
     assert found.channel.tolist() == [0] * 4 + [1] * 4
-    assert found.reading.tolist() == [1.0, 2.0, 4.0, 5.0, 0.01, 0.02, 0.03, 0.04]
+    assert found.measured.tolist() == [1.0, 2.0, 4.0, 5.0, 0.01, 0.02, 0.03, 0.04]
     assert (found.runs, found.run.tolist()) == (("a", "b"), [1, 0, 1, 0, 0])
     assert found.order.tolist() == [1, 2, 0, 0, 1]  # by time within a run
     assert found.slip.tolist() == [0.1, 0.2, 0.4, 0.5, 0.1, 0.2, 0.3, 0.4]
@@ -86,9 +86,9 @@ def test_noise_that_is_not_positive_is_not_declared():
     assert found.slip_std.tolist() == [0.01, 0.02, 0.0, 0.03, 0.05]
     assert typical_std(found.slip_std) == pytest.approx(0.025)  # the median of those above zero
     assert not found.load_std.any() and typical_std(found.load_std) == 0.0
-    elsewhere = found.noise_at(2.0 * found.reading)
+    elsewhere = found.noise_at(2.0 * found.measured)
     assert elsewhere[:4] == pytest.approx(found.std[:4], nan_ok=True)
-    assert elsewhere[4:] == pytest.approx(noise["sinkage_m"].std(2.0 * found.reading[4:]))
+    assert elsewhere[4:] == pytest.approx(noise["sinkage_m"].std(2.0 * found.measured[4:]))
     usual = found.with_default_std({"torque": 0.7})
     assert usual.std[:4] == pytest.approx([0.1, 0.7, 0.7, 0.5])
     assert usual.std[4:].tolist() == found.std[4:].tolist()
@@ -99,7 +99,7 @@ def test_noise_is_that_of_expected_values_and_never_nothing():
     found = stack_readings(case, driven(case))
     noise = case.noise["torque_Nm"]
     torque = found.channel == found.channels.index("torque")
-    expected = 2.0 * found.reading
+    expected = 2.0 * found.measured
     expected[0] = 0.0
     other = replace(noise, share=3.0 * noise.share)
     std = replace(found, noise=(noise, other, other)).with_noise_at(expected).std
@@ -124,7 +124,7 @@ def test_a_channel_of_unknown_noise_is_left_out_with_a_note():
     assert kept.channels == (found.channels[0], found.channels[2])
     assert kept.noise == (found.noise[0], found.noise[2])
     assert set(kept.channel[:32]) == {0} and set(kept.channel[32:]) == {1}
-    assert kept.reading.tolist() == found.reading[found.channel != 1].tolist()
+    assert kept.measured.tolist() == found.measured[found.channel != 1].tolist()
     assert note.code == "unused-channel"
     assert note.text.startswith("drawbar_pull_N is excluded: its noise is not declared")
     nothing = replace(found, std=np.full(len(found), np.nan))
@@ -137,7 +137,7 @@ def test_readings_of_some_rows_are_numbered_anew():
     at = replace(found.at, slip=np.asarray(found.at.slip)[rows], load=np.asarray([80.0, 50.0]))
     selected, part = found.of_rows(rows, at)
     assert np.flatnonzero(selected).tolist() == [1, 3, 5]
-    assert part.reading.tolist() == [2.0, 5.0, 0.02] and part.row.tolist() == [1, 0, 1]
+    assert part.measured.tolist() == [2.0, 5.0, 0.02] and part.row.tolist() == [1, 0, 1]
     assert part.load.tolist() == [50.0, 80.0, 50.0] and part.run.tolist() == [0, 0]
     assert part.order.tolist() == [1, 2] and part.slip_std.tolist() == [0.05, 0.02]
 
@@ -175,4 +175,4 @@ def test_noise_in_the_model_is_that_of_the_readings():
     found = stack_readings(case, driven(case))
     for i, name in enumerate(("torque_Nm", "drawbar_pull_N", "sinkage_m")):
         here = found.channel == i
-        assert found.std[here] == pytest.approx(case.noise[name].std(found.reading[here]))
+        assert found.std[here] == pytest.approx(case.noise[name].std(found.measured[here]))

@@ -230,7 +230,7 @@ def test_the_map_of_the_gap_has_the_side_of_the_readings(problem):
     soil = problem.fit_soil([np.full(3, 0.5)])
     found = discrepancy_map(problem, soil, 0)
     std = problem.covariance.std
-    standardised = (problem.readings.reading - soil.prediction) / std
+    standardised = (problem.readings.measured - soil.prediction) / std
     sizes = [abs(d.z) for d in found]
     assert sizes == sorted(sizes, reverse=True) and len(found) > 3
     worst = found[0]

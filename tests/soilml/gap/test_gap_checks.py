@@ -43,7 +43,7 @@ def test_only_planted_outliers_are_detected():
     space = np.column_stack(
         [np.linalg.solve(problem.covariance.whiten, soil.jacobian), smooth_basis(problem.readings)]
     )
-    residual = problem.readings.reading - soil.prediction
+    residual = problem.readings.measured - soil.prediction
     assert not outliers(problem.covariance, residual, space).any()
     struck = np.isin(np.arange(len(residual)), (9, 50, 77))
     far = residual + np.where(struck, 9.0, 0.0) * problem.covariance.std
@@ -55,7 +55,7 @@ def test_a_reading_that_a_repeat_confirms_is_no_outlier(both):
     case = case_of()
     problem = fit_problem(case, driven(case, loads=(40.0, 40.0, 60.0, 90.0, 140.0), seed=4))
     soil = problem.fit_soil([np.full(3, 0.5)])
-    residual = problem.readings.reading - soil.prediction
+    residual = problem.readings.measured - soil.prediction
     space = np.linalg.solve(problem.covariance.whiten, soil.jacobian)
     struck = np.isin(np.arange(len(residual)), (3, 11) if both else (3,))  # runs 0 and 1
     far = residual + np.where(struck, 9.0, 0.0) * problem.covariance.std
@@ -70,7 +70,7 @@ def test_a_repeat_that_strays_to_the_other_side_confirms_nothing():
     case = case_of()
     problem = fit_problem(case, driven(case, loads=(40.0, 40.0, 60.0, 90.0, 140.0), seed=4))
     soil = problem.fit_soil([np.full(3, 0.5)])
-    far = problem.readings.reading - soil.prediction
+    far = problem.readings.measured - soil.prediction
     far[3] += 9.0 * problem.covariance.std[3]
     far[11] -= 9.0 * problem.covariance.std[11]
     space = np.linalg.solve(problem.covariance.whiten, soil.jacobian)

@@ -88,7 +88,7 @@ def test_a_region_that_the_rest_does_not_predict_is_stated(sound):
     heavy = readings.load >= 139.0
     for sigma, fails in ((3.0, True), (0.3, False)):
         off = np.where(heavy, sigma * readings.std, 0.0) * np.where(readings.channel == 2, -1, 1)
-        moved = replace(problem, readings=replace(readings, reading=readings.reading + off))
+        moved = replace(problem, readings=replace(readings, measured=readings.measured + off))
         found = disagreements._region(moved, soil)
         assert len(found) == fails
         if fails:

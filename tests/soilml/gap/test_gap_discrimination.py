@@ -206,7 +206,7 @@ def test_expected_readings_have_the_noise_of_the_channel_or_its_typical_one():
     found = expected_readings(at, like, case)
     case.noise["drawbar_pull_N"] = plain
     force = case.model(case.soil, at)
-    assert found.reading == pytest.approx([*force.torque, *force.drawbar_pull, *force.sinkage])
+    assert found.measured == pytest.approx([*force.torque, *force.drawbar_pull, *force.sinkage])
     typical = np.median(readings.std[readings.channel == 1])
     assert found.std == pytest.approx(
         [*(0.01 * np.abs(force.torque)), typical, typical, *(0.01 * np.abs(force.sinkage))]

@@ -150,7 +150,7 @@ def test_figures_are_those_of_the_suspect_that_is_listed_first():
         has_gap=True,
         candidates=ordered,
         likeliest=ordered[0],
-        none=sets[0],
+        soil_alone=sets[0],
         posterior=Posterior(weights),
         accepted=ordered[:1],
     )
@@ -204,7 +204,7 @@ def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
         result = SimpleNamespace(
             has_gap=True,
             adequate=False,
-            none=none,
+            soil_alone=none,
             likeliest=best,
             accepted=(best,),
             candidates=(best, none),

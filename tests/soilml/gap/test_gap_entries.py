@@ -62,7 +62,7 @@ def analysed(*candidates, accepted=(), runs=("a", "b"), weights=None, outliers=(
         soil=soil,
         candidates=candidates,
         accepted=accepted,
-        none=next((c for c in candidates if not c.names), None),
+        soil_alone=next((c for c in candidates if not c.names), None),
         posterior=Posterior(weights or {}),
         has_gap=False,
     )

@@ -27,7 +27,7 @@ def test_an_omitted_effect_moves_the_soil_as_a_fit_to_changed_readings_does(prob
     small = int(np.argmin(np.abs(spread.offset["friction_angle"][1:]))) + 1
     changed = replace(
         problem.readings,
-        reading=problem.readings.reading
+        measured=problem.readings.measured
         + np.sign(signature.sign or 1) * SIZES[0] * signature.column,
     )
     moved = replace(problem, readings=changed).fit_soil([soil.x])

@@ -36,7 +36,7 @@ def test_the_process_has_the_stated_covariance(problem):
     assert columns @ columns.T == pytest.approx(0.09 * kernel, abs=0.002 * 0.09)
     other = process.columns[~own][:, process.channel == readings.channels.index("torque")]
     assert np.all(other == 0.0)
-    span = readings.reading[own].max()  # positive, so that the range from zero is the largest
+    span = readings.measured[own].max()  # positive, so that the range from zero is the largest
     assert discrepancy_process(readings, {}).usual[0] == pytest.approx(0.02 * span)
 
 
@@ -72,7 +72,7 @@ def test_the_evidence_is_that_of_dense_algebra(problem, soil):
     def dense(amplitude):
         matrix = problem.discrepancy.matrix(amplitude)
         inverse = np.linalg.inv(matrix)
-        residual = soil.reading - soil.prediction
+        residual = soil.measured - soil.prediction
         h = soil.derivatives.T @ inverse @ soil.derivatives + UNIFORM_PRECISION * np.eye(3)
         inside = (soil.x > 0.0) & (soil.x < 1.0)  # coordinates at a bound stay there
         slope = soil.derivatives.T @ inverse @ residual

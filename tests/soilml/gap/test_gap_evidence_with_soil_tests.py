@@ -47,7 +47,7 @@ def test_a_test_of_the_soil_is_a_residual_of_the_evidence(tested):
     assert abs(d[0]) > 0.4
     matrix = problem.discrepancy.matrix(found.amplitude)
     inverse = np.linalg.inv(matrix)
-    residual = soil.reading - soil.prediction
+    residual = soil.measured - soil.prediction
     h = soil.derivatives.T @ inverse @ soil.derivatives + rates.T @ rates
     h += UNIFORM_PRECISION * np.eye(3)
     slope = soil.derivatives.T @ inverse @ residual - rates.T @ d

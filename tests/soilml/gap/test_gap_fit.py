@@ -32,7 +32,7 @@ def test_a_soil_without_noise_is_recovered_from_a_far_start(clean):
     for path, value in found.values().items():
         true = float(getattr(clean.case.soil, path))
         assert abs(value - true) < 0.2 * found.stds()[path]
-    np.testing.assert_allclose(found.prediction, clean.readings.reading, rtol=2e-3, atol=2e-3)
+    np.testing.assert_allclose(found.prediction, clean.readings.measured, rtol=2e-3, atol=2e-3)
 
 
 def test_a_fit_stops_at_the_bounds_of_the_prior(clean):
@@ -55,7 +55,7 @@ def test_a_prior_on_a_size_shrinks_it_towards_zero(clean):
     loose, tight = (replace(offset, normal_std=std * offset.prior.upper) for std in (10.0, 1e-3))
     readings = replace(
         clean.readings,
-        reading=clean.readings.reading * np.where(clean.readings.channel == 0, 1.03, 1.0),
+        measured=clean.readings.measured * np.where(clean.readings.channel == 0, 1.03, 1.0),
     )
     sizes = []
     for coordinate in (loose, tight):
@@ -91,7 +91,7 @@ def test_a_signature_is_what_the_effect_does_per_reference_size(clean, name):
         {n: np.asarray(getattr(force, n)) for n in clean.readings.channels}
     )
     np.testing.assert_allclose(
-        found.column, 2.0 * (moved - clean.readings.reading), rtol=1e-6, atol=1e-9
+        found.column, 2.0 * (moved - clean.readings.measured), rtol=1e-6, atol=1e-9
     )
     assert found.kind == about.kind
 

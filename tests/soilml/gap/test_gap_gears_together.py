@@ -148,7 +148,7 @@ def test_runs_to_add_name_the_gear_to_drive():
     new = expected_readings(lugged.at, request.readings, request.case)
     own = request.case.of_gear("lugged")
     at = replace(new.at, gear=None)
-    torque = new.reading[new.channel == new.channels.index("torque")]
+    torque = new.measured[new.channel == new.channels.index("torque")]
     np.testing.assert_array_equal(torque, own.model(own.soil, at).torque)
     joined = joined_readings(request.readings, new)
     assert list(joined.at.gear) == [*request.readings.at.gear, *lugged.at.gear]

@@ -16,8 +16,8 @@ def test_a_gap_is_the_mean_square_over_noise_by_channel():
     case = case_of()
     problem = fit_problem(case, driven(case))
     readings, std = problem.readings, np.full(len(problem.readings), 0.5)
-    before = readings.reading + np.where(readings.channel == 1, 1.0, 0.5)
-    after = readings.reading + 0.25
+    before = readings.measured + np.where(readings.channel == 1, 1.0, 0.5)
+    after = readings.measured + 0.25
     after[0] = np.nan
     found = gap_reduction(readings, std, before, after, "all")
     n = len(readings)

@@ -133,7 +133,7 @@ def test_the_declared_noise_is_where_the_analysis_begins():
 def test_an_analysis_without_a_search_has_no_gap():
     found = analysis._no_result(None)
     assert found.soil_test.p_value >= 0.5 and not found.has_gap
-    assert found.none is None and found.likeliest is None
+    assert found.soil_alone is None and found.likeliest is None
 
 
 def test_smoothed_residuals_are_those_of_generalised_least_squares():
@@ -173,7 +173,7 @@ def test_a_fit_states_precision_and_covariance_of_its_parameters():
     other = Coordinate("cohesion", "Pa", Prior(0.0, 2000.0), normal_std=500.0)
     x, none = np.asarray([0.25, 0.5]), np.zeros(9)
     at = Operating(slip=np.full(9, 0.2), load=np.full(9, 60.0))
-    readings = Readings.of_every_row(at, ["torque"], reading=np.ones(9))
+    readings = Readings.of_every_row(at, ["torque"], measured=np.ones(9))
     fit = Solution(
         LeastSquaresProblem(CASE, (angle, other), readings, np.eye(9)),
         x,

@@ -77,7 +77,7 @@ def test_small_differences_of_slip_are_subtracted():
     columns |= {"drawbar_pull_N": force.drawbar_pull, "sinkage_m": force.sinkage}
     readings = stack_readings(case, Table(table.columns | columns))
     raw = repeat_disagreement(readings)
-    exact = repeat_disagreement(readings, expected=readings.reading)
+    exact = repeat_disagreement(readings, expected=readings.measured)
     assert raw[0].chi_square > 10.0 and exact[0].chi_square == 0.0
 
 
@@ -102,7 +102,7 @@ def test_the_channel_whose_repeats_disagree_most_comes_first():
     sizes = np.asarray([shift[name] for name in readings.channels])[readings.channel]
     second = readings.run[readings.row] == 1
     other = replace(
-        readings, reading=readings.reading + np.where(second, sizes, 0.0) * readings.std
+        readings, measured=readings.measured + np.where(second, sizes, 0.0) * readings.std
     )
     found = repeat_disagreement(other)
     assert [c.channel for c in found] == ["drawbar_pull", "torque", "sinkage"]
@@ -127,9 +127,9 @@ def test_the_channel_whose_repeats_disagree_most_comes_first():
 def test_a_difference_is_in_per_cent_where_the_smaller_reading_is_a_tenth(values, said):
     case = case_of()
     readings = stack_readings(case, driven(case, loads=TWICE, noise=0.0))
-    reading = readings.reading.copy()
+    reading = readings.measured.copy()
     reading[[3, 11]] = values
-    sentence = _pair_sentence(replace(readings, reading=reading), 3, 11)
+    sentence = _pair_sentence(replace(readings, measured=reading), 3, 11)
     assert sentence.endswith(f"under 40 N: {said}")
-    own = _pair_sentence(replace(readings, reading=reading), 3, 3)
+    own = _pair_sentence(replace(readings, measured=reading), 3, 3)
     assert own.startswith("two rows of run run_0 at slip 0.29")

@@ -191,7 +191,7 @@ def test_a_set_of_which_each_is_needed_stays():
 def test_the_true_model_leaves_nothing_of_readings_without_noise(dug):
     case = case_of()
     problem = fit_problem(case, driven(case, noise=0.0))
-    truth = problem.readings.reading
+    truth = problem.readings.measured
     found = gap_reduction(
         problem.readings, problem.readings.std, truth + 3.0 * problem.readings.std, truth, "all"
     )
@@ -240,4 +240,4 @@ def test_rows_that_took_no_part_are_predicted_as_well(dug, named):
 def test_a_prediction_without_equilibrium_counts_as_ten_sigma(dug):
     readings = dug[0].readings
     nowhere = np.full(len(readings), np.nan)
-    assert gap_reduction(readings, readings.std, nowhere, readings.reading, "all").before == 100.0
+    assert gap_reduction(readings, readings.std, nowhere, readings.measured, "all").before == 100.0

@@ -222,7 +222,7 @@ def searched(monkeypatch):
     for name, value in {
         "effect_signatures": lambda *_: ((), ("lacking",)),
         "residual_test": lambda *_: SimpleNamespace(p_value=seen.p_value),
-        "_soil_alone": lambda *_: made(objective=seen.objective[0]),
+        "_fit_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
         "effects_to_fit": lambda *_, **__: ["a"],
         "_fit_level": fit_level,
@@ -247,7 +247,7 @@ def test_sets_of_up_to_three_effects_are_tried_while_each_is_better(searched):
     assert seen.levels == [[("a",)], [("a", "b")], [("a", "b", "c")]]
     assert seen.done == [0.25, 0.5, 0.75]
     assert [c.objective for c in found.candidates] == [30.0, 40.0, 50.0, 100.0]
-    assert found.none.names == () and found.likeliest.names == ("a", "b", "c")
+    assert found.soil_alone.names == () and found.likeliest.names == ("a", "b", "c")
     assert found.untestable == ("lacking",) and found.predicted_gain == {"a": 5.0}
 
 
@@ -284,7 +284,7 @@ def test_a_gap_is_searched_where_the_soil_alone_is_rejected_at_3_per_cent(search
     assert found.has_gap == bool(found.candidates) == gap
     assert found.untestable == ("lacking",) and (seen.done == []) == (not gap)
     if not gap:
-        assert found.none is found.likeliest is None and found.accepted == ()
+        assert found.soil_alone is found.likeliest is None and found.accepted == ()
 
 
 @pytest.mark.parametrize("p_value, adequate", [(0.0009, False), (0.0011, True)])

@@ -16,7 +16,7 @@ from soilml.gap.search.screening import (
     noise_only_gains,
     predicted_with_and_without,
 )
-from soilml.gap.search.stepwise import _soil_alone, search
+from soilml.gap.search.stepwise import _fit_soil_alone, search
 from soilml.physics.effects import EFFECTS
 
 #: The stresses move to the front of the contact in proportion to slip.
@@ -41,7 +41,7 @@ def alone(soil):
 def screened(moved):
     problem, soil = moved
     signatures, _ = effect_signatures(soil.fitted(), problem.readings, problem.effects)
-    none = _soil_alone(problem, soil, {})
+    none = _fit_soil_alone(problem, soil, {})
     return none, signatures, predicted_with_and_without(problem, none, soil, signatures)
 
 

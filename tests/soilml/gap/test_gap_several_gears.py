@@ -215,7 +215,7 @@ def test_wheels_of_a_rover_stand_for_their_gears(capsys):
     wheel = np.where(columns.pop("gear") == "smooth", "nose", "tail")
     by_wheel = Table(columns | {"wheel": wheel})
     np.testing.assert_array_equal(
-        planned_readings(case, by_gear).reading, planned_readings(case, by_wheel).reading
+        planned_readings(case, by_gear).measured, planned_readings(case, by_wheel).measured
     )
     found = [gap(case, table, effects={}).soil_before for table in (by_gear, by_wheel)]
     assert found[0] == found[1]

@@ -129,7 +129,7 @@ def test_expected_readings_have_the_channels_and_noise_of_the_rig(rivals):
     readings = expected_readings(option.at, problem.readings, problem.case)
     assert len(readings) == 3 * len(option.at.slip)
     torque = readings.channel == 0
-    np.testing.assert_allclose(readings.std[torque], 0.01 * np.abs(readings.reading[torque]))
+    np.testing.assert_allclose(readings.std[torque], 0.01 * np.abs(readings.measured[torque]))
 
 
 def test_proposals_are_ranked_and_contain_predictions(rivals):

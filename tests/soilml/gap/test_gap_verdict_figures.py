@@ -41,7 +41,7 @@ def readings(torque, sinkage=(), slip=None, load=None):
     values = np.asarray([*torque, *sinkage], dtype=float)
     slip = np.linspace(0.1, 0.5, values.size) if slip is None else np.asarray(slip)
     load = np.full(values.size, 60.0) if load is None else np.asarray(load)
-    return stub(channels=CHANNELS, channel=channel, reading=values, slip=slip, load=load)
+    return stub(channels=CHANNELS, channel=channel, measured=values, slip=slip, load=load)
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_repeats_give_the_noise_by_their_degrees_of_freedom():
     """Two groups of four: deviations of 1 and 2 about their means, six degrees of freedom."""
     values = [9.0, 11.0, 9.0, 11.0, 18.0, 22.0, 18.0, 22.0]
     given = stub(
-        channels=("torque",), channel=np.zeros(8, dtype=int), reading=np.asarray(values),
+        channels=("torque",), channel=np.zeros(8, dtype=int), measured=np.asarray(values),
         std=np.full(8, np.nan), replicates=np.repeat([3, 7], 4),
     )  # fmt: skip
     noise, notes = checks.estimate_repeat_noise(given)
@@ -210,7 +210,7 @@ def test_repeats_give_the_noise_by_their_degrees_of_freedom():
     ]  # fmt: skip
     few = stub(**vars(given) | {"replicates": np.asarray([3, 3, 3, 3, 7, 7, 7, 8])})
     assert checks.estimate_repeat_noise(few) == ({}, [])
-    equal = stub(**vars(given) | {"reading": np.repeat([9.0, 18.0], 4)})
+    equal = stub(**vars(given) | {"measured": np.repeat([9.0, 18.0], 4)})
     noise, notes = checks.estimate_repeat_noise(equal)
     assert noise == {} and "its repeated rows are equal" in notes[0].text
     known = stub(**vars(given) | {"std": np.ones(8)})

@@ -101,7 +101,7 @@ def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condens
     assert few.reading_count == data.reading_count == 3 * ROWS
     assert few.channels == data.channels
     for i in range(3):
-        all_std = data.noise_at(data.reading)
+        all_std = data.noise_at(data.measured)
         weights = [
             (std[one.channel == i] ** -2.0).sum() for one, std in ((few, few.std), (data, all_std))
         ]
@@ -118,8 +118,8 @@ def test_rows_without_equilibrium_stay(case, condensing):
     few = condensing_rows._condensed_at(known, data, *condensing_rows._residuals(known, data), cell)
     assert len(few.row_slip) == ROWS // 20 + 1
     assert few.row_load[-1] == 1e6
-    first = few.reading[few.channel == 0]
-    assert first[-1] == data.reading[data.channel == 0][5]
+    first = few.measured[few.channel == 0]
+    assert first[-1] == data.measured[data.channel == 0][5]
 
 
 def test_few_rows_are_left_as_they_are(case):

@@ -67,7 +67,7 @@ def test_covariance_of_least_squares_includes_prior_and_distance_to_its_mean():
 def test_noise_before_and_after_a_fit_is_that_of_each_channel(case):
     reading = np.asarray([3.0, 4.0, 3.0, 4.0, 1.0, 1.0, 1.0])
     residual = np.asarray([1.0, -1.0, 1.0, -1.0, 0.1, 0.1, -0.2])
-    data = rows_of(case, reading=reading)
+    data = rows_of(case, measured=reading)
     found = nonlinear._residual_noise(data, residual, 3)
     # three parameters, shared among four and three readings
     torque, sinkage = np.sqrt(4.0 / (4.0 - 12.0 / 7.0)), np.sqrt(0.06 / (3.0 - 9.0 / 7.0))
@@ -138,8 +138,8 @@ def test_the_linear_method_takes_the_larger_of_declared_and_seen_noise(case):
     def std(factor, scatter=0.0, count=4):
         seen = np.asarray([0.0, 1.0, -1.0, 1.0]) * scatter
         torque = data.channel == 0
-        reading = data.reading * (1.0 + np.where(torque, seen[data.row], 0.0))
-        given = replace(data, reading=reading, std=factor * data.std)
+        reading = data.measured * (1.0 + np.where(torque, seen[data.row], 0.0))
+        given = replace(data, measured=reading, std=factor * data.std)
         given = given.subset(~torque | (data.row < count))
         return np.sqrt(np.diag(linear._solve(case, given, free).covariance))
 
@@ -201,6 +201,6 @@ def test_methods_in_closed_form_say_what_rows_they_need(case):
 
 
 def test_a_row_without_equilibrium_has_a_residual_of_a_thousand_standard_deviations():
-    readings = SimpleNamespace(reading=np.asarray([1.0, 2.0]), std=np.asarray([0.1, 0.5]))
+    readings = SimpleNamespace(measured=np.asarray([1.0, 2.0]), std=np.asarray([0.1, 0.5]))
     problem = LeastSquaresProblem(None, (), readings, np.eye(2))
     np.testing.assert_allclose(problem.residual(np.asarray([[1.5, np.nan]])), [[-0.5, 500.0]])

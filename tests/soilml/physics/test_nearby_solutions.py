@@ -137,8 +137,8 @@ def test_readings_of_slightly_changed_rows_are_right_to_first_order(effects):
         ground, at = rows(h)
         case, _ = flattened(LoadCase(WHEEL, ground, at, effects))
         found, exact = linear_response(case, base), model(ground, at)
-        assert not found.reading.status.any()
-        off = [getattr(found.reading, n) / getattr(exact, n) - 1.0 for n in CHANNELS]
+        assert not found.force.status.any()
+        off = [getattr(found.force, n) / getattr(exact, n) - 1.0 for n in CHANNELS]
         true = apply_input_effects(case)
         z = Model(WHEEL, tuple(e for e in effects if "offset" not in e.name))(ground, at).sinkage
         off.append(found.sinkage.log_sinkage - np.log(z))
@@ -160,7 +160,7 @@ def test_readings_of_slightly_changed_rows_are_right_to_first_order(effects):
 
 def test_rows_of_a_base_row_without_equilibrium_are_blank():
     case = batch(slip=[0.2, 0.2, 0.5, 0.5], load=np.asarray([1e6, 60.0, 60.0, 60.0]))
-    found = linear_response(case, np.asarray([0, 0, 2, 2])).reading
+    found = linear_response(case, np.asarray([0, 0, 2, 2])).force
     assert found.status[:2].all() and not found.status[2:].any()
     assert np.isnan(found.torque).tolist() == [True, True, False, False]
 
@@ -173,5 +173,5 @@ def test_readings_of_first_order_start_from_an_estimate_of_the_base_rows():
     again = linear_response(case, base, estimate)
     for name in (*CHANNELS, "load"):
         np.testing.assert_allclose(
-            getattr(again.reading, name), getattr(alone.reading, name), rtol=1e-8
+            getattr(again.force, name), getattr(alone.force, name), rtol=1e-8
         )

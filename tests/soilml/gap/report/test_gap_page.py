@@ -101,7 +101,7 @@ def curves(runs=8, channels=("torque_Nm", "drawbar_pull_N", "sinkage_m"), slips=
         run=tuple(f"r{i}" for i in run),
         slip=slip,
         load=load,
-        reading=true + 0.1 * rng.standard_normal(true.size),
+        measured=true + 0.1 * rng.standard_normal(true.size),
         std=np.full(true.size, 0.1),
         before=0.9 * true,
         after=true,

@@ -21,7 +21,7 @@ def curves(load, run):
         run=tuple(run.tolist()),
         slip=slip,
         load=np.asarray(load, dtype=np.float64),
-        reading=load * slip,
+        measured=load * slip,
         std=np.ones(slip.size),
         before=load * slip,
         after=load * slip,
