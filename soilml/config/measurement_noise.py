@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,13 +31,14 @@ KNOWN_PARTS: dict[str, tuple[str | None, str | None]] = {
     column("sinkage"): ("sinkage_bias", None),
     column("drawbar_pull"): ("drawbar_pull_bias", None),
 }
-#: The same as effects of the catalogue: of an offset, and of a relative error.
-_EFFECTS: dict[str, tuple[str, str]] = {
-    column("slip"): ("slip-offset", ""),
-    column("load"): ("", "load-gain"),
-    column("torque"): ("torque-offset", "torque-gain"),
-    column("sinkage"): ("sinkage-offset", ""),
-    column("drawbar_pull"): ("drawbar-offset", ""),
+#: The effect of the catalogue that stands for each of these errors.
+EFFECT_OF_ERROR = {
+    "slip_bias": "slip-offset",
+    "load_gain": "load-gain",
+    "torque_bias": "torque-offset",
+    "torque_gain": "torque-gain",
+    "sinkage_bias": "sinkage-offset",
+    "drawbar_pull_bias": "drawbar-offset",
 }
 #: Forms of a noise or bias in a message; a bias may be zero.
 NEEDED = "a number in the column's unit, '2 %' of the reading, or '2 % + 0.05'"
@@ -103,16 +104,17 @@ def take_bias(settings: Settings) -> dict[str, Noise]:
 
 
 def checked_sensors(bias: Mapping[str, Noise]) -> dict[str, float]:
-    """Standard deviations of faults of sensors, by effect, as `gap` takes them: those above zero.
+    """Declared errors above zero as standard deviations of the faults that `gap` may find."""
+    return {EFFECT_OF_ERROR[name]: std for name, std in common_errors(bias).items() if std > 0.0}
 
-    A declared error becomes the size of the fault that an analysis may find.
-    """
-    sizes: dict[str, float] = {}
+
+def unestimated_bias(bias: Mapping[str, Noise], effects: Collection[str]) -> dict[str, Noise]:
+    """The declared errors without those for which a model has one of these effects instead."""
+    left = {}
     for key, declared in bias.items():
-        offset, gain = _EFFECTS[key]
-        sizes |= {offset: declared.constant} if offset else {}
-        sizes |= {gain: declared.share} if gain else {}
-    return {name: size for name, size in sizes.items() if size > 0.0}
+        offset, gain = (EFFECT_OF_ERROR.get(part or "") in effects for part in KNOWN_PARTS[key])
+        left[key] = Noise(0.0 if offset else declared.constant, 0.0 if gain else declared.share)
+    return left
 
 
 def common_errors(bias: Mapping[str, Noise]) -> dict[str, float]:

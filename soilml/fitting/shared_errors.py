@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Real, namespace
 from soilml.config.case import Case
-from soilml.config.measurement_noise import KNOWN_PARTS, common_errors
+from soilml.config.measurement_noise import EFFECT_OF_ERROR, KNOWN_PARTS, common_errors
 from soilml.fitting.coordinates import Coordinate
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
@@ -50,15 +50,6 @@ USUAL_MODEL_ERRORS = {
     "torque_by_slip": 0.1,
     "sinkage_by_slip": 0.15,
     "drawbar_pull_by_slip": 0.1,
-}
-#: Effects that stand for an error of a sensor.
-EFFECT_OF_ERROR = {
-    "slip_bias": "slip-offset",
-    "load_gain": "load-gain",
-    "torque_bias": "torque-offset",
-    "torque_gain": "torque-gain",
-    "sinkage_bias": "sinkage-offset",
-    "drawbar_pull_bias": "drawbar-offset",
 }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
-from soilml.errors import FitError
+from soilml.errors import FitError, InputError
 from soilml.fitting.operating_points import operating_points, with_rover_columns
 from soilml.fitting.readings import (
     LEAST_RELATIVE_STD,
@@ -29,19 +29,12 @@ def usable_readings(case: Case, table: Table) -> Readings:
     standard deviation of zero, which a relative noise has at a reading of zero, is replaced by the
     median of the others.
 
-    Raises `TableError` where the table names another wheel than the case's; `FitError` where no row
-    or no reading remains, or all standard deviations of a channel are zero.
+    Raises `InputError` where no row remains, `TableError` where the table names another wheel than
+    the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
-    table = with_rover_columns(case, table)
-    dropped = int(np.count_nonzero(~table.answered))
-    if dropped == len(table):
-        raise FitError(f"{table.source}: no row has the status ok")
-    table = table.rows(table.answered)
+    table, excluded = answered_rows(with_rover_columns(case, table))
     check_wheel_size(case, table)
-    notes = _remarks_on(case, table)
-    if dropped:
-        text = f"{dropped} rows are excluded: their status is not ok"
-        notes.append(Remark("rows-excluded", text))
+    notes = [*_remarks_on(case, table), *excluded]
     found = stack_readings(case, table)
     if not found.channels:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")
@@ -51,6 +44,18 @@ def usable_readings(case: Case, table: Table) -> Readings:
     if not kept or not unknown:
         return found
     return replace(found.of_channels(kept), excluded_channels=unknown)
+
+
+def answered_rows(table: Table) -> tuple[Table, list[Remark]]:
+    """The rows whose status is ok, and a remark on the others; `InputError` where there is none."""
+    if not table.answered.any():
+        raise InputError(f"{table.source}: no row has the status ok")
+    excluded = int(np.count_nonzero(~table.answered))
+    if not excluded:
+        return table, []
+    rows = "1 row is" if excluded == 1 else f"{excluded} rows are"
+    remark = Remark("rows-excluded", f"{rows} excluded: the status is not ok")
+    return table.rows(table.answered), [remark]
 
 
 def _remarks_on(case: Case, table: Table) -> list[Remark]:

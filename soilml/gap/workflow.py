@@ -9,11 +9,12 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
+from soilml.config.measurement_noise import checked_sensors
 from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import Readings, stack_readings
-from soilml.fitting.usable_readings import with_zeros_replaced
+from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
 from soilml.gap.candidate_effects import candidate_effects, effect_names
 from soilml.gap.checks import (
     DataCheckResult,
@@ -97,7 +98,7 @@ def gap(
     Parameters
     ----------
     case : Case
-        Model, soil, priors and measurement noise.
+        Model, soil, priors, measurement noise, and the bias of sensors.
     table : Table, data frame or mapping of columns
         Rows with `run`, `slip`, `load_N` and measured channels.
     free : sequence of str, optional
@@ -109,7 +110,7 @@ def gap(
         The catalogue of effects by name; those that do not suit the gear are ignored.
     calibration : mapping, optional
         Standard deviation of the remaining error of a calibrated sensor, by effect name, in the
-        unit of the effect's size.
+        unit of the effect's size; by default as the bias of the case declares it.
     costs : mapping, optional
         Cost of each kind of next run or check, in any unit, 1 where none is given; they are then
         ranked by what they discriminate per cost.
@@ -157,10 +158,7 @@ def gap(
     table = with_rover_columns(case, as_table(table))
     check_wheel_size(case, table)
     _check_size(table)
-    usable = table.answered
-    if not usable.any():
-        raise InputError(f"{table.source}: no row has the status ok")
-    table, unusable_rows = table.rows(usable), int(np.count_nonzero(~usable))
+    table, excluded_rows = answered_rows(table)
     table, duplicate_rows = without_duplicate_rows(table)
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
@@ -174,10 +172,7 @@ def gap(
     if checks.errors:
         errors = (*checks.errors, *checks.naming_obstacles)
         return _bad_data_report(case, errors, checks.notes, seed)
-    if unusable_rows:
-        rows = "1 row is" if unusable_rows == 1 else f"{unusable_rows} rows are"
-        notes.append(Remark("rows-excluded", f"{rows} excluded: the status is not ok"))
-    checks = replace(checks, notes=(*notes, *checks.notes))
+    checks = replace(checks, notes=(*notes, *excluded_rows, *checks.notes))
 
     place = split.analysed.place
     analysis = analyse(
@@ -185,7 +180,7 @@ def gap(
         soil,
         readings,
         effects=effects,
-        calibration=calibration or {},
+        calibration=checked_sensors(case.bias) | dict(calibration or {}),
         seed=seed,
         place=place,
         progress=progress or (lambda _: None),

@@ -1,6 +1,7 @@
 """Errors of slip and load, and common errors, in tables and model files given to `estimate`."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,19 @@ from conftest import MODEL, simulated_run
 
 from soilml.cli import main
 from soilml.config.case import read_case_of_one_gear
-from soilml.config.measurement_noise import checked_sensors, common_errors, take_bias
+from soilml.config.measurement_noise import (
+    Noise,
+    checked_sensors,
+    common_errors,
+    take_bias,
+    unestimated_bias,
+)
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
+from soilml.gap import workflow
+from soilml.gap.checks import DataCheckResult
 from soilml.identification.trained_estimator import with_sensors_of
+from soilml.io.read_table import read_table
 from soilml.io.toml_settings import Settings
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
@@ -113,19 +123,29 @@ def test_commands_that_do_not_use_a_bias_refuse_it(folder, capsys):
 
 def test_a_declared_bias_is_a_checked_sensor_for_gap(folder, monkeypatch):
     """[bias] says of gap's effects what --checked says; the option has the last word."""
-    import soilml.gap
-
     bias = take_bias(Settings(tomllib.loads(BIAS)["bias"], "[bias]", folder))
     sizes = {"torque-gain": 0.05, "torque-offset": 0.1, "sinkage-offset": 0.002}
     assert checked_sensors(bias) == sizes and set(sizes) <= set(EFFECTS)
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n")
     given = {}
 
-    def stop(case, table, **options):
+    def stop(case, soil, readings, **options):
         given.update(options)
         raise InputError("enough")
 
-    monkeypatch.setattr(soilml.gap, "gap", stop)
+    monkeypatch.setattr(workflow, "analyse", stop)
+    monkeypatch.setattr(workflow, "check_readings", lambda *_: DataCheckResult((), (), ()))
     command = ["gap", "biased.toml", "runs.csv", "--out", "found", "--checked", "torque-gain=0.01"]
     assert main(command) == 2
     assert given["calibration"] == sizes | {"torque-gain": 0.01}
+    case = replace(read_case_of_one_gear(folder / "biased.toml", with_bias=True), bias=bias)
+    with pytest.raises(InputError, match="enough"):
+        workflow.gap(case, read_table(folder / "runs.csv"))
+    assert given["calibration"] == sizes
+
+
+def test_a_bias_stays_in_the_model_but_for_errors_that_are_effects_now():
+    bias = {"torque_Nm": Noise(0.1, 0.05), "slip": Noise(0.01), "load_N": Noise(share=0.01)}
+    assert unestimated_bias(bias, set()) == bias
+    left = unestimated_bias(bias, {"torque-gain", "slip-offset", "grousers"})
+    assert left == bias | {"torque_Nm": Noise(0.1, 0.0), "slip": Noise()}

@@ -90,14 +90,11 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    from dataclasses import replace
-
     from soilml.cli.options import available_effects, parse_costs, parse_names
     from soilml.cli.output import origin_of, show, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_long_table
     from soilml.config.case import read_case
-    from soilml.config.measurement_noise import checked_sensors
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
 
@@ -108,8 +105,6 @@ def run(args: argparse.Namespace) -> int:
 
     effects = available_effects(args)
     case = read_case(args.model, effects, with_bias=True)
-    checked = checked_sensors(case.bias) | _calibration(args.checked, effects)
-    case = replace(case, bias={})
     table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
@@ -119,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
             free=parse_names(args.free),
             holdout=args.holdout,
             effects=effects,
-            calibration=checked,
+            calibration=_calibration(args.checked, effects),
             costs=parse_costs(args),
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),

@@ -11,10 +11,11 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, solvable
-from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.coordinates import Coordinate, free_soil_parameters
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
+from soilml.fitting.usable_readings import answered_rows
 from soilml.gap.candidate_effects import candidate_effects
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_kinds import check_costs
@@ -25,7 +26,6 @@ from soilml.gap.report.results import as_json_entry
 from soilml.io.read_table import Rows, as_table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
-from soilml.quantities import SHEAR
 from soilml.remarks import Remark
 from soilml.report.figure_style import AFTER, UNCHANGED, take_axes
 
@@ -139,14 +139,10 @@ def audit(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
-    design = as_table(design)
-    if not design.answered.any():
-        raise InputError(f"{design.source}: no row has the status ok")
-    readings = planned_readings(case, design.rows(design.answered))
-    selected = select_free(case, free if free is not None or case.prior else SHEAR)
-    soil = [f for f in selected if "." not in f.path]
-    coordinates = list(soil)
-    nominal = np.asarray([f.prior.fraction(f.nominal) for f in soil])
+    design, _ = answered_rows(as_table(design))
+    readings = planned_readings(case, design)
+    coordinates = free_soil_parameters(case, free)
+    nominal = np.asarray([c.prior.fraction(c.nominal) for c in coordinates])
     jacobian = linearise(case, coordinates, nominal, readings).jacobian / readings.std[:, None]
     of_tests = SoilTestTerms(case, coordinates).rates(nominal)
     jacobian = np.vstack([jacobian, of_tests])

@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.measurement_noise import Discrepancy
+from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature
@@ -152,7 +152,7 @@ def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> 
     The size of each effect gets a uniform prior of three standard deviations to either side, so
     that its uncertainty is propagated where the model is used. `discrepancy` has the standard
     deviations of the smooth discrepancy by column, in the column's unit; None keeps what the case
-    declares.
+    declares. An error of a sensor that is fitted as an effect is no longer a bias.
     """
     values, stds = {path: significant(v) for path, v in fit.values().items()}, fit.stds()
     case = fit.case.with_values(values)
@@ -173,7 +173,9 @@ def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> 
             name: replace(declared, share=0.0, constant=significant(std))
             for name, std in discrepancy.items()
         }
-    return replace(case, prior=prior, noise=dict(fit.case.noise), discrepancy=remaining)
+    bias = unestimated_bias(fit.case.bias, {c.effect for c in fit.coordinates})
+    noise = dict(fit.case.noise)
+    return replace(case, prior=prior, noise=noise, discrepancy=remaining, bias=bias)
 
 
 def soil_estimates(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from soilml.config.case import read_case
-from soilml.config.measurement_noise import checked_sensors
 from soilml.gap import STATUSES, GapReport, gap
 from soilml.gap.presentation import gap_files
 from soilml.gap.report.page import (
@@ -31,13 +29,10 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """
     model = setting_file("MODEL.toml", request.get("model"))
     case = read_case(model, with_bias=True)
-    checked, case = checked_sensors(case.bias), replace(case, bias={})
     table = read_rows(request)
     stage = f"analysing {len(table)} rows"
     tell(stage, 0.0)
-    report = gap(
-        case, table, calibration=checked, progress=lambda share: tell(stage, min(share, 1.0))
-    )
+    report = gap(case, table, progress=lambda share: tell(stage, min(share, 1.0)))
     tell("drawing the report")
     files = gap_files(report, model.name, table.source)
     return verdict(report) | {"rows": len(table), "files": write_files(files)}

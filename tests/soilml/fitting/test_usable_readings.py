@@ -7,7 +7,7 @@ import pytest
 from conftest import MODEL
 
 from soilml import Noise, Operating, gap, identify, read_case, simulate
-from soilml.errors import FitError, TableError
+from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
@@ -111,8 +111,8 @@ def test_rows_whose_status_is_not_ok_are_excluded_and_counted(case, table):
     fit = identify(case, changed(table, torque_Nm=torque, status=status), SHEAR)
     assert fit.rows_used == 10
     assert fit["friction_angle"] == pytest.approx(float(case.soil.friction_angle), rel=1e-4)
-    assert "2 rows are excluded: their status is not ok" in texts(fit.warnings)
-    with pytest.raises(FitError, match=r"log\.csv: no row has the status ok"):
+    assert "2 rows are excluded: the status is not ok" in texts(fit.warnings)
+    with pytest.raises(InputError, match=r"log\.csv: no row has the status ok"):
         identify(case, changed(table, status=np.full(12, "no peak")), SHEAR)
 
 
