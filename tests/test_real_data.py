@@ -117,4 +117,4 @@ def test_plate_and_shear_tests_contain_their_known_soil(tmp_path, monkeypatch):
     found = json.loads((tmp_path / "sand.json").read_text())
     low, high = found["estimates"]["shear_strength"]["another_place_95"]
     assert low <= 93e3 * 0.637 <= high  # tan 32.5 degrees, without cohesion
-    assert remarked(found["remarks"], "cannot be told apart")
+    assert remarked(found["remarks"], "not identifiable")

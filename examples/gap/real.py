@@ -67,7 +67,7 @@ def lugged(table: Path) -> None:
 
 
 def together(table: Path) -> None:
-    """The smooth and the lugged wheel on one soil, told apart by the column gear."""
+    """The smooth and the lugged wheel on one soil, distinguished by the column gear."""
     rows = _rows(table, lambda row: row["run"].startswith("kls1"))
     for row in rows:
         row["gear"] = "lugged" if float(row["grouser_height_m"]) > 0.0 else "smooth"

@@ -173,6 +173,8 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
         return fail(str(error), 2)
     except (KeyboardInterrupt, Terminated) as stop:
         return _interrupted(stop)
+    except SystemExit as done:  # the parser has printed the help, or why it refuses an argument
+        return int(done.code or 0)
     except BrokenPipeError:
         silence_stdout()
         return 0

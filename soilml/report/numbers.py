@@ -60,7 +60,7 @@ def decimal(value: float, digits: int = 3) -> str:
 
 
 def format_residual(x: float, digits: int = 3) -> str:
-    """A mean squared residual; those far below that of noise are not told apart."""
+    """A mean squared residual; one far below that of noise is given as an upper limit."""
     return "< 0.001" if 0.0 <= x < 1e-3 else format_number(x, digits)
 
 

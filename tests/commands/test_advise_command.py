@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import MODEL
-from exit_status import exit_status
 
 from soilml import Estimator
 from soilml.cli import main
@@ -101,7 +100,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, command, s
     (folder / "speed.toml").write_text(MODEL + rate)
     before = {p: p.read_bytes() for p in folder.iterdir()}
     outs = [] if {"--out", "--picture"} & {*command} else ["--out", "o.csv", "--picture", "o.png"]
-    code = exit_status(["advise", *command, *outs])
+    code = main(["advise", *command, *outs])
     captured = capsys.readouterr()
     assert (
         code == 2 and captured.out == "" and captured.err.count("\n") == 1 and said in captured.err

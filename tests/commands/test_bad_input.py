@@ -47,10 +47,7 @@ def refused(folder, command, capsys, monkeypatch, said):
     """Run in the folder; expect status 2, one line that says `said`, and no new file."""
     monkeypatch.chdir(folder)
     before = sorted(p.name for p in folder.rglob("*"))
-    try:
-        status = main(command)
-    except SystemExit as done:
-        status = done.code
+    status = main(command)
     captured = capsys.readouterr()
     assert status == 2
     assert captured.err.count("\n") == 1, captured.err

@@ -41,10 +41,7 @@ def state(folder):
 
 def refused(folder, command, capsys, said):
     before = state(folder)
-    try:
-        status = main(command)
-    except SystemExit as done:
-        status = done.code
+    status = main(command)
     captured = capsys.readouterr()
     assert status == 2
     assert captured.err.count("\n") == 1 and captured.out == ""

@@ -37,10 +37,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def refused(words, capsys, said):
-    try:
-        status = main(words)
-    except SystemExit as done:
-        status = done.code
+    status = main(words)
     captured = capsys.readouterr()
     assert status == 2 and captured.err.count("\n") == 1, captured.err
     assert said in captured.err

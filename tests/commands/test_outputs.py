@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from conftest import MODEL, RECIPE
-from exit_status import exit_status
 
 from soilml.cli import main
 
@@ -30,7 +29,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def refused(command, capsys, said):
-    assert exit_status(command) == 2
+    assert main(command) == 2
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1 and said in captured.err
     assert captured.out == ""

@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import MODEL
-from exit_status import exit_status
 
 from soilml import Operating, read_case
 from soilml.cli import main
@@ -120,7 +119,7 @@ def test_bad_input_is_one_line(folder, capsys, fault):
     for name, text in files.items():
         (folder / name).write_text(text)
     before = sorted(folder.iterdir())
-    assert exit_status([*COMMAND, *options, "--out", "pull.csv"]) == 2
+    assert main([*COMMAND, *options, "--out", "pull.csv"]) == 2
     captured = capsys.readouterr()
     assert captured.err.count("\n") == 1 and said in captured.err, captured.err
     assert captured.out == "" and sorted(folder.iterdir()) == before

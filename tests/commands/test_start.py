@@ -14,10 +14,7 @@ LISTING = """\
 import sys
 before = set(sys.modules)
 from soilml.cli.main import main
-try:
-    main()
-except SystemExit as stop:
-    print("status", stop.code)
+print("status", main())
 print(*sorted(set(sys.modules) - before))
 """
 OWN = ("soilml", "datagen", "training")

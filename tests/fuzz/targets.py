@@ -158,10 +158,7 @@ def _command(content: bytes) -> None:
         said = io.StringIO()
         try:
             with contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
-                try:
-                    status = main(words)
-                except SystemExit as stop:
-                    status = stop.code
+                status = main(words)
         finally:
             os.chdir(before)
     assert status in (0, 1, 2), status

@@ -62,7 +62,7 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
     if not fit.several_sizes:
         yield Remark(
             "one-plate-size",
-            f"one plate size ({fit.sizes[0]:.3g} m): kc and kphi cannot be told apart, only "
+            f"one plate size ({fit.sizes[0]:.3g} m): kc and kphi are not identifiable, only "
             f"k = kc / b + kphi for b = {fit.sizes[0]:.3g} m; for another width it may differ",
             ("kc", "kphi"),
         )
@@ -133,8 +133,8 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
     if fit.cohesion is None:
         yield Remark(
             "one-normal-stress",
-            f"one normal stress ({_kpa(fit.stresses[0])} kPa): cohesion and friction angle cannot "
-            f"be told apart, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there",
+            f"one normal stress ({_kpa(fit.stresses[0])} kPa): cohesion and friction angle are "
+            f"not identifiable, only c + sigma tan(phi) = {_kpa(fit.strength.value)} kPa there",
             ("cohesion", "friction_angle"),
         )
     elif fit.cohesion.value == 0.0:

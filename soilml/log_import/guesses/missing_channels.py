@@ -20,7 +20,7 @@ def load_lines(
 ) -> list[str]:
     """What stands for the load where no column is one: what logs or names say, or the mass.
 
-    `labels` is the number of wheels that a column of the log tells apart.
+    `labels` is the number of wheels that a column of the log distinguishes.
     """
     if "load" in found.roles():
         return []

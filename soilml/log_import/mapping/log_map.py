@@ -13,7 +13,7 @@ from soilml.log_import.mapping.channel_map import ROLES, ChannelMap, take_channe
 from soilml.log_import.mapping.uncertain_value import Uncertain, take_uncertain
 
 #: Keys that say where samples come from, of which a table has one.
-_SOURCES = ("column", "value", "file_name")
+_SOURCES = ("column", "value", "file_name", "head")
 _ZERO = Uncertain(0.0)
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from channel_readings import channel_readings
+from channel_readings import LOAD, SLIP, channel_readings, rows_of
 from scipy.stats import multivariate_normal
 
 from soilml import Operating, read_case
@@ -27,21 +27,10 @@ from soilml.physics.gears import GEARS
 from soilml.physics.gears.rigid_wheel import WheelArc
 from soilml.physics.load_case import LoadCase
 
-SLIP, LOAD = np.asarray([0.1, 0.3, 0.5, 0.2]), np.asarray([30.0, 60.0, 90.0, 120.0])
-
 
 @pytest.fixture
 def case(model_file):
     return read_case(model_file)
-
-
-def rows_of(case, torque_std=0.05, **changes):
-    """Torque in all rows, sinkage in the last three."""
-    at = Operating(slip=SLIP, load=LOAD)
-    force = case.model(case.soil, at)
-    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
-    channels = {"torque": (np.asarray(force.torque), torque_std), "sinkage": (depth, 0.001)}
-    return channel_readings(at, channels, **changes)
 
 
 def test_relative_noise_is_that_of_the_prediction_and_given_noise_stays(case):

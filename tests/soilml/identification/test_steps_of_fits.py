@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from channel_readings import channel_readings
+from channel_readings import rows_of
 
 from soilml import Operating, read_case
 from soilml.errors import FitError
@@ -21,21 +21,11 @@ from soilml.remarks import texts
 linear, newton, nonlinear = (
     import_module(f"soilml.identification.{name}") for name in ("linear", "newton", "nonlinear")
 )
-SLIP, LOAD = np.asarray([0.1, 0.3, 0.5, 0.2]), np.asarray([30.0, 60.0, 90.0, 120.0])
 
 
 @pytest.fixture
 def case(model_file):
     return read_case(model_file)
-
-
-def rows_of(case, torque_std=0.05, **changes):
-    """Torque in all rows, sinkage in the last three."""
-    at = Operating(slip=SLIP, load=LOAD)
-    force = case.model(case.soil, at)
-    depth = np.where(np.arange(4) == 0, np.nan, np.asarray(force.sinkage))
-    channels = {"torque": (np.asarray(force.torque), torque_std), "sinkage": (depth, 0.001)}
-    return channel_readings(at, channels, **changes)
 
 
 def optimum(x, jacobian, residual=(0.0, 0.0), of_tests=0.0):

@@ -117,9 +117,6 @@ def test_options(text, tmp_path, capsys):
         ["generate", "wheel", str(tmp_path / "o.parquet"), "--rows", text],
         ["generate", "wheel", str(tmp_path / "o.parquet"), "--workers", text],
     ):
-        try:
-            status = main(words)
-        except SystemExit as done:
-            status = done.code
+        status = main(words)
         assert status == 2, words
         assert capsys.readouterr().err.count("\n") == 1

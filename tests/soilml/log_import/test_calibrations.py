@@ -1,16 +1,19 @@
 """Logs that state calibrations and constants, whose wheels share columns, that know only slip."""
 
 import datetime
+from pathlib import Path
 
 import numpy as np
 import pytest
 from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
 
 from soilml.errors import InputError
+from soilml.io.toml_settings import Settings
 from soilml.log_import import import_log, init_map
 from soilml.log_import.channels.runs import spread_over_seconds
 from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.constants import stated_constants, stated_scale
+from soilml.log_import.mapping.log_map import shared_keys, with_shared_keys
 from soilml.log_import.readers.text_layout import find_layout
 
 SLIPS = (0.1, 0.25, 0.45)
@@ -232,3 +235,12 @@ def test_stated_numbers_are_in_plain_digits(tmp_path):
     given["load"] = {"file_name": r"load_(\d+)N"}
     with pytest.raises(InputError, match="finds no number in the name of the run"):
         import_log(file, given | {"torque": {"column": "M"}})
+
+
+def test_a_wheel_whose_load_a_line_of_the_head_states_does_not_take_the_shared_column():
+    shared = {"load": {"column": "Fz", "unit": "N", "noise": "1 N"}}
+    head = {"load": {"head": r"load (\d+)"}}
+    assert with_shared_keys(head, shared) == {"load": {"unit": "N", "noise": "1 N", **head["load"]}}
+    settings = Settings(dict(head), "map", Path())
+    assert shared_keys(settings, {"left": {"load": {"scale": 2.0}}}) == head
+    assert "load" in settings  # it serves wheels without a load of their own as well
