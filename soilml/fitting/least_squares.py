@@ -220,8 +220,8 @@ class Solution:
         return self.problem.soil_tests
 
     @property
-    def covariance(self) -> Floats:
-        """Linearised posterior covariance of the coordinates, (p, p).
+    def information(self) -> Floats:
+        """Linearised information on the coordinates by readings, soil tests and priors, (p, p).
 
         A soil coordinate is uniform a priori; its precision enters as that of a Gaussian.
         """
@@ -229,8 +229,12 @@ class Solution:
             UNIFORM_PRECISION if np.isinf(c.std) and not c.effect else 0.0 for c in self.coordinates
         ]
         jacobian = np.vstack([self.jacobian, self.soil_tests.rates(self.x)])
-        information = jacobian.T @ jacobian + np.diag(self.precision + np.asarray(uniform))
-        return np.asarray(np.linalg.pinv(information))
+        return np.asarray(jacobian.T @ jacobian + np.diag(self.precision + np.asarray(uniform)))
+
+    @property
+    def covariance(self) -> Floats:
+        """Linearised posterior covariance of the coordinates, (p, p)."""
+        return np.asarray(np.linalg.pinv(self.information))
 
     def whitened_by(self, whiten: Whitening | Floats) -> Solution:
         """The same point with residuals and Jacobian whitened by another matrix (m, m)."""

@@ -170,22 +170,14 @@ def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
     return replace(sample, u=sample.u[:, :p])
 
 
-def sample_posterior(
-    case: Case, readings: Readings, free: Sequence[Coordinate]
-) -> tuple[ImportanceSample, float]:
-    """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
-
-    The noise is as declared, whatever the misfit, which is that at the sample of largest weight, or
-    with shared errors at the optimum if it is less there. Raises `FitError` as `posterior` does.
-    """
-    density = PosteriorDensity(case, readings, free)
-    optimum = most_probable(case, readings, free) if density.errors else None
-    return _with_misfit(density, optimum, len(free))
-
-
 def _with_misfit(
     density: PosteriorDensity, optimum: Solution | None, parameters: int
 ) -> tuple[ImportanceSample, float]:
+    """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
+
+    The noise is as declared. The misfit is that at the sample of largest weight, or with shared
+    errors at the optimum if it is less there.
+    """
     sample = _sampled(density, None, optimum)
     misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
     if optimum is not None:  # samples have nearly one more squared residual for each error

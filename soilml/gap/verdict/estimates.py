@@ -18,7 +18,7 @@ from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import EstimatedValue
 from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.gap.search.posterior import Posterior
-from soilml.numerics.prior import UNIFORM_PRECISION, Prior
+from soilml.numerics.prior import Prior
 from soilml.quantities import Z_90
 from soilml.report.numbers import significant
 
@@ -73,14 +73,11 @@ def by_undetected_effects(
     leaves; an effect has prior odds of one to twenty against the soil alone.
     """
     fit = soil.whitened_by(problem.covariance.whiten)
-    normal = fit.jacobian.T @ fit.jacobian + np.diag(fit.precision + UNIFORM_PRECISION)
-    of_tests = fit.soil_tests.rates(fit.x)
-    normal += of_tests.T @ of_tests
     stds = {c.effect: c.std for c in problem.size_coordinates([s.name for s in signatures])}
     logs, offsets = [np.zeros(1)], [np.zeros((1, len(fit.x)))]
     for s in signatures:
         column = problem.covariance.whiten @ s.column
-        moved = np.linalg.solve(normal, fit.jacobian.T @ column)
+        moved = np.linalg.solve(fit.information, fit.jacobian.T @ column)
         apart = column - fit.jacobian @ moved
         size, log = _size_posterior(apart, fit.residual, s.sign, stds[s.name])
         logs.append(log)
