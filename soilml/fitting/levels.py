@@ -89,18 +89,10 @@ def find_levels(values: Floats, rule: LevelRule, run: Integers | None = None) ->
     only where several runs repeat both. What remains together and scatters by more than the rule
     says is a range without gaps, which is divided into levels of equal width.
 
-    Parameters
-    ----------
-    values : array (n,)
-        On the scale of the rule: logarithms of loads, for example.
+    values (n,): On the scale of the rule: logarithms of loads, for example.
     rule : LevelRule
-    run : array (n,), optional
-        Run of each value. Equal values of one run count as one value that was set once; without
-        runs, or in one run alone, each value counts.
-
-    Returns
-    -------
-    Levels
+    run (n,): Run of each value. Equal values of one run count as one value that
+        was set once; without runs, or in one run alone, each value counts.
 
     Examples
     --------

@@ -35,15 +35,10 @@ LEAST_OF_MEDIAN = 1e-3
 class CondensedRows:
     """What condensed rows stand for.
 
-    Attributes
-    ----------
-    rows, readings
-        Numbers of measured rows, and of their readings.
-    squares
-        Sum of the squared distances of the readings from those of their condensed rows, in standard
-        deviations of their noise.
-    undeclared
-        Columns whose noise is that of their residuals, since none is declared.
+    rows, readings: Numbers of measured rows, and of their readings.
+    squares: Sum of the squared distances of the readings from those of their condensed rows, in
+        standard deviations of their noise.
+    undeclared: Columns whose noise is that of their residuals, since none is declared.
     """
 
     rows: int
@@ -56,35 +51,23 @@ class CondensedRows:
 class Readings:
     """Operating points of n rows, and the m readings of all channels in one vector.
 
-    Attributes
-    ----------
-    at
-        Operating points, arrays (n,).
-    run, runs, order
-        Index (n,) of each row's run in `runs`; position (n,) of the row in its run, by time.
-    channels
-        Names of the channels.
-    row, channel
-        Row, and index in `channels`, of each reading, (m,).
-    measured, std
-        Measured values (m,), of planned rows the expected ones, and their noise: as declared, NaN
-        where it is not; in a fit, as it is taken.
-    noise, from_case
-        Noise of each channel that the case declares, and of which readings (m,) it is the noise;
-        that of others stands in the table.
-    slip_std, load_std
-        Declared noise of slip and of load (N), (n,); 0 where none is declared.
-    sensor_std
-        The part (m,) of `std` that is not noise of slip and load, where these were added.
-    excluded_channels
-        Columns that are not fitted, since their noise is not declared and that of others is.
-    notes
-        Remarks on the table.
-    shared_errors
-        Standard deviations of the errors that all rows share, by name: as [bias] declares them, or
-        with those that sensors and models typically have.
-    condensed
-        What the rows stand for, where many were condensed.
+    at: Operating points, arrays (n,).
+    run, runs, order: Index (n,) of each row's run in `runs`; position (n,) of the row in its run,
+        by time.
+    channels: Names of the channels.
+    row, channel: Row, and index in `channels`, of each reading, (m,).
+    measured, std: Measured values (m,), of planned rows the expected ones, and their noise: as
+        declared, NaN where it is not; in a fit, as it is taken.
+    noise, from_case: Noise of each channel that the case declares, and of which readings (m,) it is
+        the noise; that of others stands in the table.
+    slip_std, load_std: Declared noise of slip and of load (N), (n,); 0 where none is declared.
+    sensor_std: The part (m,) of `std` that is not noise of slip and load, where these were added.
+    excluded_channels: Columns that are not fitted, since their noise is not declared and that of
+        others is.
+    notes: Remarks on the table.
+    shared_errors: Standard deviations of the errors that all rows share, by name: as [bias]
+        declares them, or with those that sensors and models typically have.
+    condensed: What the rows stand for, where many were condensed.
     """
 
     at: Operating

@@ -67,9 +67,7 @@ def sine_and_versine(nodes: Nodes, angle: Array) -> tuple[Array, Array]:
     nodes: The fractions, in [0, 1], from a function of `soilml.numerics.quadrature`.
     angle (parts, batch): Angles (rad) from 0 to pi.
 
-    Returns
-    -------
-    sine, versine : array (parts, len(fractions), batch)
+    Returns: Sine and versine, (parts, len(fractions), batch) each.
     """
     xp = namespace(angle)
     count = TERMS if angle.dtype == xp.float64 else SINGLE_TERMS

@@ -83,13 +83,10 @@ def first_bracket(f: Callable[[Array], Array], grid: Array) -> tuple[Array, Arra
     f: Function of an array of shape (batch,), element by element.
     grid: Points (points, batch), increasing along the first axis.
 
-    Returns
-    -------
-    lower, upper, exists, peak
-        The ends of the interval, whether there is one, and the index of the point about which an
-        earlier crossing may be hidden between points: the highest point before the interval from
-        which `f` falls again, or the start of the interval if there is no such point, or the
-        highest point of all if there is no interval. Shape (batch,).
+    Returns: The ends of the interval, whether there is one, and the index of the point about which
+    an earlier crossing may be hidden between points: the highest point before the interval from
+    which `f` falls again, or the start of the interval if there is no such point, or the highest
+    point of all if there is no interval. Shape (batch,).
     """
     xp = namespace(grid)
     y = xp.stack([f(grid[i, :]) for i in range(grid.shape[0])], axis=0)

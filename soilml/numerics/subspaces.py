@@ -16,14 +16,11 @@ def column_space(
 ) -> Floats:
     """Orthonormal basis of the column space, by singular value decomposition.
 
-    Parameters
-    ----------
     columns : array (m, k)
-    relative_tolerance : float
-        Directions with a singular value at or below this fraction of the largest are dropped.
-    absolute_tolerance : float
-        Directions with a singular value at or below this value are dropped as well.
-
+    relative_tolerance: Directions with a singular value at or below this fraction of the
+        largest are dropped.
+    absolute_tolerance: Directions with a singular value at or below this value are dropped
+        as well.
     Returns (m, r): Left singular vectors of the r directions that are kept.
     """
     u, s, _ = np.linalg.svd(columns, full_matrices=False)

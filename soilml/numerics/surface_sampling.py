@@ -70,12 +70,8 @@ def surface_sample(
         power of it.
     most_rounds: Rounds after which it ends in any case.
 
-    Returns
-    -------
-    ImportanceSample or None
-        None where no polynomial is accurate enough, or not soon enough, or where predictions are
-        missing in the region.
-
+    Returns: None where no polynomial is accurate enough, or not soon enough, or where predictions
+    are missing in the region.
     References: Marzouk and Xiu, Communications in Computational Physics 6(4), 2009 (polynomials in
     place of a model in its posterior). Conrad, Marzouk, Pillai and Smith, J. American Statistical
     Association 111(516), 2016 (their refinement where the posterior is).

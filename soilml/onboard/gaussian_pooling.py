@@ -213,15 +213,11 @@ def pool(mean: Floats, covariance: Floats, prior: PriorSummary, weights: Floats)
 
     Directions in which a row is no more certain than the prior contribute nothing.
 
-    Parameters
-    ----------
-    mean, covariance : ndarray, shapes (..., m, q) and (..., m, q, q)
-        Estimates of the single rows.
-    prior : PriorSummary
-        The prior that every row's estimate contains.
-    weights : ndarray, shape (..., m)
-        Share w of each row's information that is used; below 1 where the errors of rows are
-        correlated because their operating conditions, or an unknown bearing, are the same.
+    mean, covariance (..., m, q) and (..., m, q, q): Estimates of the single rows.
+    prior: The prior that every row's estimate contains.
+    weights (..., m): Share w of each row's information that is used; below 1 where
+        the errors of rows are correlated because their operating conditions, or an unknown bearing,
+        are the same.
 
     References
     ----------

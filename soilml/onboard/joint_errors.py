@@ -240,17 +240,11 @@ def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> Fuse
     the file carries, does not average out. The averages of different files are then fused by
     `JointErrors`.
 
-    Parameters
-    ----------
-    mean, std : ndarray, shape (m, n, q)
-        Estimates of the m readings.
-    files : sequence of HeldOutErrors
-        Of the file that each reading was estimated by, (m,); `are_comparable` must hold.
+    mean, std (m, n, q): Estimates of the m readings.
+    files: Of the file that each reading was estimated by, (m,);
+        `are_comparable` must hold.
 
-    Raises
-    ------
-    ValueError
-        Where the files have too few held-out rows in common.
+    Raises `ValueError` where the files have too few held-out rows in common.
     """
     distinct = tuple(dict.fromkeys(files))
     members = [[i for i, other in enumerate(files) if other == file] for file in distinct]

@@ -72,11 +72,8 @@ class Memory:
         `LEAST_SINGULAR_VALUE` change no answer, and are left out: readings of one wheel have
         fewer directions than the system has columns.
 
-        Parameters
-        ----------
-        rows_before : int, optional
-            Rows of the memory before the last step: it is packed also where it has passed a
-            multiple of `PACKED_EVERY` since.
+        rows_before: Rows of the memory before the last step: it is packed also
+            where it has passed a multiple of `PACKED_EVERY` since.
 
         References
         ----------

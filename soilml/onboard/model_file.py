@@ -84,13 +84,7 @@ def find_model(path: str | os.PathLike[str]) -> Path:
 def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     """Open a model file and verify its checksums.
 
-    Returns
-    -------
-    session : onnxruntime.InferenceSession
-        On the CPU, with one thread.
-    metadata : dict of str to str
-        All metadata of the file.
-
+    Returns: The session, on the CPU with one thread, and all metadata of the file.
     Raises `ModelFileError` for a file that cannot be read, was not written by `soilml train`, has
     another format, or is damaged.
     """

@@ -50,23 +50,14 @@ def wheel_curves(
 ) -> WheelCurves:
     """Curves of a case's rover straight up a slope.
 
-    Parameters
-    ----------
-    case
-        With a rover. Effects of rig and sensors are left out.
-    draws
-        Draws (n, p) of the soil.
-    slope
-        In rad, a number or one for each draw (n,).
-    slip
-        Slips (m,).
-    speed
-        Travel speed, m/s, where an effect needs it.
+    case: With a rover. Effects of rig and sensors are left out.
+    draws: Draws (n, p) of the soil.
+    slope: In rad, a number or one for each draw (n,).
+    slip: Slips (m,).
+    speed: Travel speed, m/s, where an effect needs it.
 
-    Raises
-    ------
-    InputError
-        Where a wheel leaves the ground, or an effect needs what a rover does not tell.
+    Raises `InputError` where a wheel leaves the ground, or an effect needs what a rover does not
+    tell.
     """
     rover = case.rover
     assert rover is not None
@@ -115,28 +106,16 @@ def _forces(
 class RoverPerformance:
     """A rover straight up m slopes at constant speed, for n draws of the soil.
 
-    Attributes
-    ----------
-    slope
-        Slopes (m,), rad.
-    slip
-        Slip that the slope needs, (n, m); NaN where no slip up to the limit suffices.
-    margin
-        Largest pull up to the slip limit less the weight along the slope, N (n, m).
-    energy
-        Mechanical work of the wheels for each metre of travel, J/m (n, m).
-    loads
-        Of each wheel, N (m,).
-    torque, sinkage
-        Of each wheel at the needed slip, N m and m (n, m).
-    passes
-        Pass of each wheel.
-    steepest_slope
-        Of each draw, rad (n,); NaN where the rover does not move on level ground.
-    best_slip
-        Slip of the best ratio of pulling power to wheel power on level ground, (n,).
-    slip_limit
-        Highest slip considered.
+    slope: Slopes (m,), rad.
+    slip: Slip that the slope needs, (n, m); NaN where no slip up to the limit suffices.
+    margin: Largest pull up to the slip limit less the weight along the slope, N (n, m).
+    energy: Mechanical work of the wheels for each metre of travel, J/m (n, m).
+    loads: Of each wheel, N (m,).
+    torque, sinkage: Of each wheel at the needed slip, N m and m (n, m).
+    passes: Pass of each wheel.
+    steepest_slope: Of each draw, rad (n,); NaN where the rover does not move on level ground.
+    best_slip: Slip of the best ratio of pulling power to wheel power on level ground, (n,).
+    slip_limit: Highest slip considered.
     """
 
     slope: Floats
@@ -166,24 +145,14 @@ def rover_performance(
 
     at the least slip s that all wheels share, since their rims have one speed.
 
-    Parameters
-    ----------
-    case
-        With a rover, see `WheeledRover`.
-    draws
-        Draws (n, p) of the soil.
-    slopes
-        Slopes (m,) from 0 to 60 degrees, rad.
-    slip
-        Increasing slips up to the limit.
-    speed
-        Travel speed, m/s, where an effect needs it.
+    case: With a rover, see `WheeledRover`.
+    draws: Draws (n, p) of the soil.
+    slopes: Slopes (m,) from 0 to 60 degrees, rad.
+    slip: Increasing slips up to the limit.
+    speed: Travel speed, m/s, where an effect needs it.
 
-    Raises
-    ------
-    InputError
-        For a slope outside these bounds, on which a wheel leaves the ground, or under which more
-        than half of the draws do not carry a wheel.
+    Raises `InputError` for a slope outside these bounds, on which a wheel leaves the ground, or
+    under which more than half of the draws do not carry a wheel.
 
     Notes
     -----

@@ -235,11 +235,7 @@ def export_model(
     path: The file to write.
     data_path: The data that it was trained on; their checksum is part of the metadata.
 
-    Returns
-    -------
-    dict of str to str
-        The metadata of the file.
-
+    Returns: The metadata of the file.
     Raises `SoilmlError` where the float32 file differs from the float64 original by more than
     `TOLERANCE`.
     """

@@ -144,11 +144,8 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     def predict(self, X: Any, return_std: bool = False) -> Any:
         """Predict rows X (n, d).
 
-        Returns
-        -------
-        mean : ndarray, shape (n,) or (n, q), as y in `fit`
-        std : ndarray of the same shape
-            Only with `return_std`.
+        Returns: The mean (n,) or (n, q), as y in `fit`; with `return_std`, also the standard
+        deviation of the same shape.
         """
         check_is_fitted(self)
         X = validate_data(self, X, reset=False, dtype=np.float64)

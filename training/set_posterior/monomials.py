@@ -25,11 +25,8 @@ def monomial_terms(
     leading, leading_degree: Monomials of the first `leading` coordinates alone are included up to
         this degree.
 
-    Returns
-    -------
-    tuple of tuple of int
-        One ascending tuple for each monomial, all of length `max(degree, leading_degree)`; `ONE`
-        fills monomials of a lower degree.
+    Returns: One ascending tuple for each monomial, all of length `max(degree, leading_degree)`;
+    `ONE` fills monomials of a lower degree.
 
     Examples
     --------

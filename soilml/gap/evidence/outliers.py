@@ -37,19 +37,13 @@ def outliers(
 
     compared with a robust scale, the median of \|t\|, where that exceeds 1.
 
-    Parameters
-    ----------
     residual : array (m,)
-    space : array (m, q)
-        X, all that soil, effects and smooth functions could explain.
-    replicate_group : array (m,), optional
-        Group of each reading: readings of one group are repeats of each other, of one channel. A
-        reading whose repeat strays to the same side and agrees with it is a strange but repeatable
-        response and no outlier.
-    run : array (m,), optional
-        Run of each reading. Where a group has several runs, only another run confirms a reading:
-        neighbouring samples of one run may share a fault.
-
+    space (m, q): X, all that soil, effects and smooth functions could explain.
+    replicate_group (m,): Group of each reading: readings of one group are repeats
+        of each other, of one channel. A reading whose repeat strays to the same side and agrees
+        with it is a strange but repeatable response and no outlier.
+    run (m,): Run of each reading. Where a group has several runs, only another
+        run confirms a reading: neighbouring samples of one run may share a fault.
     References: Cook and Weisberg, Residuals and Influence in Regression, 1982.
     """
     whiten = covariance.whiten

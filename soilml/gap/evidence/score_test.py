@@ -51,17 +51,11 @@ def score_test(
     with C the cosines between the projected columns. The null distribution of the largest score is
     sampled.
 
-    Parameters
-    ----------
     residual : array (m,)
     columns : array (m, k)
-    space : array (m, p)
-        Directions that are projected out of the columns.
-    signs : array (k,)
-        1 or -1 for a column whose coefficient can only have that sign, else 0.
-    degrees_of_freedom : float
-        Of the noise estimate; the draws are from Student's t distribution.
-
+    space (m, p): Directions that are projected out of the columns.
+    signs (k,): 1 or -1 for a column whose coefficient can only have that sign, else 0.
+    degrees_of_freedom: Of the noise estimate; the draws are from Student's t distribution.
     References: Westfall and Young, Resampling-Based Multiple Testing, 1993.
     """
     projected = project_out(columns, space)

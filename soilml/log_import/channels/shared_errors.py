@@ -37,13 +37,8 @@ def shared_errors(
 ) -> tuple[dict[str, Noise], list[SharedError]]:
     """The errors that rows share, by column, and what each constant adds to them.
 
-    Parameters
-    ----------
-    quantities
-        Quantities (rows,) by name, of values of the constants.
-    constants
-        Constants with their standard deviations.
-
+    quantities: Quantities (rows,) by name, of values of the constants.
+    constants: Constants with their standard deviations.
     Each constant is changed by one standard deviation. The change of a quantity counts as relative
     or as an offset, whichever describes the rows better, and as [bias] can state it. Constants are
     taken as independent.

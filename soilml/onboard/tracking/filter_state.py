@@ -241,15 +241,9 @@ class FilterState:
     def from_arrays(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
         """The state that `as_arrays` wrote for the file of this identity.
 
-        Parameters
-        ----------
-        arrays : mapping
-            From `as_arrays`.
-        identity : str
-            Of the file.
-        start : Memory
-            A memory of the file without rows.
-
+        arrays: From `as_arrays`.
+        identity: Of the file.
+        start: A memory of the file without rows.
         Raises `InputError` for arrays of another file or version, or damaged ones.
         """
         try:
