@@ -19,8 +19,12 @@ def candidate_effects(case: Case, effects: Mapping[str, type[Effect]]) -> dict[s
 
     With several gears, an effect of soil, rig or sensor, and any effect that suits all gears, is
     one that they share; an effect whose cause is in the gear is offered for each gear alone too,
-    as `grousers@lugged`.
+    as `grousers@lugged`. Of a family of which the case has an effect, no other is offered.
     """
+    models = (case.model, *case.gears.values())
+    own = {e.name: e.about.family for model in models for e in model.effects}
+    taken = set(own.values()) - {""}
+    effects = {n: e for n, e in effects.items() if n in own or e.about.family not in taken}
     if not case.gears:
         return {name: e for name, e in effects.items() if e.applies_to(case.model.gear)}
     found = {}

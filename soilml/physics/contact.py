@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 from soilml.arrays import Array, Real, namespace
 from soilml.physics.operating_point import Operating
@@ -10,6 +11,8 @@ from soilml.physics.soils import Soil
 
 #: Depth (m) in place of none, where the stress is zero: log(0) has no derivative.
 SMALLEST_DEPTH = 1e-300
+#: Shear strength (Pa) below which the shear stress counts as none.
+SMALLEST_STRENGTH = 1e-30
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,7 @@ class Contact:
     shear_direction: Array | None = None  # 1 or -1, of the shear stress; None: that of the slip
     travel_ratio: Array | None = None  # v / (r omega), (batch,); None: 1 - slip
     repeats: int = 1  # how often the depths of the first points are repeated by the others
+    geometry: Any = None  # of the type that the gear's `contact_geometry` returns
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,26 @@ def stress(contact: Contact, soil: Soil, at: Operating) -> Stress:
     if signed:
         shear = shear * shear_direction(contact, at)
     return Stress(contact=contact, normal=normal, shear=shear)
+
+
+def with_normal(stress: Stress, normal: Array, soil: Soil) -> Stress:
+    """The stresses with another normal stress (Pa), and the shear stress that its friction permits.
+
+    The mobilised share of the strength c + sigma tan(phi) stays.
+    """
+    tan = namespace(normal).tan(soil.friction_angle)
+    return with_strength(
+        replace(stress, normal=normal),
+        before=soil.cohesion + stress.normal * tan,
+        strength=soil.cohesion + normal * tan,
+    )
+
+
+def with_strength(stress: Stress, before: Array, strength: Array) -> Stress:
+    """The stresses where the shear strength is `strength` in place of `before` (Pa)."""
+    xp = namespace(before)
+    ratio = strength / xp.maximum(before, xp.full_like(before, SMALLEST_STRENGTH))
+    return replace(stress, shear=stress.shear * ratio)
 
 
 def mobilised_fraction(displacement: Array, soil: Soil) -> Array:

@@ -65,13 +65,15 @@ class FitProblem:
     def effects_not_in(self, fit: Solution) -> dict[str, type[Effect]]:
         """The effects of the catalogue without coordinates in a fit.
 
-        An effect that all gears share and the same effect of one gear exclude each other.
+        An effect that all gears share and the same effect of one gear exclude each other, and so do
+        two forms of one law.
         """
-        fitted = {c.effect for c in fit.coordinates if c.effect}
-        excluded = {
-            other for name in fitted for other in self.effects if exclude_each_other(name, other)
+        fitted = [self.effects[name] for name in {c.effect for c in fit.coordinates if c.effect}]
+        return {
+            name: effect
+            for name, effect in self.effects.items()
+            if not any(exclude_each_other(effect, other) for other in fitted)
         }
-        return {name: effect for name, effect in self.effects.items() if name not in excluded}
 
     def with_effects(self, names: Sequence[str]) -> Case:
         """The case with these effects added."""
@@ -184,10 +186,18 @@ def _raised(fit: Solution | InputError) -> Solution:
     return fit
 
 
-def exclude_each_other(name: str, other: str) -> bool:
-    """Whether two effects are the same one, or one of them is the other for a single gear."""
-    (base, _, gear), (other_base, _, other_gear) = name.partition("@"), other.partition("@")
-    return name == other or (base == other_base and not (gear and other_gear))
+def exclude_each_other(effect: type[Effect], other: type[Effect]) -> bool:
+    """Whether two effects cannot be in one set: both act on one gear, as one effect or one family.
+
+    An effect that all gears share acts on each of them.
+    """
+    (base, _, gear), (other_base, _, other_gear) = (
+        own.name.partition("@") for own in (effect, other)
+    )
+    if gear and other_gear and gear != other_gear:
+        return False
+    family = effect.about.family
+    return base == other_base or (bool(family) and other.about.family == family)
 
 
 #: Fits at most under successive estimates of the discrepancy; the estimate of the amplitudes hardly

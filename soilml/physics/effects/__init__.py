@@ -18,6 +18,13 @@ from soilml.physics.effects.stress_shift import StressShift as StressShift
 from soilml.physics.effects.small_wheel_stiffness import SmallWheelStiffness as SmallWheelStiffness
 from soilml.physics.effects.wheel_flexibility import WheelFlexibility as WheelFlexibility
 from soilml.physics.effects.shear_softening import ShearSoftening as ShearSoftening
+from soilml.physics.effects.hyperbolic_shear import HyperbolicShear as HyperbolicShear
+from soilml.physics.effects.curved_envelope import CurvedEnvelope as CurvedEnvelope
+from soilml.physics.effects.elliptic_pressure import EllipticPressure as EllipticPressure
+from soilml.physics.effects.parabolic_pressure import ParabolicPressure as ParabolicPressure
+from soilml.physics.effects.saturating_pressure import SaturatingPressure as SaturatingPressure
+from soilml.physics.effects.firm_base import FirmBase as FirmBase
+from soilml.physics.effects.reece_width import ReeceWidth as ReeceWidth
 from soilml.physics.effects.sidewall_shear import SidewallShear as SidewallShear
 from soilml.physics.effects.depth_cohesion import DepthCohesion as DepthCohesion
 from soilml.physics.effects.rate_dependence import Rate as Rate

@@ -61,6 +61,8 @@ class EffectCard:
     #: for sensors and rigs: standard deviation of the fault that remains in a checked setup, in the
     #: unit of the effect's size; None where it is unknown
     calibration: float | None = None
+    #: the law that it is another form of; a search names one effect of a family at most
+    family: str = ""
 
     @property
     def size(self) -> str:

@@ -37,6 +37,7 @@ class ShearSoftening(SlipLoadScaling):
         reference={"share": 0.5},
         signs={},
         isolate="a shear-ring test of the soil; runs from the smallest to the largest slip",
+        family="shear law",
     )
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "share of Wong's curve")] = 0.0
     residual: Annotated[Real, Parameter("1", 0.05, 1.0, "K_r, residual / peak stress")] = 0.7

@@ -67,6 +67,7 @@ class LinearWheel(RigidWheel):
             width=geometry.width,
             shear_direction=displacement_direction(displacement, at.slip, self.braking),
             travel_ratio=travelled,
+            geometry=geometry,
         )
 
     def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:

@@ -14,6 +14,7 @@ from typing import Annotated, Literal, final, get_args
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import Parameter
+from soilml.physics.contact import Contact
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
@@ -150,6 +151,31 @@ class WheelArc:
     def travelled(self, slip: Array, law: BrakingLaw) -> Array:
         """Travel of the axle over that of the shearing surface, of slip ratios (batch,)."""
         return (1.0 - displacement_slip(slip, law)) * self.travel
+
+
+def way_to_peak(contact: Contact) -> Array:
+    """How far points (points, batch) are from the nearer end of a wheel's contact to its maximum.
+
+    0 at entry and exit, 1 at the maximum stress, by the angle.
+    """
+    rim: WheelArc = contact.geometry
+    xp = namespace(contact.surface_travel)
+    passed = contact.surface_travel / rim.shear_radius
+    before = passed / (rim.entry - rim.peak)
+    behind = (rim.entry - rim.exit - passed) / (rim.peak - rim.exit)
+    return xp.maximum(xp.minimum(before, behind), xp.zeros_like(before))
+
+
+def largest_pressure(contact: Contact, soil: Soil) -> Array:
+    r"""Bekker's pressure at the angle of maximum stress of a wheel, Pa, (batch,).
+
+    .. math:: \sigma_m = (k_c / b + k_\varphi) [r (\cos\theta_m - \cos\theta_1)]^n
+    """
+    rim: WheelArc = contact.geometry
+    xp = namespace(rim.entry)
+    half_sum, half = 0.5 * (rim.entry + rim.peak), 0.5 * (rim.entry - rim.peak)
+    depth = 2.0 * rim.radius * xp.sin(half_sum) * xp.sin(half)
+    return (soil.kc / contact.width + soil.kphi) * xp.exp(soil.n * xp.log(depth))
 
 
 @dataclass(frozen=True, kw_only=True)

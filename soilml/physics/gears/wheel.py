@@ -157,6 +157,7 @@ def _two_part_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int)
         width=rim.width,
         shear_direction=displacement_direction(displacement, at.slip, law),
         travel_ratio=travelled,
+        geometry=rim,
         repeats=2,
     )
 
@@ -217,6 +218,7 @@ def _braking_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) 
         width=rim.width,
         shear_direction=displacement_direction(displacement, at.slip, law),
         travel_ratio=travelled,
+        geometry=rim,
     )
 
 
@@ -276,4 +278,5 @@ def contact_at(
         width=rim.width,
         shear_direction=displacement_direction(displacement, at.slip, law),
         travel_ratio=travelled,
+        geometry=rim,
     )

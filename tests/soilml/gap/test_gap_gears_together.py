@@ -160,8 +160,18 @@ def test_runs_to_add_name_the_gear_to_drive():
         ("grousers", "grousers@lugged", True),
         ("grousers@smooth", "grousers@lugged", False),
         ("grousers@lugged", "grousers@lugged", True),
-        ("grousers@lugged", "sidewall-shear@lugged", False),
+        ("shear-softening", "hyperbolic-shear", True),
     ],
 )
-def test_a_shared_effect_excludes_that_of_one_gear(name, other, excluded):
-    assert exclude_each_other(name, other) is exclude_each_other(other, name) is excluded
+def test_a_shared_effect_excludes_that_of_one_gear_and_its_family(name, other, excluded):
+    offered = candidate_effects(case_of(WIDTHS + REST), EFFECTS)
+    pair = offered[name], offered[other]
+    assert exclude_each_other(*pair) is exclude_each_other(*reversed(pair)) is excluded
+
+
+def test_of_the_family_of_an_effect_that_the_case_has_no_other_is_offered():
+    case = case_of(WIDTHS + REST)
+    case = with_effect(case, EFFECTS["shear-softening"])
+    offered = candidate_effects(case, EFFECTS)
+    assert "shear-softening" in offered and "hyperbolic-shear" not in offered
+    assert "curved-envelope" in offered

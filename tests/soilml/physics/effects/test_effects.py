@@ -27,8 +27,17 @@ PUBLISHED = Path(__file__).parents[1] / "declared_parameters.csv"
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
 FORCES = ("load", "torque", "drawbar_pull", "sinkage", "entry_angle", "status")
 
-RIGID = [name for name, gear in GEARS.items() if issubclass(gear, RigidWheel)]
 OF_WHEELS = [name for name, effect in EFFECTS.items() if effect.applies_to(WHEEL.gear)]
+#: With every rigid wheel that the effect applies to.
+on_every_wheel = pytest.mark.parametrize(
+    ("name", "gear"),
+    [
+        (name, gear)
+        for name in OF_WHEELS
+        for gear, cls in GEARS.items()
+        if issubclass(cls, RigidWheel) and EFFECTS[name].applies_to(cls(radius=0.15, width=0.12))
+    ],
+)
 every = pytest.mark.parametrize("name", OF_WHEELS)
 TRACK = Model(Track(radius=0.1, width=0.08, base=0.6))
 #: Those of tracks alone are tried on a track.
@@ -63,8 +72,7 @@ def plain(gear):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gear", RIGID)
-@every
+@on_every_wheel
 def test_neutral_changes_nothing_to_the_last_bit(name, gear):
     box = input_box(128, seed=4)
     assert (box["slip"] < 0).any() and (box["slip"] > 0).any()
@@ -82,8 +90,7 @@ def test_an_effect_that_is_given_no_size_is_neutral(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("gear", RIGID)
-@every
+@on_every_wheel
 def test_finite_over_the_whole_box_or_flagged(name, gear):
     box, known = input_box(256, seed=8), known_to(256)
     for share in (0.5, 2.0):

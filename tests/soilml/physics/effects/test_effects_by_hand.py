@@ -144,6 +144,87 @@ def test_the_hump_of_the_shear_curve_is_one_at_its_peak_and_falls_to_the_residua
     np.testing.assert_allclose(half, 0.5 * (before.shear + full), rtol=1e-12)
 
 
+def test_the_hyperbola_mobilises_half_the_strength_at_its_modulus_and_nine_tenths_at_nine():
+    modulus = SAND.shear_modulus
+    before, scene = sheared_by(modulus * np.asarray([1e-9, 1.0, -9.0]))
+    effect = EFFECTS["hyperbolic-shear"](share=1.0)
+    curve = np.abs(effect.on_stress(before, scene).shear) / strength(before)
+    assert curve == pytest.approx([1e-9, 0.5, 0.9])
+    half = replace(effect, share=0.5).on_stress(before, scene).shear
+    full = effect.on_stress(before, scene).shear
+    np.testing.assert_allclose(half, 0.5 * (before.shear + full), rtol=1e-12)
+
+
+def pressed(normal, ground=SAND):
+    """Fully sheared points under these normal stresses (Pa), without a gear."""
+    found, scene = sheared_by(np.full(len(normal), 1.0), ground=ground)
+    found = replace(found, normal=np.asarray(normal, dtype=float))
+    return replace(found, shear=strength(found, ground)), scene
+
+
+def test_on_a_curved_envelope_friction_falls_with_the_normal_stress():
+    before, scene = pressed([0.0, 1e4, 4e4])
+    found = EFFECTS["curved-envelope"](exponent=0.5).on_stress(before, scene)
+    friction = np.tan(SAND.friction_angle) * np.asarray([0.0, 1e4, 2e4])
+    np.testing.assert_allclose(found.shear, SAND.cohesion + friction, rtol=1e-12)
+    np.testing.assert_array_equal(found.normal, before.normal)
+
+
+@pytest.mark.parametrize("slip", [0.3, -0.3])
+@pytest.mark.parametrize(
+    "name, shape",
+    [
+        ("elliptic-pressure", lambda x: np.sqrt(1 - x**2)),
+        ("parabolic-pressure", lambda x: 1 - x**2),
+    ],
+)
+def test_pressure_of_another_shape_has_the_maximum_of_bekkers(name, shape, slip):
+    model = WHEEL + EFFECTS["exit-angle"](kappa=0.2) + EFFECTS[name](share=1.0)
+    found = model.profile(SAND, replace(AT, slip=slip), 801)
+    angle, normal = found.angle, found.normal
+    first, last = angle[0], angle[-1]
+    peak = (SAND.a0 + SAND.a1 * slip) * first
+    depth = 0.15 * (np.cos(peak) - np.cos(first))
+    largest = (SAND.kc / 0.12 + SAND.kphi) * depth**SAND.n
+    side = np.where(angle > peak, first - peak, peak - last)
+    np.testing.assert_allclose(
+        normal, largest * shape(np.minimum(np.abs(angle - peak) / side, 1.0)), atol=1e-5 * largest
+    )
+    # the soil carries the load, and friction is that of the new pressure
+    across = np.trapezoid(-normal * np.cos(angle) - found.shear * np.sin(angle), angle, axis=0)
+    np.testing.assert_allclose(across * 0.15 * 0.12, 60.0, rtol=2e-3)
+    ratio = np.abs(found.shear) / (SAND.cohesion + normal * np.tan(SAND.friction_angle))
+    assert (ratio <= 1.0).all() and ratio.max() > 0.3
+
+
+def test_pressure_saturates_at_its_limit():
+    before, scene = pressed([0.0, 1e3, 5e4, 1e8])
+    found = EFFECTS["saturating-pressure"](softness=2e-5).on_stress(before, scene)
+    expected = 5e4 * np.asarray([0.0, 1 - np.exp(-0.02), 1 - np.exp(-1.0), 1.0])
+    np.testing.assert_allclose(found.normal, expected, rtol=1e-12)
+    np.testing.assert_allclose(found.shear, strength(found), rtol=1e-12)
+
+
+def test_a_base_doubles_the_pressure_at_its_depth():
+    before, scene = pressed([2e4, 3e4])  # 1 cm deep
+    found = EFFECTS["firm-base"](nearness=100.0, steepness=3.0).on_stress(before, scene)
+    np.testing.assert_allclose(found.normal, [4e4, 6e4], rtol=1e-12)
+    deeper = EFFECTS["firm-base"](nearness=50.0, steepness=3.0).on_stress(before, scene)
+    np.testing.assert_allclose(deeper.normal, [2e4 * 1.125, 3e4 * 1.125], rtol=1e-12)
+    np.testing.assert_allclose(deeper.shear, strength(deeper), rtol=1e-12)
+
+
+@pytest.mark.parametrize("width", [0.05, 0.1, 0.2])
+def test_reeces_pressure_depends_on_sinkage_over_width(width):
+    ground = replace(SAND, n=0.7)
+    # k1 and k2 at which the two laws agree for a width of 0.1 m
+    k1, k2 = (k * 0.1 ** (ground.n - 1.0) for k in (ground.kc, ground.kphi))
+    gear = Wheel(radius=0.15, width=width)
+    modulus = (k1 + k2 * width) / width**ground.n
+    other = replace(ground, kc=0.0, kphi=modulus)
+    same((Model(gear) + EFFECTS["reece-width"](share=1.0))(ground, AT), Model(gear)(other, AT))
+
+
 def test_side_walls_of_a_wheel_buried_to_the_hub_are_quarter_circles():
     area, depth = buried(np.asarray([np.pi / 2]))
     assert area == pytest.approx(np.pi / 4)
