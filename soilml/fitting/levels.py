@@ -90,9 +90,8 @@ def find_levels(values: Floats, rule: LevelRule, run: Integers | None = None) ->
     says is a range without gaps, which is divided into levels of equal width.
 
     values (n,): On the scale of the rule: logarithms of loads, for example.
-    rule : LevelRule
-    run (n,): Run of each value. Equal values of one run count as one value that
-        was set once; without runs, or in one run alone, each value counts.
+    run (n,): Run of each value. Equal values of one run count as one value that was set once;
+        without runs, or in one run alone, each value counts.
 
     Examples
     --------

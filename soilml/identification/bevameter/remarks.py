@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.identification.bevameter.plate_tests import PressureSinkageFit
 from soilml.identification.bevameter.scatter import is_level
 from soilml.identification.bevameter.shear_tests import ShearFit
@@ -81,7 +82,12 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
             f"{fit.sizes[0]:.3g} m",
             ("kc",),
         )
-    yield from _repeats_of_plates(fit)
+    yield from _repeats(
+        np.asarray([test.size for test in fit.tests]),
+        np.exp([curve.log_pressure for curve in fit.curves]),
+        [(b, f"with the plate of {b:.3g} m", f"pressure at {fit.depth:.3g} m") for b in fit.sizes],
+        "no plate test was repeated: a usual scatter of 15 % in pressure is assumed",
+    )
     halves = np.asarray([c.halves for c in fit.curves if np.isfinite(c.halves).all()])
     if halves.size and abs(np.diff(halves.mean(axis=0))[0]) > NOTABLE_BEND:
         shallow, deep = halves.mean(axis=0)
@@ -102,23 +108,21 @@ def plate_remarks(fit: PressureSinkageFit) -> Iterator[Remark]:
         )
 
 
-def _repeats_of_plates(fit: PressureSinkageFit) -> Iterator[Remark]:
-    size = np.asarray([test.size for test in fit.tests])
-    log_pressure = np.asarray([curve.log_pressure for curve in fit.curves])
-    for level in fit.sizes:
-        near = log_pressure[is_level(size, level)]
+def _repeats(
+    at: Floats, value: Floats, levels: Sequence[tuple[float, str, str]], otherwise: str
+) -> Iterator[Remark]:
+    """How far tests (n,) of one level differ in a value (n,); `otherwise` where none is repeated.
+
+    levels: Each with what its tests have in common, and what they differ in, in words.
+    """
+    for level, where, what in levels:
+        near = value[is_level(at, level)]
         if near.size > 1:
-            yield Remark(
-                "repeats-differ",
-                f"{near.size} tests with the plate of {level:.3g} m differ by a factor "
-                f"{math.exp(np.ptp(near)):.2f} in pressure at {fit.depth:.3g} m",
-                severity="note",
-            )
-    if size.size == len(fit.sizes):
-        yield Remark(
-            "not-repeated",
-            "no plate test was repeated: a usual scatter of 15 % in pressure is assumed",
-        )
+            factor = near.max() / near.min()
+            text = f"{near.size} tests {where} differ by a factor {factor:.2f} in {what}"
+            yield Remark("repeats-differ", text, severity="note")
+    if at.size == len(levels):
+        yield Remark("not-repeated", otherwise)
 
 
 def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
@@ -143,7 +147,13 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
             "the failure line meets the axis below zero: cohesion is set to zero",
             ("cohesion",),
         )
-    yield from _repeats_of_shear(fit)
+    yield from _repeats(
+        np.asarray([test.normal_stress for test in fit.tests]),
+        np.asarray([curve.strength for curve in fit.curves]),
+        [(sigma, f"at {_kpa(sigma)} kPa", "strength") for sigma in fit.stresses],
+        "no shear test was repeated: the scatter is that of the tests about the line, and a usual "
+        "one of 8 % in strength",
+    )
     if fit.halves:
         (c0, phi0), (c1, phi1) = fit.halves
         yield Remark(
@@ -171,26 +181,6 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
             "normal-stress-varies",
             f"the normal stress varies by more than 5 % within {_list(varying)}; its mean is used",
             tuple(varying),
-        )
-
-
-def _repeats_of_shear(fit: ShearFit) -> Iterator[Remark]:
-    sigma = np.asarray([test.normal_stress for test in fit.tests])
-    strength = np.asarray([curve.strength for curve in fit.curves])
-    for level in fit.stresses:
-        near = strength[is_level(sigma, level)]
-        if near.size > 1:
-            yield Remark(
-                "repeats-differ",
-                f"{near.size} tests at {_kpa(level)} kPa differ by a factor "
-                f"{near.max() / near.min():.2f} in strength",
-                severity="note",
-            )
-    if len(fit.tests) == len(fit.stresses):
-        yield Remark(
-            "not-repeated",
-            "no shear test was repeated: the scatter is that of the tests about the line, and a "
-            "usual one of 8 % in strength",
         )
 
 

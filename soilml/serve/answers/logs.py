@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from soilml.config.case import Case
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
@@ -95,7 +94,7 @@ def is_table_of_runs(file: Path) -> bool:
     return header >= {*RUNS} or (len(header & _KNOWN) >= 2 and not clock)
 
 
-def table_summary(table: Table, case: Case | None = None) -> dict[str, Any]:
+def table_summary(table: Table) -> dict[str, Any]:
     """Rows, runs, ranges and readings of a table, for a picture of it."""
     rows = table.rows(table.answered)
     index = np.unique(np.linspace(0, max(len(rows) - 1, 0), min(len(rows), _DRAWN)).astype(int))
