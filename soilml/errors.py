@@ -14,6 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from typing import TypeVar
+
+T = TypeVar("T")
 
 
 class SoilmlError(Exception):
@@ -52,6 +55,13 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
     near = get_close_matches(name, list(known), 1, 0.5)
     return f"did you mean {near[0]!r}? " if near else ""
+
+
+def raised(answer: T | InputError) -> T:
+    """The answer; an `InputError` in its place is raised."""
+    if isinstance(answer, InputError):
+        raise answer
+    return answer
 
 
 @contextmanager

@@ -17,7 +17,7 @@ import numpy as np
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
-from soilml.errors import InputError
+from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.joined_cases import CaseSets, join_key, joined_load_case
 from soilml.fitting.operating_points import rows_by_gear
@@ -152,9 +152,7 @@ def linearise_many(requests: Sequence[PredictionRequest]) -> list[Linearisation 
 def predict(case: Case, coordinates: Sequence[Coordinate], x: Floats, readings: Readings) -> Floats:
     """Predictions (sets, m) at coordinates `x` (sets, p); NaN where there is no equilibrium."""
     (prediction,) = predict_many([PredictionRequest(case, coordinates, x, readings)])
-    if isinstance(prediction, InputError):
-        raise prediction
-    return prediction
+    return raised(prediction)
 
 
 def linearise(
@@ -171,9 +169,7 @@ def linearise(
     """
     start = None if near is None else near.sinkage_at((x - near.x)[None, :])
     (found,) = linearise_many([PredictionRequest(case, coordinates, x[None, :], readings, start)])
-    if isinstance(found, InputError):
-        raise found
-    return found
+    return raised(found)
 
 
 def predict_channels(

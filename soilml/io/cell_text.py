@@ -28,6 +28,15 @@ def read_number(text: str) -> float:
     return value
 
 
+def is_number(text: str) -> bool:
+    """Whether a text is a number as `read_number` takes it."""
+    try:
+        read_number(text)
+    except ValueError:
+        return False
+    return True
+
+
 def read_numbers(texts: Sequence[str]) -> list[float]:
     """What `read_number` gives for each text, in a fifth of the time; raises as it does."""
     if not _CHARACTERS.issuperset("".join(texts)):

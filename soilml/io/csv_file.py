@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
-from soilml.io.cell_text import cell_as_text, read_number, read_numbers
+from soilml.io.cell_text import cell_as_text, is_number, read_numbers
 from soilml.io.table import TEXT, Column, text_column
 
 #: Rows that a table may have: more do not fit into the memory of a usual machine.
@@ -121,18 +121,10 @@ def _column(file: Path, name: str, cells: list[str], lines: NDArray[np.int64]) -
     try:
         values[filled] = read_numbers([cells[i] for i in filled])
     except ValueError:
-        wrong = next(i for i in filled if not _is_number(cells[i]))
+        wrong = next(i for i in filled if not is_number(cells[i]))
         shown = cells[wrong] if len(cells[wrong]) <= _SHOWN else f"{cells[wrong][:_SHOWN]}..."
         raise TableError(
             f"{file} line {lines[wrong]}, column {name}: {shown!r} is not a number; needed "
             "is a finite number, or a blank cell where it was not measured"
         ) from None
     return values
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        read_number(cell)
-    except ValueError:
-        return False
-    return True

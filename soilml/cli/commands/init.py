@@ -8,7 +8,7 @@ from pathlib import Path
 
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
-from soilml.io.cell_text import read_number
+from soilml.io.cell_text import is_number, read_number
 
 HELP = "write a first model file, with comments"
 DESCRIPTION = """\
@@ -120,7 +120,7 @@ def _text(given: dict[str, str | float | None], mass: float | None, wheels: int 
             f"no soil {name!r}; {did_you_mean(str(name), catalogue)}`soilml soils` lists them"
         )
     noise = str(given["torque_noise"] or "2 %")
-    written = noise if _is_number(noise) else f'"{noise}"'
+    written = noise if is_number(noise) else f'"{noise}"'
     parts = [
         "# Model file of soilml; docs/model-file.md explains every section. SI units.",
         f'[gear]\ntype = "wheel"\nradius = {given["radius"]} # m\nwidth = {given["width"]} # m',
@@ -173,11 +173,3 @@ def _rover(mass: float, wheels: int) -> str:
         for side, y in (("left", 0.5 * TRACK), ("right", -0.5 * TRACK)):
             lines.append(f"row{row + 1}-{side} = {{ position = [{x:g}, {y:g}] }}")
     return "\n".join(lines)
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True

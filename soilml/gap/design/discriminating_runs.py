@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.errors import InputError
+from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
@@ -25,8 +24,6 @@ from soilml.gap.search.explanation import Explanation
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
-
-T = TypeVar("T")
 
 #: Sigma at which a discrimination is capped: beyond it, more makes no practical difference.
 MAX_DISCRIMINATION = 10.0
@@ -123,20 +120,13 @@ def _predictions(option: RunOption, readings: Readings, fits: Mapping[str, Solut
         for at in ways
         for fit in fits.values()
     ]
-    predicted = np.concatenate([_known(found) for found in predict_many(requests)])
+    predicted = np.concatenate([raised(found) for found in predict_many(requests)])
     return predicted.reshape(len(ways), len(fits), len(readings))
 
 
 def _is_plain_repeat(readings: Readings, y: Floats) -> bool:
     """Whether every explanation predicts for a run what it predicts for the plain run."""
     return len(y) > 1 and not np.any(np.abs(y[0] - y[1]) > SAME_PREDICTION * readings.std)
-
-
-def _known(answer: T | InputError) -> T:
-    """The answer of the model; an `InputError` in its place is raised."""
-    if isinstance(answer, InputError):
-        raise answer
-    return answer
 
 
 def _without_equal_rows(runs: Sequence[NextRun]) -> list[NextRun]:
@@ -206,7 +196,7 @@ def _differences(
         PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
         for fit in fits.values()
     )
-    linear = [_known(found) for found in linearise_many(rivals)]
+    linear = [raised(found) for found in linearise_many(rivals)]
     return [(whiten @ (expected - one.prediction), whiten @ one.jacobian) for one in linear]
 
 

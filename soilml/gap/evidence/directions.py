@@ -14,7 +14,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate, size_coordinate
 from soilml.fitting.levels import Levels, covariate_levels
-from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
+from soilml.fitting.predictions import PredictionRequest, linearise, predict_many
 from soilml.fitting.readings import Readings
 from soilml.gap.candidate_effects import gears_differ, with_effect
 from soilml.physics.effects.base import Effect
@@ -50,9 +50,7 @@ def effect_signatures(
 
     An effect that the case has already is changed from its present size, which may be wrong.
     """
-    (base,) = linearise_many([PredictionRequest(case, [], np.zeros((1, 0)), readings)])
-    if isinstance(base, InputError):
-        raise base
+    base = linearise(case, [], np.zeros(0), readings)
     sinkage = base.sinkage_at(np.zeros((1, 0)))
     requests = []
     reasons: dict[str, Remark] = {}

@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.errors import InputError
+from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coordinate
 from soilml.fitting.covariance import Whitening, discrepancy_process
 from soilml.fitting.damped_descents import descend_together
@@ -108,13 +108,13 @@ class FitProblem:
         whiten = self.covariance.whiten
         problem = LeastSquaresProblem(self.case, self.soil, self.readings, whiten)
         fits = descend_together([problem] * len(starts), starts)
-        return min((_raised(fit) for fit in fits), key=lambda fit: fit.objective)
+        return min((raised(fit) for fit in fits), key=lambda fit: fit.objective)
 
     def fit(
         self, case: Case, coordinates: Sequence[Coordinate], start: Mapping[str, float]
     ) -> Solution:
         """One fit; see `fit_many`."""
-        return _raised(fit_many(self, [StartedFit(case, coordinates, start)])[0])
+        return raised(fit_many(self, [StartedFit(case, coordinates, start)])[0])
 
     def first_coordinates(
         self, coordinates: Sequence[Coordinate], start: Mapping[str, float]
@@ -177,13 +177,6 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
 def _without_effects(coordinates: Sequence[Coordinate], start: Mapping[str, float]) -> Floats:
     """The coordinates of the soil at their start, those of effects at zero."""
     return np.asarray([start.get(c.path, 0.0) if not c.effect else 0.0 for c in coordinates])
-
-
-def _raised(fit: Solution | InputError) -> Solution:
-    """The fit; an `InputError` in its place is raised."""
-    if isinstance(fit, InputError):
-        raise fit
-    return fit
 
 
 def exclude_each_other(effect: type[Effect], other: type[Effect]) -> bool:
