@@ -141,10 +141,10 @@ def gear_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[st
     yield from _fixed_differences(case, other, owner, _is_of_gear, SIZE_TOLERANCE)
 
 
-def value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:
+def value_differences(case: Case, other: Case) -> Iterator[str]:
     """Differences of the fixed values of soil and effects; what `other` varies has no value."""
-    yield from soil_value_differences(case, other, owner)
-    yield from effect_value_differences(case, other, owner)
+    yield from soil_value_differences(case, other)
+    yield from effect_value_differences(case, other)
 
 
 def soil_value_differences(case: Case, other: Case, owner: str = OWNER) -> Iterator[str]:

@@ -19,13 +19,13 @@ WIDTH = 100  # Characters of a line of an aligned table
 _LEAST_WRAPPED = 16  # Fewest characters to which a column is wrapped
 
 
-def wrapped(text: str, width: int = WIDTH) -> str:
+def wrapped(text: str) -> str:
     """The text with its longer lines broken between words; what follows a break is indented."""
     return "\n".join(
         line
-        if len(line) <= width
+        if len(line) <= WIDTH
         else textwrap.fill(
-            line, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
+            line, WIDTH, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False
         )
         for line in text.split("\n")
     )

@@ -58,10 +58,9 @@ def process_columns(
 def independent_process_columns(
     points: Floats,
     group: Integers,
-    amplitude: float = 1.0,
     least_eigenvalue: float = LEAST_EIGENVALUE,
 ) -> Floats:
-    """Columns (n, q) of processes of equal covariance, one for each group of points.
+    """Columns (n, q) of processes of equal and unit covariance, one for each group of points.
 
     They are those of `process_columns`; a column is zero at the points of other groups.
 
@@ -69,7 +68,7 @@ def independent_process_columns(
     """
     parts = [np.zeros((len(points), 0))]
     for number in np.unique(group):
-        own = process_columns(points[group == number], amplitude, least_eigenvalue)
+        own = process_columns(points[group == number], 1.0, least_eigenvalue)
         parts.append(np.zeros((len(points), own.shape[1])))
         parts[-1][group == number] = own
     return np.concatenate(parts, axis=1)

@@ -30,9 +30,9 @@ def column_space(
     return np.asarray(u[:, s > tolerance])
 
 
-def project_out(columns: Floats, space: Floats, relative_tolerance: float = ROUNDING) -> Floats:
+def project_out(columns: Floats, space: Floats) -> Floats:
     """Component of columns (m, k) that is orthogonal to the column space of `space` (m, p)."""
     if space.shape[1] == 0:
         return columns
-    basis = column_space(space, relative_tolerance=relative_tolerance)
+    basis = column_space(space, relative_tolerance=ROUNDING)
     return np.asarray(columns - basis @ (basis.T @ columns))

@@ -50,7 +50,6 @@ def surface_sample(
     density: ModelDensity,
     p: int,
     start: ImportanceSample | None = None,
-    seed: int = 0,
     tempered_rounds: int = MOST_ROUNDS,
     most_rounds: int = MOST_ROUNDS,
 ) -> ImportanceSample | None:
@@ -65,7 +64,6 @@ def surface_sample(
     density: The model and the density.
     p: Number of variables.
     start: Samples of a density that is similar and wider.
-    seed: Of the random numbers.
     tempered_rounds: Rounds after which polynomials must be accurate enough for the density, not a
         power of it.
     most_rounds: Rounds after which it ends in any case.
@@ -76,7 +74,7 @@ def surface_sample(
     place of a model in its posterior). Conrad, Marzouk, Pillai and Smith, J. American Statistical
     Association 111(516), 2016 (their refinement where the posterior is).
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     points, predictions = [], []
     samples, surrogate, reach = start, None, REACH
     for turn in range(1, most_rounds + 1):

@@ -145,10 +145,10 @@ def format_estimate(value: Estimated) -> str:
     return with_unit(format_with_std(factor * value.value, factor * value.std), unit)
 
 
-def format_quantity(value: float, unit: str, digits: int = 3) -> str:
+def format_quantity(value: float, unit: str) -> str:
     """A number in an SI unit, in the display unit of its kind."""
     factor, shown = display_unit(unit, abs(value))
-    return with_unit(format_number(factor * value, digits), shown)
+    return with_unit(format_number(factor * value), shown)
 
 
 def format_in_si(value: Estimated) -> str:

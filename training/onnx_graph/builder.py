@@ -135,16 +135,16 @@ class Graph:
         total = self.op("Add", self.op("Add", cross, own), self.constant((centres**2).sum(axis=1)))
         return self.op("Max", total, self.constant(np.float64(0.0)))
 
-    def reduced(self, kind: str, x: str, axis: int, keep: bool = False) -> str:
+    def reduced(self, kind: str, x: str, axis: int) -> str:
         """A reduction over one axis."""
-        return self.op(kind, x, self._axis(axis), keepdims=int(keep))
+        return self.op(kind, x, self._axis(axis), keepdims=0)
 
     def _axis(self, axis: int) -> str:
         return self.constant(np.asarray([axis], dtype=np.int64))
 
-    def reshaped(self, x: str, *shape: int, out: str | None = None) -> str:
+    def reshaped(self, x: str, *shape: int) -> str:
         """A value in a new shape; 0 keeps a dimension, one -1 is computed."""
-        return self.op("Reshape", x, self.constant(np.asarray(shape, dtype=np.int64)), out=out)
+        return self.op("Reshape", x, self.constant(np.asarray(shape, dtype=np.int64)))
 
     def default(self, name: str, value: Any) -> None:
         """Give an input of the graph a default value, for callers that do not feed it."""

@@ -28,9 +28,9 @@ def log_squared_residuals(residual: Floats) -> Floats:
     return np.asarray(np.log(square + floor) - LOG_CHI2)
 
 
-def median_distance(x: Floats, seed: int = 0) -> float:
+def median_distance(x: Floats) -> float:
     """Median distance between rows (n, d), of at most 400 of them: the unit of kernel widths."""
-    sample = x[np.random.default_rng(seed).permutation(len(x))[:400]]
+    sample = x[np.random.default_rng(0).permutation(len(x))[:400]]
     distance = np.sqrt(((sample[:, None, :] - sample[None, :, :]) ** 2).sum(axis=-1))
     pairs = np.triu_indices(len(sample), 1)
     median = float(np.median(distance[pairs])) if len(sample) > 1 else 1.0
