@@ -24,10 +24,11 @@ from soilml.gap.checks import (
 )
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
-from soilml.gap.evidence.held_out import HoldoutSplit, predict_held_out, split_holdout
+from soilml.gap.evidence.holdout_split import HoldoutSplit, split_holdout
 from soilml.gap.report.results import GapReport
 from soilml.gap.report.sentences import unsupported_conclusions, verdict_sentence
 from soilml.gap.search.analysis import Analysis, analyse
+from soilml.gap.search.prediction import predictive_gains
 from soilml.gap.verdict.decision import (
     NOTHING_IS_BETTER,
     cause_set,
@@ -43,7 +44,6 @@ from soilml.gap.verdict.entries import (
     candidate_summaries,
     competing_explanations,
     conditions_of_suspects,
-    gap_reductions,
     named_effects,
     readings_and_predictions,
     signature_similarity,
@@ -57,6 +57,12 @@ from soilml.gap.verdict.estimates import (
     by_undetected_effects,
     soil_estimates,
     updated_case,
+)
+from soilml.gap.verdict.reductions import (
+    gap_reductions,
+    plain_fit,
+    predict_held_out,
+    without_grown,
 )
 from soilml.gap.verdict.remainder import (
     discrepancy_amplitudes,
@@ -191,7 +197,8 @@ def gap(
     if split.held_out is not None:
         held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
         held_out = held_out.subset(np.isfinite(held_out.std))
-    analysis = replace(analysis, result=with_refused_outside(analysis.result))
+    gains = predictive_gains(analysis.predictions)
+    analysis = replace(analysis, result=with_refused_outside(analysis.result, gains))
     report = _build_report(case, analysis, checks, split, held_out, seed=seed)
     report = replace(
         report,
@@ -223,6 +230,8 @@ def _build_report(
     """Decide the status, then compute the entries of the report."""
     problem, result = analysis.problem, analysis.result
     obstacles = checks.naming_obstacles
+    if analysis.opened is not None:
+        obstacles = (analysis.opened, *obstacles)
     smooth_gap = result.has_gap and not is_left_open(result)
     conflicts = [] if smooth_gap else disagreements(problem, result.soil)
     if result.has_gap and not (smooth_gap or conflicts):
@@ -232,11 +241,15 @@ def _build_report(
     before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
     shown = decision.shown.best if decision.shown else before
     written = shown if decision.claimed else beside  # what model.toml contains
-    figures = gap_reductions(analysis, before, shown, seed)
+    plain = plain_fit(problem, result.soil, decision.shown) if decision.shown else result.soil
+    figures, beside_remainder = gap_reductions(analysis, decision.shown, plain, seed)
     if held_out is not None and len(held_out):
         figures[split.name] = predict_held_out(
-            problem, result.soil, shown.fit, held_out, split.description
+            problem, result.soil, plain, held_out, split.description
         )
+    addition = " + ".join(decision.shown.names) if decision.shown else ""
+    figures, not_reduced = without_grown(figures, addition)
+    beside_remainder, _ = without_grown(beside_remainder, addition)
     replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     intervals = with_uncertain_discrepancy(problem, written)
     if smooth_gap:
@@ -254,16 +267,21 @@ def _build_report(
         best_unclaimed=unclaimed_effects(decision, result),
         reasons=reasons(decision, obstacles, conflicts or replicates),
         gap=figures,
+        gap_beside_remainder=beside_remainder,
         soil_before=soil_estimates(result.soil),
         soil_after=soil_estimates(intervals, spread),
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable=dict(result.untestable),
-        notes=(*checks.notes, *analysis_notes(analysis, written.fit, shown.fit, replicates)),
+        notes=(
+            *checks.notes,
+            *analysis_notes(analysis, written.fit, shown.fit, replicates),
+            *not_reduced,
+        ),
         variance_components=variance_component_entries(analysis),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,
         seed=seed,
-        curves=readings_and_predictions(analysis, shown.fit),
+        curves=readings_and_predictions(analysis, plain),
     )
     if decision.status == "suspected":
         fit = with_uncertain_discrepancy(problem, shown)

@@ -17,8 +17,7 @@ from soilml.gap.candidate_effects import effect_names
 from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
 from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.evidence.held_out import covariance_at
-from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.evidence.problem import FitProblem, covariance_at
 from soilml.gap.report.results import NextRun
 from soilml.gap.search.explanation import Explanation
 from soilml.physics.effects.base import Effect

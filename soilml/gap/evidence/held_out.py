@@ -1,8 +1,8 @@
-"""Rows that are held out: from the analysis, or from refits in cross-validation."""
+"""Prediction of rows that were kept back, by refits of explanations to all other rows."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,17 +12,17 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
-from soilml.fitting.predictions import predict
+from soilml.fitting.predictions import Linearisation, PredictionRequest, linearise_many
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import Covariance, assemble_covariance, run_effect_columns
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
-from soilml.gap.report.results import BeforeAfter, GapReduction
-from soilml.io.table import Table
-from soilml.quantities import column
+from soilml.gap.evidence.marginal_likelihood import WEAK_PRECISION
+from soilml.gap.evidence.problem import FitProblem
+from soilml.numerics.prior import UNIFORM_PRECISION
 
 FOLDS = 4
 #: Fraction of the readings, those of highest load or of highest slip, in the held-out region.
 REGION_FRACTION = 0.3
+#: Levels of slip up to which each is predicted from the others, where there is one load.
+MOST_SLIP_LEVELS = 8
 #: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
 INFEASIBLE_SQUARE = 100.0
 
@@ -35,45 +35,33 @@ class Folds:
     fold: NDArray[np.int64]  # (m,)
     predicted: NDArray[np.int64]
 
+    @property
+    def selected(self) -> NDArray[np.bool_]:
+        """The readings that are predicted, (m,)."""
+        return np.isin(self.fold, self.predicted)
 
-def gap_reduction(
-    readings: Readings, std: Floats, before: Floats, after: Floats, description: str
-) -> GapReduction:
-    """Mean squared standardised residuals of two predictions, in all and by channel.
 
-    A prediction without equilibrium counts as ten standard deviations off.
+def held_out_folds(readings: Readings, seed: int) -> dict[str, Folds]:
+    """The parts that are held out in turn, by name.
+
+    Runs are predicted from the others, where there are at least three; the highest loads, or the
+    highest slips where the load hardly varies, from the rest, where at least three loads or three
+    slips were measured. Where neither runs nor loads are three, each slip is predicted from the
+    others too.
     """
-
-    def squares(y: Floats) -> Floats:
-        return np.nan_to_num(((readings.measured - y) / std) ** 2, nan=INFEASIBLE_SQUARE)
-
-    old, new = squares(before), squares(after)
-    channels = {}
-    for i, name in enumerate(readings.channels):
-        in_channel = readings.channel == i
-        if in_channel.any():
-            means = float(old[in_channel].mean()), float(new[in_channel].mean())
-            channels[column(name)] = BeforeAfter(*means)
-    return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
-
-
-def held_out(
-    problem: FitProblem, soil: MarginalFit, shown: MarginalFit, seed: int
-) -> dict[str, GapReduction]:
-    """Cross-validation by runs, and extrapolation to the highest loads.
-
-    Runs are predicted by fits to the others, where there are at least three; the highest loads, or
-    the highest slips where the load hardly varies, from the rest, where at least three loads or
-    three slips were measured.
-    """
-    known = {}
-    if (runs := _run_folds(problem.readings, seed)) is not None:
-        known["held_out_runs"] = runs
-    if (region := held_out_region(problem.readings)) is not None:
+    parts = {}
+    if (runs := _run_folds(readings, seed)) is not None:
+        parts["held_out_runs"] = runs
+    if (region := held_out_region(readings)) is not None:
         name, out = region
         description = f"{name}, predicted from the rest"
-        known["held_out_region"] = Folds(description, out.astype(np.int64), np.asarray([1]))
-    return dict(zip(known, _cross_validate(problem, soil, shown, [*known.values()]), strict=True))
+        parts["held_out_region"] = Folds(description, out.astype(np.int64), np.asarray([1]))
+    slips = readings.slip_levels
+    if runs is None and readings.load_levels.count < 3 and slips.count >= 3:
+        fold = slips.index * min(slips.count, MOST_SLIP_LEVELS) // slips.count
+        text = "every slip predicted by fits to the others"
+        parts["held_out_slips"] = Folds(text, fold, np.unique(fold))
+    return parts
 
 
 def _run_folds(readings: Readings, seed: int) -> Folds | None:
@@ -103,124 +91,109 @@ def held_out_region(readings: Readings) -> tuple[str, NDArray[np.bool_]] | None:
     return name, values >= edge
 
 
-def _cross_validate(
-    problem: FitProblem, soil: MarginalFit, shown: MarginalFit, all_folds: Sequence[Folds]
-) -> list[GapReduction]:
-    """Predict each fold by both fits, repeated on all readings outside it."""
-    fits = [soil] if shown is soil else [soil, shown]
-    predicted = iter(_predict_folds(problem, [(fit, folds) for folds in all_folds for fit in fits]))
-    reductions = []
-    for folds in all_folds:
-        before = next(predicted)
-        after = before if shown is soil else next(predicted)
-        selected = np.isin(folds.fold, folds.predicted)
-        reductions.append(
-            gap_reduction(
-                problem.readings.subset(selected),
-                problem.covariance.std[selected],
-                before[selected],
-                after[selected],
-                folds.description,
-            )
-        )
-    return reductions
+@dataclass(frozen=True)
+class HeldOutPrediction:
+    """Predictions of the readings of one part, each by a fit to all readings outside its fold.
+
+    `log_density` is the logarithm of the probability density of the readings, fold by fold, with
+    the variance of noise, scatter, remainder and parameters.
+    """
+
+    mean: Floats  # (m,), NaN outside the part and without equilibrium
+    std: Floats  # (m,) of a reading, NaN outside the part
+    log_density: float
 
 
-def _predict_folds(
-    problem: FitProblem, wanted: Sequence[tuple[MarginalFit, Folds]]
-) -> list[Floats]:
-    """Predictions (m,) of each fold by the same fit, repeated to all other readings.
+def predict_parts(
+    problem: FitProblem, models: Sequence[tuple[Solution, Floats]], parts: Mapping[str, Folds]
+) -> list[dict[str, HeldOutPrediction]]:
+    r"""Predict all parts by each of several models, which are refitted without each fold.
 
-    The fits are made beside the same discrepancy, from its optimum. Readings of a fold without a
-    fit, and those of other folds, are NaN.
+    .. math::
+        y_o \sim N(f_o + A (y_r - f_r),\; V_{oo} - A V_{ro} + B \Sigma B^T), \quad
+        A = V_{or} V_{rr}^{-1}, \quad B = J_o - A J_r
+
+    with the covariance V of noise, scatter and remainder, the predictions f and derivatives J of
+    the fit to the rest r, and the covariance of its coordinates. All fits share the calls of the
+    model. A fold without a fit counts as ten standard deviations away.
+
+    models: Fits to all readings, from which the refits start, with the amplitudes of the smooth
+        remainder by channel; zero for fits under noise and scatter alone.
+
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.25,
+    2.26 and 2.41.
     """
     readings = problem.readings
     problems, starts, where = [], [], []
-    for i, (marginal, folds) in enumerate(wanted):
-        fit, amplitude = marginal.fit, marginal.evidence.amplitude
-        for number in folds.predicted:
-            rest = folds.fold != number
-            known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
-            kept, whiten = readings.subset(rest), known.whiten(amplitude)
-            problems.append(LeastSquaresProblem(fit.case, fit.coordinates, kept, whiten))
-            starts.append(fit.x)
-            where.append((i, ~rest))
-    predicted = [np.full(len(readings), np.nan) for _ in wanted]
-    for (i, out), again in zip(where, descend_together(problems, starts), strict=True):
-        if isinstance(again, InputError):
-            continue
-        y = predict(again.case, again.coordinates, again.x[None, :], readings)[0]
-        predicted[i][out] = y[out]
-    return predicted
-
-
-def predict_held_out(
-    problem: FitProblem, soil: Solution, shown: Solution, readings: Readings, description: str
-) -> GapReduction:
-    """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
-    before = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
-    after = predict(shown.case, shown.coordinates, shown.x[None, :], readings)[0]
-    std = covariance_at(problem, shown, readings).std
-    return gap_reduction(readings, std, before, after, description)
-
-
-def covariance_at(problem: FitProblem, fit: Solution, readings: Readings) -> Covariance:
-    """The covariance of other readings, by the variance components of the problem."""
-    components = problem.covariance.components
-    index = {name: i for i, name in enumerate(problem.readings.channels)}
-    scale = np.asarray(
-        [components.noise_scale[index[n]] if n in index else 1.0 for n in readings.channels]
+    for i, (fit, amplitude) in enumerate(models):
+        for name, folds in parts.items():
+            for number in folds.predicted:
+                rest = folds.fold != number
+                known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
+                kept, whiten = readings.subset(rest), known.whiten(amplitude)
+                problems.append(LeastSquaresProblem(fit.case, fit.coordinates, kept, whiten))
+                starts.append(fit.x)
+                where.append((i, name, rest))
+    fits = descend_together(problems, starts)
+    covariance = [problem.discrepancy.matrix(amplitude) for _, amplitude in models]
+    at = linearise_many(
+        [
+            PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
+            for fit in fits
+            if isinstance(fit, Solution)
+        ]
     )
-    columns = run_effect_columns(fit.fitted(), readings)
-    return assemble_covariance(readings, columns, replace(components, noise_scale=scale))
+    linearised = iter(at)
+    found = [{name: _nothing_yet(len(readings)) for name in parts} for _ in models]
+    for (i, name, rest), solved in zip(where, fits, strict=True):
+        part = found[i][name]
+        near = next(linearised) if isinstance(solved, Solution) else solved
+        if isinstance(solved, InputError) or isinstance(near, InputError):
+            std = problem.covariance.std[~rest]
+            part.std[~rest], log_density = std, _density_of_nothing(std)
+        else:
+            part.mean[~rest], part.std[~rest], log_density = _conditional(
+                solved, near, readings.measured, covariance[i], rest
+            )
+        found[i][name] = replace(part, log_density=part.log_density + log_density)
+    return found
 
 
-#: `--holdout run` holds out one run in so many, and needs at least as many runs.
-RUNS_PER_HELD_OUT = 4
+def _nothing_yet(count: int) -> HeldOutPrediction:
+    return HeldOutPrediction(np.full(count, np.nan), np.full(count, np.nan), 0.0)
 
 
-@dataclass(frozen=True)
-class HoldoutSplit:
-    """The rows to analyse and those held out; `name` is the entry of the report's figures."""
-
-    analysed: Table
-    held_out: Table | None = None
-    name: str = ""
-    description: str = ""
-
-
-def split_holdout(table: Table, holdout: str | None, seed: int) -> HoldoutSplit:
-    """Split a table by `run` (a quarter of the runs, at random) or by `COLUMN=VALUE`.
-
-    Raises `InputError` for another text, for too few runs, or where no row remains to analyse.
-    """
-    if holdout is None:
-        return HoldoutSplit(table)
-    if holdout == "run":
-        runs = np.unique(table["run"])
-        if runs.size < RUNS_PER_HELD_OUT:
-            raise InputError(f"--holdout run needs four runs or more; the table has {runs.size}")
-        count = max(1, runs.size // RUNS_PER_HELD_OUT)
-        chosen = np.random.default_rng(seed).permutation(runs)[:count]
-        held_out = np.isin(table["run"], chosen)
-        name, description = "held_out_runs", f"runs {', '.join(sorted(map(str, chosen)))}"
-    else:
-        key, equals, value = holdout.partition("=")
-        if not equals:
-            raise InputError(f"--holdout is {holdout!r}; needed is run, or COLUMN=VALUE")
-        rows = _positions(table, table.where(key, value))
-        held_out = np.isin(np.arange(len(table)), rows)
-        name, description = "held_out_region", holdout
-    if held_out.all():
-        raise InputError(f"--holdout {holdout} holds out every row; no row remains to analyse")
-    description += ", held out"
-    return HoldoutSplit(table.rows(~held_out), table.rows(held_out), name, description)
+def _conditional(
+    fit: Solution, at: Linearisation, reading: Floats, matrix: Floats, rest: NDArray[np.bool_]
+) -> tuple[Floats, Floats, float]:
+    """Mean and standard deviation of readings that are not in the rest, and their log density."""
+    out = ~rest
+    jacobian = np.nan_to_num(at.jacobian)
+    gain = np.linalg.solve(matrix[np.ix_(rest, rest)], matrix[np.ix_(rest, out)]).T
+    left = np.nan_to_num(reading[rest] - at.prediction[rest])
+    mean = at.prediction[out] + gain @ left
+    change = jacobian[out] - gain @ jacobian[rest]
+    covariance = matrix[np.ix_(out, out)] - gain @ matrix[np.ix_(rest, out)]
+    covariance = covariance + change @ _coordinate_covariance(fit) @ change.T
+    std = np.sqrt(np.diag(covariance))
+    if not np.isfinite(mean).all():
+        return mean, std, _density_of_nothing(std)
+    factor = np.linalg.cholesky(covariance)
+    white = np.linalg.solve(factor, reading[out] - mean)
+    log_density = -0.5 * float(white @ white + np.log(2.0 * np.pi) * len(white))
+    return mean, std, log_density - float(np.log(np.diag(factor)).sum())
 
 
-def _positions(table: Table, rows: Table) -> NDArray[np.int64]:
-    """Positions of the rows of a part in the whole table: by line, else by content."""
-    if len(table.line):
-        return np.flatnonzero(np.isin(table.line, rows.line))
-    keys = [tuple(str(table[n][i]) for n in table.columns) for i in range(len(table))]
-    own = {tuple(str(rows[n][i]) for n in rows.columns) for i in range(len(rows))}
-    return np.asarray([i for i, key in enumerate(keys) if key in own], dtype=np.int64)
+def _coordinate_covariance(fit: Solution) -> Floats:
+    """Covariance (p, p) of coordinates whose priors are as wide as they are."""
+    wide = [WEAK_PRECISION if c.effect else UNIFORM_PRECISION for c in fit.coordinates]
+    wide = [own if np.isinf(c.std) else 0.0 for own, c in zip(wide, fit.coordinates, strict=True)]
+    jacobian = np.vstack([fit.jacobian, fit.soil_tests.rates(fit.x)])
+    information = jacobian.T @ jacobian + np.diag(fit.precision + np.asarray(wide))
+    return np.asarray(np.linalg.inv(information))
+
+
+def _density_of_nothing(std: Floats) -> float:
+    """Log density of readings that are not predicted: each is ten standard deviations away."""
+    each = INFEASIBLE_SQUARE + np.log(2.0 * np.pi * std**2)
+    return -0.5 * float(each.sum())

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Integers
+from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import FIXED_EFFECT_TOLERANCES, Covariance
 from soilml.numerics.subspaces import column_space
 from soilml.quantities import Z_50
@@ -85,3 +86,34 @@ def _is_confirmed(
     variance = matrix[i, i] + np.diag(matrix)[repeats] - 2.0 * matrix[i, repeats]
     agree = np.abs(residual[repeats] - residual[i]) <= REPEAT_SIGMA * np.sqrt(variance)
     return bool(np.any(agree & (t[repeats] * np.sign(t[i]) > REPEAT_SIGMA)))
+
+
+#: Readings of a series, in one channel of one run, from which its ends can be judged.
+LEAST_SERIES = 4
+SAME_LOAD = 0.15  # Range of the load of such a series, as a fraction of the smallest
+
+
+def ends_of_monotone_series(readings: Readings) -> NDArray[np.bool_]:
+    """The readings (m,) at the highest slip of a run whose channel changes in one direction.
+
+    Such a reading is large because the series is, and a model that does not follow it is no reason
+    to exclude it: it tells most of what the model lacks. Changes within the noise are of either
+    direction.
+    """
+    found = np.zeros(len(readings), dtype=np.bool_)
+    run = readings.run[readings.row]
+    for channel in range(len(readings.channels)):
+        for number in np.unique(run):
+            own = np.flatnonzero((run == number) & (readings.channel == channel))
+            if (
+                own.size < LEAST_SERIES
+                or np.ptp(readings.load[own]) > SAME_LOAD * readings.load[own].min()
+            ):
+                continue
+            own = own[np.argsort(readings.slip[own], kind="stable")]
+            change = np.diff(readings.measured[own])
+            noise = np.hypot(readings.std[own][1:], readings.std[own][:-1])
+            for sign in (1.0, -1.0):
+                if (sign * change > -noise).all() and sign * change[-1] > 0.0:
+                    found[own[-1]] = True
+    return found

@@ -17,7 +17,11 @@ from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
 from soilml.gap.candidate_effects import with_effect
-from soilml.gap.evidence.covariance import Covariance
+from soilml.gap.evidence.covariance import (
+    Covariance,
+    assemble_covariance,
+    run_effect_columns,
+)
 from soilml.gap.evidence.directions import current_size
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
 from soilml.physics.effects.base import Effect
@@ -172,6 +176,17 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
     for i, result in zip(refused, again, strict=True):
         found[i] = result
     return found
+
+
+def covariance_at(problem: FitProblem, fit: Solution, readings: Readings) -> Covariance:
+    """The covariance of other readings, by the variance components of the problem."""
+    components = problem.covariance.components
+    index = {name: i for i, name in enumerate(problem.readings.channels)}
+    scale = np.asarray(
+        [components.noise_scale[index[n]] if n in index else 1.0 for n in readings.channels]
+    )
+    columns = run_effect_columns(fit.fitted(), readings)
+    return assemble_covariance(readings, columns, replace(components, noise_scale=scale))
 
 
 def _without_effects(coordinates: Sequence[Coordinate], start: Mapping[str, float]) -> Floats:

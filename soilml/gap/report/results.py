@@ -55,6 +55,9 @@ class Suspect:
 
     effects: tuple[str, ...]
     log_odds: float  # natural logarithm
+    #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
+    #: smooth remainder; None where no row was kept back for it
+    predictive_gain: float | None = None
 
 
 @dataclass(frozen=True)
@@ -221,7 +224,10 @@ class GapReport:
         Regions of the data, the largest disagreement first.
     gap : dict of GapReduction
         Figures of the fitted rows (`train`) and of held-out runs and regions, before and after
-        adding what is named or first among the suspects.
+        adding what is named or first among the suspects. Both are without the smooth remainder.
+        A part whose figure did not shrink is left out, with a note.
+    gap_beside_remainder : dict of GapReduction
+        The same of held-out runs and regions, both beside a smooth remainder.
     soil_before, soil_after : dict of EstimatedValue
         Soil parameters without and with the added effects.
     mimic_radius : float
@@ -258,6 +264,7 @@ class GapReport:
     reasons: tuple[Remark, ...] = ()
     where: tuple[RegionScore, ...] = ()
     gap: dict[str, GapReduction] = field(default_factory=dict)
+    gap_beside_remainder: dict[str, GapReduction] = field(default_factory=dict)
     soil_before: dict[str, EstimatedValue] = field(default_factory=dict)
     soil_after: dict[str, EstimatedValue] = field(default_factory=dict)
     mimic_radius: float = 0.0

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.least_squares import Solution
+from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
@@ -22,9 +24,17 @@ from soilml.gap.evidence.covariance import (
     run_effect_columns,
 )
 from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_basis
-from soilml.gap.evidence.outliers import MAX_OUTLIER_FRACTION, outliers
-from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.evidence.outliers import (
+    MAX_OUTLIER_FRACTION,
+    OUTLIER_SIGMA,
+    ends_of_monotone_series,
+    outliers,
+)
+from soilml.gap.evidence.problem import FitProblem, covariance_at
 from soilml.gap.evidence.score_test import ScoreTest
+from soilml.gap.search.explanation import EFFECT_PENALTY
+from soilml.gap.search.opened_priors import open_priors
+from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
 from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, without_search
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
@@ -38,6 +48,9 @@ SOIL_STARTS = (0.5, 0.25)
 #: run-to-run standard deviations by less than this many units: weights of the readings then differ
 #: by less than their estimation error.
 SCALE_TOLERANCE, RUN_EFFECT_TOLERANCE = 0.2, 0.3
+#: Decrease of the objective from which an analysis with opened priors replaces the one with those
+#: of the case: tempered odds of 1 to 9. It then names suspects only.
+OPENED_MARGIN = 9.0
 #: Singular values below this fraction of the largest are ignored in the generalised least squares
 #: fit that smooths the noise: its columns are nearly collinear, and only their span matters.
 GLS_TOLERANCE = 1e-6
@@ -47,12 +60,18 @@ GLS_TOLERANCE = 1e-6
 class Analysis:
     """The final fit problem, the result of the search on it, and the excluded outliers.
 
+    `predictions` are those of rows kept back, by the soil alone and the likeliest explanations.
+    `with_outliers` is the result of the search on all readings, where some were excluded.
+    `opened` says which priors of the soil were opened, where they were.
     `error` is the reason why the data could not be analysed, if they could not.
     """
 
     problem: FitProblem
     result: SearchResult
-    outliers: tuple[str, ...]
+    outliers: tuple[str, ...] = ()
+    predictions: Predictions = field(default_factory=dict)
+    with_outliers: SearchResult | None = None
+    opened: Remark | None = None
     error: Remark | None = None
 
 
@@ -68,46 +87,112 @@ def analyse(
 ) -> Analysis:
     """Search for the effects that explain what the soil alone does not.
 
+    Where the soil presses against its priors, the search is repeated with these opened; it counts
+    where it explains the readings far better.
+
     `place` gives the file and line of a row, for messages; `progress` is called with the share that
     is done.
     """
-    coordinates = tuple(free)
     problem = FitProblem(
         case=case,
-        soil=coordinates,
+        soil=tuple(free),
         readings=readings,
         covariance=_declared_covariance(readings),
         effects=effects,
         calibration=calibration,
     )
+    found = _without_outliers(problem, seed, place, progress)
+    if not found.error:
+        found = replace(found, predictions=predict_with(found.problem, found.result, seed))
+        opened = open_priors(found.problem, found.result)
+        if opened is not None:
+            start = replace(problem, case=opened.case, soil=opened.soil)
+            other = _without_outliers(start, seed, place, progress)
+            other = replace(other, predictions=predict_with(other.problem, other.result, seed))
+            if not other.error and explains_better(found, other):
+                found = replace(other, opened=opened.remark)
+    return found
+
+
+def explains_better(found: Analysis, other: Analysis) -> bool:
+    """Whether an analysis with opened priors has an explanation far better than all of another.
+
+    Its evidence counts beside the noise, scatter and discrepancy of the other one, and it predicts
+    rows kept back better than the soil alone does.
+    """
+    gains = predictive_gains(other.predictions)
+    likeliest = next((c for c in other.result.candidates if gains.get(c.names, 0.0) > 0.0), None)
+    if likeliest is None or len(other.problem.readings) != len(found.problem.readings):
+        return False
+    lowest = min((c.objective for c in found.result.candidates), default=np.inf)
+    value = found.problem.discrepancy.evidence(likeliest.fit, likeliest.amplitude).value
+    return value + EFFECT_PENALTY * len(likeliest.names) < lowest - OPENED_MARGIN
+
+
+def _without_outliers(
+    problem: FitProblem, seed: int, place: Callable[[int], str], progress: Callable[[float], None]
+) -> Analysis:
+    """The analysis of all readings; without those that no explanation accounts for, if there are.
+
+    A reading is an outlier if it strays from the best explanation of all readings, and from that
+    of the readings without it.
+    """
+    first, fit = _search_in_passes(problem, seed, place, progress)
+    if first.error:
+        return first
+    stray = _stray(first.problem, fit, first.result.final_test.signatures)
+    if not stray.any():
+        return first
+    kept = replace(problem, readings=problem.readings.subset(~stray))
+    without, fit = _search_in_passes(kept, seed, place, progress)
+    if without.error:
+        return without
+    again = stray.copy()
+    again[stray] = _far_from(without.problem, fit, problem.readings.subset(stray))
+    if not again.any():
+        return first
+    if not np.array_equal(again, stray):
+        kept = replace(problem, readings=problem.readings.subset(~again))
+        without, _ = _search_in_passes(kept, seed, place, progress)
+    count = int(np.count_nonzero(again))
+    if count > MAX_OUTLIER_FRACTION * len(problem.readings):
+        text = f"{count} readings are outliers: check the sensors first"
+        error = Remark("many-outliers", text)
+        return Analysis(problem, _no_result(without.result.soil), error=error)
+    readings = problem.readings
+    names = tuple(
+        f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
+        for i in np.flatnonzero(again)
+    )
+    return replace(without, outliers=names, with_outliers=first.result)
+
+
+def _search_in_passes(
+    problem: FitProblem, seed: int, place: Callable[[int], str], progress: Callable[[float], None]
+) -> tuple[Analysis, Solution]:
+    """Covariance and search in turn, and the best fit."""
+    free = problem.soil
     nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
     soil = problem.fit_soil([nominal, *(np.full(len(free), x) for x in SOIL_STARTS)])
     result = _no_result(soil)
     infeasible = np.flatnonzero(~np.isfinite(soil.prediction))
     if infeasible.size:
-        row = int(readings.row[infeasible[0]])
+        row = int(problem.readings.row[infeasible[0]])
         text = f"the model cannot carry the load of {place(row)}"
-        return Analysis(problem, result, (), Remark("no-equilibrium", text))
-    best, excluded = soil, []
+        return Analysis(problem, result, error=Remark("no-equilibrium", text)), soil
+    best = soil
     for number in range(MAX_PASSES):
         last = problem.covariance.components
-        signatures = result.final_test.signatures
-        problem, found = _reestimate_covariance(problem, best, readings, signatures)
-        excluded += [f"{name} at {place(row)}" for name, row in found]
-        if len(excluded) > MAX_OUTLIER_FRACTION * (len(problem.readings) + len(excluded)):
-            text = f"{len(excluded)} readings are outliers: check the sensors first"
-            return Analysis(problem, _no_result(soil), (), Remark("many-outliers", text))
-        converged = not found and _have_converged(last, problem.covariance.components)
-        if result.accepted and converged:
+        problem = _with_estimated_covariance(problem, best, result.final_test.signatures)
+        if result.accepted and _have_converged(last, problem.covariance.components):
             break
-        readings = problem.readings
         soil = problem.fit_soil([soil.x])
         starts = {c.names: c for c in result.candidates}
         result = search(problem, soil, seed, starts, _in_pass(number, progress))
+        best = result.accepted[0].fit if result.accepted else soil
         if not result.accepted:
             break
-        best = result.accepted[0].fit
-    return Analysis(problem, result, tuple(excluded))
+    return Analysis(problem, result), best
 
 
 def _in_pass(number: int, progress: Callable[[float], None]) -> Callable[[float], None]:
@@ -133,18 +218,26 @@ def _have_converged(last: VarianceComponents, new: VarianceComponents) -> bool:
     )
 
 
-def _reestimate_covariance(
-    problem: FitProblem, fit: Solution, readings: Readings, signatures: Sequence[Signature]
-) -> tuple[FitProblem, list[tuple[str, int]]]:
-    """The problem with covariance estimated from a fit's residuals, outliers excluded.
+def _with_estimated_covariance(
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
+) -> FitProblem:
+    """The problem with the covariance that is estimated from a fit's residuals."""
+    readings = problem.readings
+    space = _explained_space(problem, fit, signatures)
+    residual = readings.measured - fit.prediction
+    readings, columns = _with_noise_of_fit(problem, fit, residual, space)
+    covariance = estimate_covariance(readings, columns, residual, space)
+    return replace(problem, readings=readings, covariance=covariance)
 
-    The outliers are returned as (column, row).
-    """
-    case = fit.fitted()
+
+def _explained_space(problem: FitProblem, fit: Solution, signatures: Sequence[Signature]) -> Floats:
+    """All that soil, effects and smooth functions could explain, (m, q)."""
+    readings = problem.readings
     if not signatures or len(signatures[0].column) != len(readings):
-        signatures, _ = effect_signatures(case, readings, problem.effects_not_in(fit))
+        others = problem.effects_not_in(fit)
+        signatures, _ = effect_signatures(fit.fitted(), readings, others)
     declared = problem.declared_amplitude[problem.discrepancy.process.channel] > 0.0
-    space = np.column_stack(
+    return np.column_stack(
         [
             fit.derivatives,
             *[s.column for s in signatures],
@@ -152,27 +245,48 @@ def _reestimate_covariance(
             problem.discrepancy.process.columns[:, declared],
         ]
     )
-    residual = readings.measured - fit.prediction
-    columns = run_effect_columns(case, readings)
 
-    # noise that is a fraction of the reading is evaluated at a smoothed prediction
-    typical = VarianceComponents.usual(readings)
+
+def _with_noise_of_fit(
+    problem: FitProblem, fit: Solution, residual: Floats, space: Floats
+) -> tuple[Readings, Floats]:
+    """The readings with their noise at a fit, and their changes from run to run, (m, 2).
+
+    Noise that is a fraction of the reading is evaluated at a smoothed prediction.
+    """
+    case, readings = fit.fitted(), problem.readings
+    columns = run_effect_columns(case, readings)
     several_runs = len(readings.runs) > 1
+    typical = VarianceComponents.usual(readings)
     smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
     readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))
-    readings = readings.with_noise_of_operation(noise_of_operation(case, readings))
+    return readings.with_noise_of_operation(noise_of_operation(case, readings)), columns
 
-    covariance = assemble_covariance(readings, columns, typical)
+
+def _stray(
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
+) -> NDArray[np.bool_]:
+    """The readings (m,) that stray from a fit, from what resembles it, and from smooth functions.
+
+    The last reading of a monotone series is none of them.
+    """
+    space = _explained_space(problem, fit, signatures)
+    residual = problem.readings.measured - fit.prediction
+    readings, columns = _with_noise_of_fit(problem, fit, residual, space)
+    covariance = assemble_covariance(readings, columns, VarianceComponents.usual(readings))
     replicates = readings.replicates * len(readings.channels) + readings.channel
-    is_outlier = outliers(covariance, residual, space, replicates, readings.run[readings.row])
-    excluded = [
-        (column(readings.channels[readings.channel[i]]), int(readings.row[i]))
-        for i in np.flatnonzero(is_outlier)
-    ]
-    kept = ~is_outlier
-    readings = readings.subset(kept)
-    covariance = estimate_covariance(readings, columns[kept], residual[kept], space[kept])
-    return replace(problem, readings=readings, covariance=covariance), excluded
+    found = outliers(covariance, residual, space, replicates, readings.run[readings.row])
+    return found & ~ends_of_monotone_series(readings)
+
+
+def _far_from(problem: FitProblem, fit: Solution, readings: Readings) -> NDArray[np.bool_]:
+    """The readings (m,) that a fit to others does not predict, remainder included."""
+    prediction = predict(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
+    index = [problem.readings.channels.index(readings.channels[c]) for c in readings.channel]
+    usual = problem.discrepancy.process.usual[index]
+    std = np.hypot(covariance_at(problem, fit, readings).std, usual)
+    far = np.abs(readings.measured - prediction) > OUTLIER_SIGMA * std
+    return np.asarray(far | ~np.isfinite(prediction))
 
 
 def _gls_prediction(covariance: Covariance, residual: Floats, space: Floats) -> Floats:

@@ -32,10 +32,14 @@ class Posterior:
     Sets in `refused` explain the data only by a law or a size that the catalogue does not have:
     they count as causes outside the catalogue, but for those of their effects, given with them,
     that explain most of the data without the others.
+
+    Of these, the sets in `unlisted` are no suspects either: they predict rows that were kept back
+    no better than the soil alone does, or need an implausible size.
     """
 
     log_weights: dict[Names, float]
     refused: Mapping[Names, frozenset[str]] = field(default_factory=dict)
+    unlisted: frozenset[Names] = frozenset()
 
     def probability(self, effect: str) -> float:
         """Probability that an effect is present, causes outside the catalogue included."""
@@ -48,7 +52,7 @@ class Posterior:
 
     def effect_log_odds(self, effect: str) -> float:
         """Natural logarithm of the odds that an effect is present, within the catalogue."""
-        return self._log_odds(lambda names: effect in names)
+        return self._log_odds(lambda names: effect in self._credited(names))
 
     def ranked(self) -> list[tuple[Names, float]]:
         """Sets of effects with the natural logarithm of their odds, the likeliest first.
@@ -61,11 +65,17 @@ class Posterior:
         """
         groups: dict[Names, set[Names]] = {}
         for names in sorted(self.log_weights, key=lambda n: (-self.log_weights[n], n)):
-            if names:
-                smaller = next((n for n in groups if set(n) <= set(names)), self._core(names))
-                groups.setdefault(smaller, set()).add(names)
+            if credited := self._credited(names):
+                smaller = next((n for n in groups if set(n) <= set(credited)), None)
+                groups.setdefault(smaller or self._core(credited), set()).add(names)
         odds = {names: self._log_odds(group.__contains__) for names, group in groups.items()}
         return sorted(odds.items(), key=lambda item: (-item[1], item[0]))
+
+    def _credited(self, names: Names) -> Names:
+        """The effects of a set that can be suspected."""
+        if names in self.unlisted:
+            return tuple(sorted(self.refused.get(names, ())))
+        return names
 
     def _core(self, names: Names) -> Names:
         """The effects of a set that are more likely than not, if they are a set themselves."""

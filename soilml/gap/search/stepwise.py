@@ -89,6 +89,12 @@ class SearchResult:
         """The most probable candidate with effects, by its objective; None without a search."""
         return next((c for c in self.candidates if c.names), None)
 
+    @property
+    def likeliest_suspect(self) -> Explanation | None:
+        """The likeliest candidate that can be suspected; see `Posterior.unlisted`."""
+        unlisted = self.posterior.unlisted
+        return next((c for c in self.candidates if c.names and c.names not in unlisted), None)
+
 
 def without_search(
     soil: Solution, test: ResidualTest, untestable: Mapping[str, Remark] | None = None

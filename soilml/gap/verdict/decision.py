@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from soilml.fitting.least_squares import Solution
+from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.gap.search.explanation import Explanation
-from soilml.gap.search.posterior import not_rejected
+from soilml.gap.search.posterior import Names, not_rejected
 from soilml.gap.search.stepwise import SearchResult
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -33,6 +34,9 @@ LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
 #: Why an explanation that the evidence supports is not claimed.
 IMPLAUSIBLE_FAULT = Remark(
     "implausible-fault", "the fault of a sensor or of the rig would have to be implausibly large"
+)
+NOT_PREDICTIVE = (
+    "{} fits the rows, but predicts rows that were kept back no better than the soil alone does"
 )
 OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
@@ -89,6 +93,11 @@ def decide(
         return Decision("unknown", (), None)
     if _implausible(best.fit):
         return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
+    if best.names in result.posterior.unlisted:
+        text = NOT_PREDICTIVE.format(" + ".join(best.names))
+        remark = Remark("not-predictive", text, best.names)
+        return Decision("suspected", (), _first_suspect(result), remark)
+    listed = tuple(c for c in accepted if c.names not in result.posterior.unlisted)
     if _far_from_catalogue(best):
         text = OTHER_LAW.format(" + ".join(best.names))
         return Decision("suspected", (), best, Remark("other-law", text, best.names))
@@ -99,8 +108,10 @@ def decide(
             text += f", and the evidence for {' + '.join(shown.names)} is not decisive"
         remark = Remark("not-catalogued", text, (*best.names, column(left)))
         return Decision("suspected", (), shown, remark)
+    if len(listed) > 1:
+        return Decision("class", listed, best)
     if len(accepted) > 1:
-        return Decision("class", accepted, best)
+        return Decision("suspected", (), best, NOT_DECISIVE)
     if not result.adequate:
         return Decision("partly-named", accepted, best)
     if best.shape_supported and law_matters(problem, best):
@@ -118,8 +129,11 @@ def _large_remainder(problem: FitProblem, result: SearchResult, best: Explanatio
 
 
 def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool:
-    """Whether an effect describes the data better than the soil alone beside its discrepancy."""
-    likeliest, soil_alone = result.likeliest, result.soil_alone
+    """Whether an effect describes the data better than the soil alone beside its discrepancy.
+
+    Only effects count that can be suspected.
+    """
+    likeliest, soil_alone = result.likeliest_suspect, result.soil_alone
     return bool(likeliest and soil_alone and likeliest.objective < soil_alone.objective + margin)
 
 
@@ -130,7 +144,7 @@ def _first_suspect(result: SearchResult) -> Explanation | None:
     """
     fitted = {c.names: c for c in result.candidates}
     listed = (fitted[names] for names, _ in result.posterior.ranked() if names in fitted)
-    return next(listed, result.likeliest)
+    return next(listed, result.likeliest_suspect)
 
 
 def is_left_open(result: SearchResult) -> bool:
@@ -144,19 +158,25 @@ def is_left_open(result: SearchResult) -> bool:
     return likeliest is None or soil_alone.objective <= likeliest.objective
 
 
-def with_refused_outside(result: SearchResult) -> SearchResult:
+def with_refused_outside(result: SearchResult, gains: Mapping[Names, float]) -> SearchResult:
     """The result with refused explanations counted as causes outside the catalogue.
 
-    They need an implausible size, or another law than the catalogue's. Where a part of such a set
-    is accepted, what is refused is its supplement, not that part.
+    They need an implausible size, or another law than the catalogue's, or they predict rows that
+    were kept back no better than the soil alone does. Where a part of such a set is accepted, what
+    is refused is its supplement, not that part.
+
+    gains: Log density of the rows kept back, above that of the soil alone, as far as it is known.
     """
     candidates = [c for c in result.candidates if c.names]
-    far = {c.names for c in candidates if _implausible(c.fit) or _far_from_catalogue(c)}
+    unlisted = {c.names for c in candidates if _implausible(c.fit) or _implausibly_large(c.fit)}
+    unlisted |= {names for names, gain in gains.items() if gain <= 0.0}
+    far = unlisted | {c.names for c in candidates if _far_from_catalogue(c)}
     parts = [set(c.names) for c in result.accepted if c.names not in far]
     refused = {
         names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
     }
-    return replace(result, posterior=replace(result.posterior, refused=refused))
+    found = replace(result.posterior, refused=refused, unlisted=frozenset(unlisted))
+    return replace(result, posterior=found)
 
 
 def _far_from_catalogue(best: Explanation) -> bool:
@@ -170,6 +190,14 @@ def _implausible(fit: Solution) -> bool:
     sizes = [c.effect and not c.is_shape for c in fit.coordinates]
     deviation = np.abs(fit.x) * np.sqrt(fit.precision)
     return bool(np.any(deviation[np.asarray(sizes, dtype=np.bool_)] > MAX_SIZE_DEVIATION))
+
+
+def _implausibly_large(fit: Solution) -> bool:
+    """Whether an effect of the soil or the gear is far larger than it usually is."""
+    return any(
+        c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > LARGEST_SIZE
+        for c, x in zip(fit.coordinates, fit.x, strict=True)
+    )
 
 
 def reasons(
@@ -198,15 +226,16 @@ def reasons(
 def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...], ...]:
     """The explanations that the data do not reject, where a cause is claimed or suspected."""
     if decision.status == "suspected":
-        return tuple(c.names for c in not_rejected(result.candidates) if c.names)
+        unlisted = result.posterior.unlisted
+        kept = [c for c in result.candidates if c.names not in unlisted]
+        return tuple(c.names for c in not_rejected(kept) if c.names)
     return tuple(c.names for c in decision.claimed)
 
 
 def unclaimed_effects(decision: Decision, result: SearchResult) -> tuple[str, ...]:
     """The likeliest effects where none are claimed."""
-    if decision.claimed or result.likeliest is None:
-        return ()
-    return decision.shown.names if decision.shown else result.likeliest.names
+    shown = decision.shown or result.likeliest_suspect
+    return () if decision.claimed or shown is None else shown.names
 
 
 #: Difference of the predictions of two laws, as a fraction of a channel's range, below which the

@@ -14,7 +14,6 @@ from soilml.fitting.predictions import predict
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.covariance import FEW_RUNS
 from soilml.gap.evidence.directions import effect_signatures
-from soilml.gap.evidence.held_out import gap_reduction, held_out
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
@@ -22,7 +21,6 @@ from soilml.gap.evidence.repeats import overstated_noise_notes
 from soilml.gap.evidence.score_test import SignatureSimilarity
 from soilml.gap.report.results import (
     CandidateSummary,
-    GapReduction,
     NamedEffect,
     ReadingsAndPredictions,
     Suspect,
@@ -30,6 +28,7 @@ from soilml.gap.report.results import (
 from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
+from soilml.gap.search.prediction import predictive_gains
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
@@ -41,20 +40,6 @@ LISTED_SUSPECTS = 8  # Suspects that are listed
 #: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
 AT_BOUND = 1e-3
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
-
-
-def gap_reductions(
-    analysis: Analysis, soil: MarginalFit, shown: MarginalFit, seed: int
-) -> dict[str, GapReduction]:
-    """Figures of the fitted rows and of cross-validation, as far as the runs allow it.
-
-    Before: the soil alone, fitted under noise and scatter. After: the explanation `shown`.
-    """
-    problem = analysis.problem
-    std = problem.covariance.std
-    before, after = soil.fit.prediction, shown.fit.prediction
-    fitted = gap_reduction(problem.readings, std, before, after, "all rows fitted")
-    return {"train": fitted, **held_out(problem, soil, shown, seed)}
 
 
 def soil_marginal(analysis: Analysis) -> MarginalFit:
@@ -128,7 +113,8 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
 def suspects(analysis: Analysis) -> list[Suspect]:
     """Explanations with their odds against all others, the likeliest first."""
     ranked = analysis.result.posterior.ranked()
-    return [Suspect(names, odds) for names, odds in ranked[:LISTED_SUSPECTS]]
+    gains = predictive_gains(analysis.predictions)
+    return [Suspect(names, odds, gains.get(names)) for names, odds in ranked[:LISTED_SUSPECTS]]
 
 
 def conditions_of_suspects(

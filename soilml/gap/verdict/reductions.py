@@ -1,0 +1,128 @@
+"""Figures of a gap before and after: rows fitted, and rows that were kept back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.errors import InputError
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.predictions import predict
+from soilml.fitting.readings import Readings
+from soilml.gap.evidence.held_out import INFEASIBLE_SQUARE, Folds, held_out_folds, predict_parts
+from soilml.gap.evidence.problem import FitProblem, StartedFit, covariance_at, fit_many
+from soilml.gap.report.results import BeforeAfter, GapReduction
+from soilml.gap.search.analysis import Analysis
+from soilml.gap.search.explanation import Explanation
+from soilml.quantities import column
+from soilml.remarks import Remark
+from soilml.report.numbers import decimal
+
+
+def gap_reduction(
+    readings: Readings, std: Floats, before: Floats, after: Floats, description: str
+) -> GapReduction:
+    """Mean squared standardised residuals of two predictions, in all and by channel.
+
+    A prediction without equilibrium counts as ten standard deviations off.
+    """
+
+    def squares(y: Floats) -> Floats:
+        return np.nan_to_num(((readings.measured - y) / std) ** 2, nan=INFEASIBLE_SQUARE)
+
+    old, new = squares(before), squares(after)
+    channels = {}
+    for i, name in enumerate(readings.channels):
+        in_channel = readings.channel == i
+        if in_channel.any():
+            means = float(old[in_channel].mean()), float(new[in_channel].mean())
+            channels[column(name)] = BeforeAfter(*means)
+    return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
+
+
+def plain_fit(problem: FitProblem, soil: Solution, shown: Explanation) -> Solution:
+    """An explanation fitted as the soil alone is: under noise and scatter, without a remainder.
+
+    It starts from the optimum beside a remainder and from the soil alone, so that its objective is
+    at most that of the soil alone.
+    """
+    fit = shown.fit
+    absent = {c.path: 0.0 for c in fit.coordinates if c.effect}
+    starts = [fit.start_values(), soil.start_values() | absent]
+    found = fit_many(problem, [StartedFit(fit.case, fit.coordinates, start) for start in starts])
+    solved = [one for one in found if not isinstance(one, InputError)]
+    return min(solved, key=lambda one: one.objective, default=fit)
+
+
+def gap_reductions(
+    analysis: Analysis, shown: Explanation | None, after: Solution, seed: int
+) -> tuple[dict[str, GapReduction], dict[str, GapReduction]]:
+    """Figures of the fitted rows and of rows kept back, without and with the smooth remainder.
+
+    Before is the soil alone, after the explanation shown; both are of the same kind. Without the
+    remainder, both are fitted under noise and scatter, and the total of the fitted rows is the sum
+    of squares that these fits minimise, over the number of readings.
+
+    after: The explanation shown, or the soil alone, by `plain_fit`.
+    """
+    problem, soil = analysis.problem, analysis.result.soil
+    readings, std = problem.readings, problem.covariance.std
+    fitted = gap_reduction(readings, std, soil.prediction, after.prediction, "all rows fitted")
+    count = len(readings)
+    fitted = replace(fitted, before=soil.cost / count, after=after.cost / count)
+    parts = held_out_folds(readings, seed)
+    none = np.zeros(len(readings.channels))
+    models = [(soil, none)] if shown is None else [(soil, none), (after, none)]
+    plain = predict_parts(problem, models, parts)
+    figures = {"train": fitted}
+    for name, folds in parts.items():
+        means = plain[0][name].mean, plain[-1][name].mean
+        figures[name] = _of_part(readings, std, folds, *means)
+    beside = {}
+    alone = analysis.predictions.get(())
+    if shown is not None and alone is not None and shown.names in analysis.predictions:
+        with_effect = analysis.predictions[shown.names]
+        for name, folds in parts.items():
+            before, new = alone[name], with_effect[name]
+            beside[name] = _of_part(readings, std, folds, before.mean, new.mean)
+    return figures, beside
+
+
+def _of_part(
+    readings: Readings, std: Floats, folds: Folds, before: Floats, after: Floats
+) -> GapReduction:
+    own = folds.selected
+    return gap_reduction(readings.subset(own), std[own], before[own], after[own], folds.description)
+
+
+def without_grown(
+    figures: dict[str, GapReduction], addition: str
+) -> tuple[dict[str, GapReduction], list[Remark]]:
+    """The figures that did not grow, and a remark on each that did.
+
+    addition: What was added to the model.
+    """
+    grown = {name: g for name, g in figures.items() if g.after > g.before}
+    remarks = [
+        Remark(
+            "not-reduced",
+            f"{g.description}: with {addition} the mean squared residual is "
+            f"{decimal(g.after, 2)}, without it {decimal(g.before, 2)}",
+            (name,),
+            "note",
+        )
+        for name, g in grown.items()
+    ]
+    return {name: g for name, g in figures.items() if name not in grown}, remarks
+
+
+def predict_held_out(
+    problem: FitProblem, soil: Solution, after: Solution, readings: Readings, description: str
+) -> GapReduction:
+    """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
+    old = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
+    new = predict(after.case, after.coordinates, after.x[None, :], readings)[0]
+    std = covariance_at(problem, after, readings).std
+    return gap_reduction(readings, std, old, new, description)
