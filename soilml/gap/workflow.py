@@ -31,6 +31,7 @@ from soilml.gap.search.analysis import Analysis, analyse
 from soilml.gap.search.prediction import predictive_gains
 from soilml.gap.verdict.decision import (
     NOTHING_IS_BETTER,
+    Decision,
     cause_set,
     decide,
     is_left_open,
@@ -238,6 +239,7 @@ def _build_report(
         conflicts = [NOTHING_IS_BETTER]
     decision = decide(problem, result, obstacles, conflicts)
 
+    excluded = _changed_by_outliers(analysis, decision, obstacles)
     before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
     shown = decision.shown.best if decision.shown else before
     written = shown if decision.claimed else beside  # what model.toml contains
@@ -273,6 +275,7 @@ def _build_report(
         candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
         untestable=dict(result.untestable),
         notes=(
+            *excluded,
             *checks.notes,
             *analysis_notes(analysis, written.fit, shown.fit, replicates),
             *not_reduced,
@@ -307,6 +310,27 @@ def _build_report(
         discrepancy=remaining_discrepancy(problem, beside, left_by),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )
+
+
+def _changed_by_outliers(
+    analysis: Analysis, decision: Decision, obstacles: Sequence[Remark]
+) -> list[Remark]:
+    """A remark where another verdict follows from all readings than without the outliers."""
+    if analysis.of_all is None:
+        return []
+    whole = analysis.of_all
+    result = with_refused_outside(whole.result, {})
+    smooth = result.has_gap and not is_left_open(result)
+    conflicts = [] if smooth else disagreements(whole.problem, result.soil)
+    other = decide(whole.problem, result, obstacles, conflicts)
+    named = [" + ".join(d.shown.names) if d.shown else "no effect" for d in (decision, other)]
+    if (other.status == "no-gap") == (decision.status == "no-gap") and named[0] == named[1]:
+        return []
+    text = (
+        f"the verdict depends on {len(analysis.outliers)} excluded readings: {decision.status} "
+        f"with {named[0]} without them, {other.status} with {named[1]} with them"
+    )
+    return [Remark("outliers-matter", text, analysis.outliers)]
 
 
 def _check_size(table: Table) -> None:

@@ -42,6 +42,8 @@ from soilml.remarks import Remark
 
 #: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
 MAX_PASSES = 2
+#: Searches at most, each without the readings that strayed from the explanation of the last.
+OUTLIER_ROUNDS = 4
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the
@@ -61,7 +63,7 @@ class Analysis:
     """The final fit problem, the result of the search on it, and the excluded outliers.
 
     `predictions` are those of rows kept back, by the soil alone and the likeliest explanations.
-    `with_outliers` is the result of the search on all readings, where some were excluded.
+    `of_all` is the analysis of all readings, where some were excluded.
     `opened` says which priors of the soil were opened, where they were.
     `error` is the reason why the data could not be analysed, if they could not.
     """
@@ -70,7 +72,7 @@ class Analysis:
     result: SearchResult
     outliers: tuple[str, ...] = ()
     predictions: Predictions = field(default_factory=dict)
-    with_outliers: SearchResult | None = None
+    of_all: Analysis | None = None
     opened: Remark | None = None
     error: Remark | None = None
 
@@ -137,34 +139,39 @@ def _without_outliers(
     A reading is an outlier if it strays from the best explanation of all readings, and from that
     of the readings without it.
     """
-    first, fit = _search_in_passes(problem, seed, place, progress)
-    if first.error:
-        return first
-    stray = _stray(first.problem, fit, first.result.final_test.signatures)
-    if not stray.any():
-        return first
-    kept = replace(problem, readings=problem.readings.subset(~stray))
-    without, fit = _search_in_passes(kept, seed, place, progress)
-    if without.error:
-        return without
-    again = stray.copy()
-    again[stray] = _far_from(without.problem, fit, problem.readings.subset(stray))
-    if not again.any():
-        return first
-    if not np.array_equal(again, stray):
-        kept = replace(problem, readings=problem.readings.subset(~again))
-        without, _ = _search_in_passes(kept, seed, place, progress)
-    count = int(np.count_nonzero(again))
-    if count > MAX_OUTLIER_FRACTION * len(problem.readings):
-        text = f"{count} readings are outliers: check the sensors first"
-        error = Remark("many-outliers", text)
-        return Analysis(problem, _no_result(without.result.soil), error=error)
     readings = problem.readings
+    excluded = np.zeros(len(readings), dtype=np.bool_)
+    of_all = None
+    for _ in range(OUTLIER_ROUNDS):
+        found, fit = _search_in_passes(_of_readings(problem, ~excluded), seed, place, progress)
+        of_all = of_all or found
+        if found.error:
+            return found
+        again = excluded.copy()
+        if excluded.any():
+            again[excluded] = _far_from(found.problem, fit, readings.subset(excluded))
+        again[~excluded] = _stray(found.problem, fit, found.result.final_test.signatures)
+        count = int(np.count_nonzero(again))
+        if count > MAX_OUTLIER_FRACTION * len(readings):
+            text = f"{count} readings are outliers: check the sensors first"
+            nothing = _no_result(found.result.soil)
+            return Analysis(problem, nothing, error=Remark("many-outliers", text))
+        if np.array_equal(again, excluded):
+            break
+        excluded = again
+    if not excluded.any():
+        return found
     names = tuple(
         f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
-        for i in np.flatnonzero(again)
+        for i in np.flatnonzero(excluded)
     )
-    return replace(without, outliers=names, with_outliers=first.result)
+    return replace(found, outliers=names, of_all=of_all)
+
+
+def _of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
+    """The problem of some of its readings, with their declared noise."""
+    readings = problem.readings.subset(kept)
+    return replace(problem, readings=readings, covariance=_declared_covariance(readings))
 
 
 def _search_in_passes(

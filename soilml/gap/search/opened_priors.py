@@ -31,17 +31,15 @@ class OpenedPriors:
 
 
 def open_priors(problem: FitProblem, result: SearchResult) -> OpenedPriors | None:
-    """The priors opened, where there is a gap and the soil presses against one of them.
+    """The priors opened, where the best explanation of a gap presses the soil against one of them.
 
-    The soil alone counts, and the likeliest explanation. Each prior is opened to the range of
-    natural soils, and a parameter that the case fixes gets that range.
+    Each prior is opened to the range of natural soils, and a parameter that the case fixes gets
+    that range.
     """
     if not result.has_gap:
         return None
-    fits = [result.soil, *([result.likeliest.fit] if result.likeliest else [])]
-    pressed: dict[str, str] = {}
-    for fit in fits:
-        pressed |= _pressed(fit)
+    best = next((c for c in result.accepted if c.names), result.likeliest)
+    pressed = _pressed(result.soil if best is None else best.fit)
     wide = {c.path: c.prior for c in select_free(replace(problem.case, prior={}), OPENED)}
     known = problem.case.prior
     opened = {

@@ -66,7 +66,7 @@ def analysed(*candidates, accepted=(), runs=("a", "b"), weights=None, outliers=(
         posterior=Posterior(weights or {}),
         has_gap=False,
     )
-    return SimpleNamespace(problem=problem, result=result, outliers=outliers)
+    return SimpleNamespace(problem=problem, result=result, outliers=outliers, predictions={})
 
 
 def test_the_soil_beside_a_discrepancy_stays_where_noise_put_it_under_the_largest():

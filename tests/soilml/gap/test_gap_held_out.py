@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.evidence.held_out import (
-    INFEASIBLE_SQUARE,
-    _run_folds,
-    gap_reduction,
-    held_out_region,
-)
+from soilml.gap.evidence.held_out import INFEASIBLE_SQUARE, _run_folds, held_out_region
+from soilml.gap.verdict.reductions import gap_reduction
 
 
 def test_a_gap_is_the_mean_square_over_noise_by_channel():

@@ -17,6 +17,7 @@ from soilml.gap.search import analysis
 from soilml.gap.search.stepwise import SearchResult
 from soilml.numerics.prior import Prior
 from soilml.physics.operating_point import Operating
+from soilml.quantities import column
 from soilml.remarks import texts
 
 CASE = case_of()
@@ -26,18 +27,23 @@ READINGS = fit_problem(CASE, driven(CASE)).readings
 @pytest.fixture
 def passes(monkeypatch):
     """Passes whose outliers, components and accepted fits are listed; what they were given."""
-    given = SimpleNamespace(outliers=[], components=[], accepted=[], seen=[], starts=[])
+    given = SimpleNamespace(
+        outliers=[], components=[], accepted=[], seen=[], starts=[], explained=False
+    )
 
-    def reestimate(problem, fit, readings, signatures):
+    def reestimate(problem, fit, signatures):
         i = len(given.seen)
-        given.seen.append((fit, len(readings), tuple(signatures)))
-        found = given.outliers[i] if i < len(given.outliers) else []
+        given.seen.append((fit, len(problem.readings), tuple(signatures)))
         scale = given.components[i] if i < len(given.components) else 1.0
         components = replace(problem.covariance.components, noise_scale=np.full(3, scale))
-        kept = readings.subset(np.arange(len(readings)) >= len(found))
-        covariance = analysis._declared_covariance(kept)
-        covariance = replace(covariance, components=components)
-        return replace(problem, readings=kept, covariance=covariance), found
+        return replace(problem, covariance=replace(problem.covariance, components=components))
+
+    def stray(problem, fit, signatures):
+        found = given.outliers.pop(0) if given.outliers else []
+        return np.isin(np.arange(len(problem.readings)), found)
+
+    def far_from(problem, fit, readings):
+        return np.asarray([not given.explained for _ in range(len(readings))])
 
     def search(problem, soil, seed, starts, progress):
         progress(0.5)
@@ -50,7 +56,9 @@ def passes(monkeypatch):
         test = replace(result.final_test, signatures=(signature,))
         return replace(result, accepted=accepted, candidates=accepted, final_test=test)
 
-    monkeypatch.setattr(analysis, "_reestimate_covariance", reestimate)
+    monkeypatch.setattr(analysis, "_with_estimated_covariance", reestimate)
+    monkeypatch.setattr(analysis, "_stray", stray)
+    monkeypatch.setattr(analysis, "_far_from", far_from)
     monkeypatch.setattr(analysis, "search", search)
 
     def run(case=CASE, readings=READINGS):
@@ -84,13 +92,22 @@ def test_no_second_search_where_the_covariance_has_converged(passes):
     assert found.problem.covariance.components.noise_scale.tolist() == [1.1] * 3
 
 
-def test_outliers_of_the_second_pass_call_for_another_search(passes):
+def test_readings_that_stray_from_the_explanation_are_excluded_and_searched_again(passes):
     given, run = passes
-    given.accepted = [("a",), ("b",)]
-    given.outliers = [[("torque_Nm", 4)], [("sinkage_m", 7)]]
+    given.accepted = [None, None, None]
+    given.outliers = [[4], [6], []]
     found, _ = run()
-    assert found.outliers == ("torque_Nm at row 4", "sinkage_m at row 7")
-    assert len(given.starts) == 2 and len(found.problem.readings) == len(READINGS) - 2
+    where = [(READINGS.channels[READINGS.channel[i]], READINGS.row[i]) for i in (4, 7)]
+    assert found.outliers == tuple(f"{column(name)} at row {row}" for name, row in where)
+    assert len(given.starts) == 3 and len(found.problem.readings) == len(READINGS) - 2
+    assert found.of_all is not None and len(found.of_all.problem.readings) == len(READINGS)
+
+
+def test_a_reading_that_the_explanation_of_the_others_predicts_is_taken_back(passes):
+    given, run = passes
+    given.accepted, given.outliers, given.explained = [None] * 4, [[4], []], True
+    found, _ = run()
+    assert found.outliers == () and len(found.problem.readings) == len(READINGS)
 
 
 def test_without_a_gap_there_is_one_pass(passes):
@@ -103,9 +120,9 @@ def test_without_a_gap_there_is_one_pass(passes):
 @pytest.mark.parametrize("count, too_many", [(9, False), (10, True)])
 def test_more_than_a_tenth_of_outliers_is_bad_data(passes, count, too_many):
     given, run = passes
-    given.accepted = [None]
+    given.accepted = [None, None]
     assert len(READINGS) == 96
-    given.outliers = [[("torque_Nm", i) for i in range(count)]]
+    given.outliers = [list(range(count))]
     found, _ = run()
     said = f"{count} readings are outliers: check the sensors first"
     assert str(found.error) == (said if too_many else "None")
@@ -150,15 +167,21 @@ def test_smoothed_residuals_are_those_of_generalised_least_squares():
 
 
 def test_the_covariance_is_estimated_from_what_a_fit_leaves():
-    """Noise at a smoothed prediction, outliers left out, and signatures that fit the readings."""
+    """Noise at a smoothed prediction, and outliers by signatures that fit the readings."""
     case = case_of()
     table = driven(case, seed=3)
     table.columns["torque_Nm"][12] *= 1.1
     problem = fit_problem(case, table)
     soil = problem.fit_soil([np.full(3, 0.5)])
     small = replace(problem, effects={"slip-sinkage": problem.effects["slip-sinkage"]})
-    found, excluded = analysis._reestimate_covariance(small, soil, problem.readings, ())
-    assert excluded == [("torque_Nm", 12)]
+    stray = analysis._stray(small, soil, ())
+    assert np.flatnonzero(stray).tolist() == [
+        int(i)
+        for i in np.flatnonzero(problem.readings.channel == 0)
+        if problem.readings.row[i] == 12
+    ]
+    kept = analysis._of_readings(small, ~stray)
+    found = analysis._with_estimated_covariance(kept, kept.fit_soil([soil.x]), ())
     assert len(found.readings) == len(found.covariance.std) == 95
     torque = found.readings.channel == 0
     expected = np.delete(soil.prediction[problem.readings.channel == 0], 12)

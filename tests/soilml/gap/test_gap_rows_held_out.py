@@ -9,7 +9,7 @@ from gap_sets import case_of
 from soilml.errors import InputError
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.gap.design.run_options import LUG_EFFECTS, gear_changes
-from soilml.gap.evidence.held_out import split_holdout
+from soilml.gap.evidence.holdout_split import split_holdout
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
+from scipy.stats import multivariate_normal
 
 from soilml.fitting.coordinates import shape_coordinates
+from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.least_squares import LeastSquaresProblem
+from soilml.fitting.predictions import linearise
 from soilml.gap.evidence.directions import effect_signatures
-from soilml.gap.evidence.held_out import (
-    gap_reduction,
-    held_out,
-    predict_held_out,
-)
+from soilml.gap.evidence.held_out import held_out_folds, predict_parts
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.search.explanation import (
@@ -26,6 +26,7 @@ from soilml.gap.search.posterior import IN_CATALOGUE, Posterior, explanations, p
 from soilml.gap.search.screening import predicted_gains
 from soilml.gap.search.stepwise import search
 from soilml.gap.verdict.decision import law_matters
+from soilml.gap.verdict.reductions import gap_reduction, predict_held_out
 from soilml.physics.effects import EFFECTS
 
 DIGGING = EFFECTS["slip-sinkage"]
@@ -197,23 +198,55 @@ def test_the_true_model_leaves_nothing_of_readings_without_noise(dug):
     )
     assert found.before == pytest.approx(9.0) and found.after == 0.0
     assert set(found.channels) == {"torque_Nm", "drawbar_pull_N", "sinkage_m"}
-    soil = alone(problem.fit_soil([np.full(3, 0.5)]))
-    made_of = held_out(problem, soil, soil, 0)
-    assert set(made_of) == {"held_out_runs", "held_out_region"}
-    for made in made_of.values():
-        assert made.before == made.after < 0.05
+    parts = held_out_folds(problem.readings, 0)
+    assert set(parts) == {"held_out_runs", "held_out_region"}
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    for name, found in predict_parts(problem, [(soil, np.zeros(3))], parts)[0].items():
+        own = parts[name].selected
+        assert np.isnan(found.mean[~own]).all()
+        assert squares(problem, found, own) < 0.05
 
 
 def test_the_right_model_leaves_the_noise_and_the_soil_alone_more(dug, named):
     problem, soil = dug
-    runs, region = held_out(problem, alone(soil), named.best, 0).values()
-    train = gap_reduction(
-        problem.readings, problem.covariance.std, soil.prediction, named.fit.prediction, "all"
+    parts = held_out_folds(problem.readings, 0)
+    assert parts["held_out_region"].description == "load_N >= 140, predicted from the rest"
+    none = np.zeros(3)
+    before, after = predict_parts(problem, [(soil, none), (named.fit, none)], parts)
+    for name, folds in parts.items():
+        left = squares(problem, after[name], folds.selected)
+        assert 0.5 < left < 1.8  # about 1, less a parameter's worth
+        assert squares(problem, before[name], folds.selected) > 10.0 * left
+        assert after[name].log_density > before[name].log_density + 100.0
+
+
+def squares(problem, found, own):
+    """Mean squared standardised residual of the readings of a part."""
+    left = (problem.readings.measured - found.mean)[own] / problem.covariance.std[own]
+    return np.mean(left**2)
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 3.0])
+def test_the_variance_of_rows_held_out_is_that_of_a_linear_gaussian_model(dug, amplitude):
+    problem, soil = dug
+    parts = {"held_out_region": held_out_folds(problem.readings, 0)["held_out_region"]}
+    own = np.full(3, amplitude)
+    found = predict_parts(problem, [(soil, own)], parts)[0]["held_out_region"]
+    out = parts["held_out_region"].selected
+    rest = ~out
+    known = problem.discrepancy.of_readings(rest, problem.readings.run[problem.readings.row])
+    kept = LeastSquaresProblem(
+        soil.case, soil.coordinates, problem.readings.subset(rest), known.whiten(own)
     )
-    for found in (train, runs, region):
-        assert 0.5 < found.after < 1.8  # about 1, less a parameter's worth
-        assert found.before > 10.0 * found.after
-    assert region.description == "load_N >= 140, predicted from the rest"
+    (fit,) = descend_together([kept], [soil.x])
+    at = linearise(fit.case, fit.coordinates, fit.x, problem.readings)
+    joint = problem.discrepancy.matrix(own) + at.jacobian @ at.jacobian.T / 12.0
+    gain = joint[np.ix_(out, rest)] @ np.linalg.inv(joint[np.ix_(rest, rest)])
+    covariance = joint[np.ix_(out, out)] - gain @ joint[np.ix_(rest, out)]
+    assert found.std[out] == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-3)
+    normal = multivariate_normal(found.mean[out], covariance)
+    expected = normal.logpdf(problem.readings.measured[out])
+    assert found.log_density == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize("scatter, region", [(0.08, "slip >= "), (0.0, "load_N >= 90,")])
@@ -222,8 +255,7 @@ def test_the_held_out_region_lies_between_levels(scatter, region):
     one_level = 20.0 * (1.0 + np.random.default_rng(5).uniform(-scatter, scatter, 6))
     loads = tuple(one_level) if scatter else (40.0, 41.0, 60.0, 61.0, 90.0, 91.0)
     problem = fit_problem(case, driven(case, noise=0.0, slips=6, loads=loads))
-    soil = problem.fit_soil([np.full(3, 0.5)])
-    found = held_out(problem, alone(soil), alone(soil), 0)["held_out_region"]
+    found = held_out_folds(problem.readings, 0)["held_out_region"]
     assert found.description.startswith(region)
 
 

@@ -262,9 +262,9 @@ def test_refused_explanations_lend_their_parts_that_are_accepted():
     pair = candidate("dig+plough", 18.0, coordinates=far[0], x=far[1])
     alone = candidate("plough", 21.0, coordinates=far[0], x=far[1])
     result = searched(NONE, DIG, pair, alone)
-    found = with_refused_outside(result).posterior.refused
+    found = with_refused_outside(result, {}).posterior.refused
     assert found == {("dig", "plough"): frozenset({"dig"}), ("plough",): frozenset()}
-    assert with_refused_outside(searched(NONE, DIG)).posterior.refused == {}
+    assert with_refused_outside(searched(NONE, DIG), {}).posterior.refused == {}
 
 
 def test_candidates_are_summarised_against_the_soil_alone_and_the_best():

@@ -18,7 +18,7 @@ from soilml.gap.design.run_options import (
     _whole,
     drivable_slips,
 )
-from soilml.gap.evidence.held_out import split_holdout
+from soilml.gap.evidence.holdout_split import split_holdout
 from soilml.gap.report.results import NextRun
 from soilml.gap.verdict import remainder as remaining
 from soilml.gap.verdict.decision import NEGLIGIBLE_FRACTION, law_matters

@@ -1,0 +1,87 @@
+"""An effect counts if it predicts rows kept back; priors that are pressed against are opened."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from gap_sets import case_of, driven, fit_problem
+
+from soilml.gap import gap
+from soilml.gap.evidence.outliers import ends_of_monotone_series
+from soilml.gap.report.results import GapReduction
+from soilml.gap.search.posterior import Posterior
+from soilml.gap.verdict.reductions import without_grown
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+from soilml.physics.effects import EFFECTS
+
+DIGGING = EFFECTS["slip-sinkage"]
+
+
+def test_a_set_that_is_not_listed_is_no_suspect():
+    logs = {(): -4.0, ("a",): -0.1, ("b",): -2.5}
+    assert Posterior(logs).ranked()[0][0] == ("a",)
+    found = Posterior(logs, refused={("a",): frozenset()}, unlisted=frozenset({("a",)}))
+    assert [names for names, _ in found.ranked()] == [("b",)]
+    assert found.probability("a") == 0.0
+    both = logs | {("a", "b"): -0.2}
+    part = Posterior(both, {("a", "b"): frozenset("b")}, frozenset({("a", "b")}))
+    assert dict(part.ranked())[("b",)] > dict(Posterior(logs).ranked())[("b",)]
+
+
+def test_a_figure_that_grew_is_a_remark_and_no_reduction():
+    figures = {
+        "train": GapReduction(9.0, 1.0, {}, 30, "all rows fitted"),
+        "held_out_runs": GapReduction(2.0, 3.0, {}, 30, "every run"),
+    }
+    kept, remarks = without_grown(figures, "slip-sinkage")
+    assert list(kept) == ["train"]
+    assert [(r.code, r.about) for r in remarks] == [("not-reduced", ("held_out_runs",))]
+
+
+@pytest.mark.slow
+def test_no_figure_of_a_report_grows_and_suspects_say_how_they_predict():
+    case = case_of()
+    report = gap(case, driven(case, [DIGGING(n1=0.4)], seed=2))
+    assert report.effects[0].name == "slip-sinkage"
+    for figures in (report.gap, report.gap_beside_remainder):
+        assert figures and all(g.after <= g.before for g in figures.values())
+    assert report.suspects[0].effects == ("slip-sinkage",)
+    assert report.suspects[0].predictive_gain > 10.0
+
+
+@pytest.mark.slow
+def test_a_prior_that_excludes_the_truth_is_opened_and_the_report_says_so():
+    case = case_of()
+    soil = replace(case.soil, shear_modulus=0.003)
+    table = driven(replace(case, soil=soil), [DIGGING(n1=0.6)], loads=(60.0,), slips=7, seed=1)
+    tight = replace(case, prior=case.prior | {"shear_modulus": Prior(0.012, 0.018)})
+    report = gap(tight, table)
+    assert report.status == "suspected"
+    assert report.suspects[0].effects == ("slip-sinkage",)
+    opened = next(r for r in report.reasons if r.code == "prior-opened")
+    assert "shear_modulus" in opened.about
+    assert report.model.prior["shear_modulus"].lower < 0.003
+    assert report.gap["train"].before > 3.0 * report.gap["train"].after
+
+
+def test_the_end_of_a_monotone_series_is_known():
+    case = case_of()
+    table = driven(case, noise=0.0, loads=(60.0,), slips=6)
+    readings = fit_problem(case, table).readings
+    found = ends_of_monotone_series(readings)
+    last = readings.slip == readings.slip.max()
+    assert not found[~last].any()
+    depth = np.where(table["slip"] == table["slip"].max(), 3.0, 1.0) * table["sinkage_m"]
+    deep = fit_problem(case, Table(table.columns | {"sinkage_m": depth})).readings
+    sinkage = deep.channel == deep.channels.index("sinkage")
+    assert ends_of_monotone_series(deep)[sinkage & last].all()
+
+
+@pytest.mark.slow
+def test_a_deep_last_sinkage_is_evidence_and_no_outlier():
+    case = case_of()
+    table = driven(case, [DIGGING(n1=1.2)], loads=(60.0,), slips=6, seed=3)
+    report = gap(case, table)
+    assert not [n for n in report.notes if n.code == "outliers"]
+    assert report.status != "bad-data"
