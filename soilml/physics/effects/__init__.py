@@ -17,6 +17,8 @@ from soilml.physics.effects.exit_angle import ExitAngle as ExitAngle
 from soilml.physics.effects.stress_shift import StressShift as StressShift
 from soilml.physics.effects.small_wheel_stiffness import SmallWheelStiffness as SmallWheelStiffness
 from soilml.physics.effects.wheel_flexibility import WheelFlexibility as WheelFlexibility
+from soilml.physics.effects.flat_rim import FlatRim as FlatRim
+from soilml.physics.effects.clogging import Clogging as Clogging
 from soilml.physics.effects.shear_softening import ShearSoftening as ShearSoftening
 from soilml.physics.effects.hyperbolic_shear import HyperbolicShear as HyperbolicShear
 from soilml.physics.effects.curved_envelope import CurvedEnvelope as CurvedEnvelope
@@ -32,6 +34,7 @@ from soilml.physics.effects.multipass import Multipass as Multipass
 from soilml.physics.effects.lateral_slip import LateralSlip as LateralSlip
 from soilml.physics.effects.slope import Slope as Slope
 from soilml.physics.effects.load_transfer import LoadTransfer as LoadTransfer
+from soilml.physics.effects.camber import Camber as Camber
 from soilml.physics.effects.bearing_friction import BearingFriction as BearingFriction
 from soilml.physics.effects.sensors import TorqueOffset as TorqueOffset
 from soilml.physics.effects.sensors import TorqueGain as TorqueGain

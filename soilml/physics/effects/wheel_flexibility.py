@@ -25,7 +25,7 @@ class WheelFlexibility(SlipLoadScaling):
     sqrt(2 r (z + delta)); peak and exit keep their share of the entry angle, the torque its lever
     r. References: Bekker, Introduction to Terrain-Vehicle Systems, 1969; Schmid, J. Terramechanics
     32(1), 1995, substitute circle. That the wheel is a linear spring is ours. Not for deflections
-    of the order of the radius, nor for a belt that lies flat on hard ground.
+    of the order of the radius, nor for a rim that lies flat (`flat-rim`).
     """
 
     name: ClassVar[str] = "wheel-flexibility"
@@ -36,6 +36,7 @@ class WheelFlexibility(SlipLoadScaling):
         reference={"compliance": 2e-5},
         signs={"drawbar_pull": +1, "sinkage": -1},
         isolate="pressing the wheel on a flat plate and measuring how far the axle comes down",
+        family="flexible rim",
     )
     law_terms: ClassVar[tuple[str, ...]] = ("by_load",)
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)

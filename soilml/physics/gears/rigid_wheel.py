@@ -147,6 +147,8 @@ class WheelArc:
     lever: Real  # m, lever arm of the shear stress about the axle
     width: Real  # m
     travel: Real = 1.0  # radius by which the slip is reckoned, over the shear radius
+    chord: Array | None = None  # rad, half angle of the part that lies flat; None: a full circle
+    tilt: Array | None = None  # m, half the difference in depth of two slices; None: upright
 
     def travelled(self, slip: Array, law: BrakingLaw) -> Array:
         """Travel of the axle over that of the shearing surface, of slip ratios (batch,)."""

@@ -8,6 +8,7 @@ from typing import ClassVar, final
 from soilml.arrays import Array, namespace
 from soilml.numerics.quadrature import columns, crowded_ends, crowded_start, sine_and_versine
 from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.flat_rim import flat_rim_contact, flat_rim_points
 from soilml.physics.gears.rigid_wheel import (
     BrakingLaw,
     RigidWheel,
@@ -16,6 +17,7 @@ from soilml.physics.gears.rigid_wheel import (
     displacement_direction,
     reversals,
 )
+from soilml.physics.gears.wheel_slices import sliced_contact
 from soilml.physics.operating_point import Operating
 
 #: Nodes in each part of the contact; their accuracy over all inputs is tested against adaptive
@@ -27,6 +29,8 @@ BRAKING_NODES = 24
 #: fraction of the way to the maximum stress: errors at slips below -0.9 fall from 3e-5 to 4e-6.
 MOBILISED_WITHIN = 5.0
 COARSE_NODES = 5  # Enough for the load to a few per cent
+#: Nodes in each of the five or six parts of a rim that lies flat.
+FLAT_RIM_NODES, COARSE_FLAT_RIM_NODES = 12, 3
 
 
 @final
@@ -70,21 +74,33 @@ class Wheel(RigidWheel):
     def contact(self, geometry: WheelArc, at: Operating) -> Contact:
         """The points along the arc; more of them where a braking wheel shears both ways."""
         xp = namespace(geometry.entry)
+        if geometry.tilt is not None:
+            return sliced_contact(geometry, lambda rim: self.contact(rim, at))
+        if geometry.chord is not None:
+            return flat_rim_contact(geometry, at, self.braking, FLAT_RIM_NODES)
         if bool(xp.any(at.slip < 0)):
             return _braking_contact(geometry, at, self.braking, BRAKING_NODES)
         return _two_part_contact(geometry, at, self.braking, DRIVING_NODES)
 
     def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:
         """Few points, the same for driving and braking."""
+        if geometry.tilt is not None:
+            return sliced_contact(geometry, lambda rim: self.coarse_contact(rim, at))
+        if geometry.chord is not None:
+            return flat_rim_contact(geometry, at, self.braking, COARSE_FLAT_RIM_NODES)
         return _two_part_contact(geometry, at, self.braking, COARSE_NODES)
 
     def profile_contact(
         self, geometry: WheelArc, at: Operating, points: int
     ) -> tuple[Array, Contact]:
-        """Evenly spaced points from entry to exit, without area."""
+        """Evenly spaced points from entry to exit, without area; of the middle of the width."""
         xp = namespace(geometry.entry)
         fraction = xp.linspace(0.0, 1.0, points, dtype=geometry.entry.dtype)[:, None]
         arc = geometry.entry - geometry.exit
+        if geometry.chord is not None:
+            angle = geometry.entry - fraction * arc
+            none = xp.zeros_like(angle)
+            return angle, flat_rim_points(geometry, at, self.braking, angle, none)
         front, rear = geometry.entry - geometry.peak, geometry.peak - geometry.exit
         passed = fraction * arc
         mirrored = (1.0 - fraction) * arc * (front / rear)

@@ -160,7 +160,12 @@ def test_runs_to_add_name_the_gear_to_drive():
         ("grousers", "grousers@lugged", True),
         ("grousers@smooth", "grousers@lugged", False),
         ("grousers@lugged", "grousers@lugged", True),
+        ("grousers@lugged", "clogging@lugged", False),
         ("shear-softening", "hyperbolic-shear", True),
+        ("wheel-flexibility", "flat-rim", True),
+        ("wheel-flexibility@lugged", "flat-rim", True),
+        ("wheel-flexibility@lugged", "flat-rim@lugged", True),
+        ("wheel-flexibility@lugged", "flat-rim@smooth", False),
     ],
 )
 def test_a_shared_effect_excludes_that_of_one_gear_and_its_family(name, other, excluded):

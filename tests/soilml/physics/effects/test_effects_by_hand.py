@@ -12,6 +12,7 @@ import pytest
 from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
 from soilml.physics.contact import Contact, Stress, stress
 from soilml.physics.effects.sidewall_shear import buried
+from soilml.physics.forces import forces_at_sinkage
 from soilml.physics.load_case import LoadCase
 
 SAND = soil("wong1989/dry_sand")
@@ -223,6 +224,75 @@ def test_reeces_pressure_depends_on_sinkage_over_width(width):
     modulus = (k1 + k2 * width) / width**ground.n
     other = replace(ground, kc=0.0, kphi=modulus)
     same((Model(gear) + EFFECTS["reece-width"](share=1.0))(ground, AT), Model(gear)(other, AT))
+
+
+@pytest.mark.parametrize("slip", [0.3, 0.02, -0.3])
+def test_a_rim_that_lies_flat_is_an_arc_a_chord_and_nothing_behind_it(slip):
+    at = Operating(slip=slip, load=60.0)
+    found = (WHEEL + EFFECTS["flat-rim"](compliance=5e-5))(SAND, at)
+    r, b, z, deflection = 0.15, 0.12, found.sinkage, 5e-5 * 60.0
+    entry, half = np.arccos(1.0 - (z + deflection) / r), np.arccos(1.0 - deflection / r)
+    # from entry to exit: the arc by its angle, then the chord by its distance ahead of the axle
+    height = r - deflection
+    theta, x = (
+        np.linspace(entry, half, 40001),
+        np.linspace(r * np.sin(half), -r * np.sin(half), 40001),
+    )
+    angle = np.concatenate([theta, np.arctan(x / height)])
+    step = np.concatenate([[0.0], r * -np.diff(theta), [0.0], -np.diff(x)])
+    level = np.concatenate([theta, 0.0 * x])
+    peak = (SAND.a0 + SAND.a1 * slip) * entry
+    mirrored = entry - (angle + half) / (peak + half) * (entry - peak)
+    depth = r * (np.cos(np.where(angle > peak, angle, mirrored)) - np.cos(entry))
+    normal = (SAND.kc / b + SAND.kphi) * np.clip(depth, 0.0, z) ** SAND.n
+    travel = 1.0 - slip if slip > 0 else 1.0 / (1.0 + slip)
+    rate = 1.0 - travel * np.cos(level)
+    j = np.cumsum(np.concatenate([[0.0], 0.5 * (rate[1:] + rate[:-1])]) * step)
+    strengths = SAND.cohesion + normal * np.tan(SAND.friction_angle)
+    shear = np.sign(j) * strengths * (1.0 - np.exp(-np.abs(j) / SAND.shear_modulus))
+    ahead = np.concatenate([0.0 * theta, x])
+    lever = np.concatenate([r + 0.0 * theta, height + 0.0 * x])
+
+    def total(density):
+        return b * np.sum(0.5 * (density[1:] + density[:-1]) * step[1:])
+
+    load = total(normal * np.cos(level) + shear * np.sin(level))
+    pull = total(shear * np.cos(level) - normal * np.sin(level))
+    torque = total(shear * lever + normal * ahead)
+    assert load == pytest.approx(60.0, rel=1e-4)
+    assert float(found.drawbar_pull) == pytest.approx(pull, rel=1e-3, abs=2e-3)
+    assert float(found.torque) == pytest.approx(torque, rel=1e-3, abs=2e-4)
+
+
+@pytest.mark.parametrize("slip", [0.3, -0.3])
+def test_a_clogged_wheel_is_a_larger_one_at_another_slip(slip):
+    ground = replace(SAND, a1=0.0)  # the maximum stress does not move with slip
+    found = (WHEEL + EFFECTS["clogging"](layer=0.01))(ground, Operating(slip=slip, load=60.0))
+    travel = (1.0 - slip if slip > 0 else 1.0 / (1.0 + slip)) * 0.15 / 0.16
+    true = 1.0 - travel if travel < 1.0 else 1.0 / travel - 1.0
+    larger = Model(Wheel(radius=0.16, width=0.12))(ground, Operating(slip=true, load=60.0))
+    same(found, larger)
+
+
+@pytest.mark.parametrize("slip", [0.3, -0.3])
+def test_an_inclined_wheel_is_the_mean_of_slices_across_its_width(slip):
+    at = Operating(slip=np.asarray([slip]), load=np.asarray([60.0]))
+    found = (WHEEL + EFFECTS["camber"](angle=0.2))(SAND, at)
+
+    def upright(sinkage):
+        return forces_at_sinkage(WHEEL.load_case(SAND, at)[0], sinkage)
+
+    slices = found.sinkage + np.sin(0.2) * np.linspace(-0.06, 0.06, 2001)[:, None]
+    forces = [upright(z) for z in slices]
+    for name, expected in (("load", 60.0 / np.cos(0.2)), ("torque", None), ("drawbar_pull", None)):
+        mean = np.mean([getattr(f, name) for f in forces], axis=0)
+        value = getattr(found, name) if expected is None else expected
+        np.testing.assert_allclose(value, mean, rtol=0.01, err_msg=name)
+    d = 0.12 * np.sin(0.2) / np.sqrt(12.0)
+    deep, high = upright(found.sinkage + d), upright(found.sinkage - d)
+    for name in ("torque", "drawbar_pull"):
+        both = 0.5 * (getattr(deep, name) + getattr(high, name))
+        np.testing.assert_allclose(getattr(found, name), both, rtol=1e-9)
 
 
 def test_side_walls_of_a_wheel_buried_to_the_hub_are_quarter_circles():

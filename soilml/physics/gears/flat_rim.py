@@ -1,0 +1,104 @@
+"""The contact of a rim that lies flat on the soil along a chord between two arcs."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+from soilml.arrays import Array, namespace
+from soilml.numerics.quadrature import columns, crowded_ends
+from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.gears.rigid_wheel import (
+    BrakingLaw,
+    WheelArc,
+    differences_from_entry,
+    displacement_direction,
+    reversals,
+)
+from soilml.physics.operating_point import Operating
+
+SMALLEST_SLIP = 1e-12  # Slip of the chord below which shear there counts as not reversing
+
+
+def flat_rim_contact(rim: WheelArc, at: Operating, law: BrakingLaw, count: int) -> Contact:
+    """Points of a rim with a chord, `count` of them in each part.
+
+    Parts end at the chord, where pressure begins to fall, and where shear displacement reverses.
+    """
+    x, weight = columns(crowded_ends(count), rim.entry)
+    parts = list(pairwise(_part_ends(rim, at, law)))
+    xp = namespace(rim.entry)
+    angle = xp.concat([low + (high - low) * x for low, high in parts], axis=0)
+    arc = xp.concat([(high - low) * weight for low, high in parts], axis=0)
+    return flat_rim_points(rim, at, law, angle, arc)
+
+
+def _part_ends(rim: WheelArc, at: Operating, law: BrakingLaw) -> list[Array]:
+    """Angles (rad) from exit to entry between which all that is integrated is smooth, (batch,)."""
+    xp = namespace(rim.entry)
+    chord = rim.chord + 0.0 * rim.entry
+    fall = (rim.entry - chord) / (rim.entry - rim.peak)
+    inner = [
+        rim.peak,
+        xp.maximum(-chord, rim.exit),
+        xp.minimum(chord, rim.entry),
+        rim.exit + xp.minimum(fall, xp.ones_like(fall)) * (rim.peak - rim.exit),
+    ]
+    if bool(xp.any(at.slip < 0)):
+        travelled = rim.travelled(at.slip, law)
+        on_arc, exists = reversals(rim.entry, chord, 1.0 - travelled)
+        edge = xp.sin(chord)
+        sheared = rim.entry - chord - travelled * (xp.sin(rim.entry) - edge)
+        rate = xp.maximum(travelled - 1.0, xp.full_like(travelled, SMALLEST_SLIP))
+        on_chord = xp.atan((edge - sheared / rate) / xp.cos(chord))
+        reversal = xp.where(exists[0, :], on_arc[0, :], on_chord)
+        inner.append(xp.minimum(xp.maximum(reversal, rim.exit), rim.entry))
+    ordered = xp.sort(xp.stack(inner, axis=0), axis=0)
+    return [rim.exit, *(ordered[i, :] for i in range(len(inner))), rim.entry]
+
+
+def flat_rim_points(
+    rim: WheelArc, at: Operating, law: BrakingLaw, angle: Array, arc: Array
+) -> Contact:
+    r"""Contact at these angles (rad) about the axle, each of `arc` (rad); (points, batch).
+
+    .. math::
+        z = \min[r (\cos\theta - \cos\theta_1), z_0], \quad
+        dj = [1 - (1 - s) \cos\alpha] ds
+
+    with alpha the inclination of the rim, 0 on the chord, which stands r cos(theta_c) below the
+    axle. Behind the maximum the pressure is that at the mirrored angle before it.
+    """
+    xp = namespace(angle)
+    chord, radius = rim.chord + 0.0 * angle, rim.radius
+    height = radius * xp.cos(chord)
+    flat = xp.abs(angle) < chord
+    front, rear = xp.maximum(angle, chord), xp.minimum(angle, -chord)
+    across = xp.minimum(xp.maximum(angle, -chord), chord)
+    sin_chord = xp.sin(chord)
+    passed = rim.entry - front
+    sin_difference, _ = differences_from_entry(xp.sin(rim.entry), xp.cos(rim.entry), passed)
+    on_chord = radius * sin_chord - height * xp.tan(across)
+    along = radius * (passed - chord - rear) + on_chord
+    horizontal = radius * (sin_difference - sin_chord - xp.sin(rear)) + on_chord
+    travelled = rim.travelled(at.slip, law)
+    displacement = rim.shear_radius / radius * (along - travelled * horizontal)
+    mirrored = rim.entry - (angle - rim.exit) * ((rim.entry - rim.peak) / (rim.peak - rim.exit))
+    higher = xp.maximum(xp.where(angle < rim.peak, mirrored, angle), chord)
+    depth = xp.sin(0.5 * (rim.entry - higher)) * xp.sin(0.5 * (rim.entry + higher))
+    depth = 2.0 * radius * depth
+    area = rim.width * arc * xp.where(flat, height / xp.cos(across) ** 2, radius + 0.0 * chord)
+    level = xp.where(flat, xp.zeros_like(angle), angle)
+    return Contact(
+        depth=xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)),
+        shear_displacement=displacement,
+        surface_travel=rim.shear_radius * (rim.entry - angle),
+        area=area,
+        horizontal_area=area * xp.cos(level),
+        frontal_area=area * xp.sin(level),
+        shear_lever_arm=rim.lever - xp.where(flat, radius - height, xp.zeros_like(height)),
+        width=rim.width,
+        normal_lever_arm=xp.where(flat, height * xp.tan(across), xp.zeros_like(height)),
+        shear_direction=displacement_direction(displacement, at.slip, law),
+        travel_ratio=travelled,
+        geometry=rim,
+    )
