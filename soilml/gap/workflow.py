@@ -59,6 +59,7 @@ from soilml.gap.verdict.estimates import (
     soil_estimates,
     updated_case,
 )
+from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
     plain_fit,
@@ -301,10 +302,13 @@ def _build_report(
     if not smooth_gap:
         return report
     left_by = shown if decision.shown else beside
+    conditions = conditions_of_suspects(analysis, obstacles)
+    if decision.status == "suspected" and decision.shown:
+        conditions = (*conditions, noise_range(analysis, decision.shown))
     return replace(
         report,
         suspects=tuple(suspects(analysis)),
-        conditions=conditions_of_suspects(analysis, obstacles),
+        conditions=conditions,
         where=tuple(discrepancy_map(problem, result.soil, seed)),
         residual_trend=residual_trend(problem, left_by.fit),
         discrepancy=remaining_discrepancy(problem, beside, left_by),
