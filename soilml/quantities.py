@@ -48,6 +48,8 @@ _ALL = (
     Quantity("speed", "v", "m/s", "travel speed of the axle"),
     Quantity("pass", "", "-", "1 on virgin soil, 2 in the rut of one wheel, ..."),
     Quantity("slip_angle", "beta", "rad", "angle between the wheel's plane and its travel"),
+    Quantity("progress", "p", "-", "share of the campaign that is over, 0 at its first row"),
+    Quantity("load_direction", "d", "-", "1 where the load last rose, -1 where it last fell"),
     Quantity(
         "vibration", "Delta a", "m/s^2", "largest amplitude of the hub's acceleration, a stride"
     ),

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from soilml.arrays import Floats, Integers
-from soilml.physics.operating_point import Operating
+from soilml.physics.operating_point import FROM_ORDER, Operating
 
 #: Two levels are apart by this many standard deviations of their values, plus the second figure
 #: divided by the number of values. In a simulation of 4 to 64 values of one normal or uniform
@@ -203,7 +203,7 @@ def replicate_rows(
     ]
     for field in fields(at):
         value = getattr(at, field.name)
-        if field.name in ("slip", "load") or value is None:
+        if field.name in ("slip", "load", *FROM_ORDER) or value is None:
             continue
         value = np.broadcast_to(value, slip.shape)
         if field.name in COVARIATE_RULES:

@@ -16,6 +16,7 @@ from soilml.fitting.readings import (
     declared_std,
     stack_readings,
 )
+from soilml.fitting.row_order import with_order_columns
 from soilml.io.table import Table
 from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.remarks import Remark
@@ -32,7 +33,7 @@ def usable_readings(case: Case, table: Table) -> Readings:
     Raises `InputError` where no row remains, `TableError` where the table names another wheel than
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
-    table, excluded = answered_rows(with_rover_columns(case, table))
+    table, excluded = answered_rows(with_rover_columns(case, with_order_columns(case, table)))
     check_wheel_size(case, table)
     notes = [*_remarks_on(case, table), *excluded]
     found = stack_readings(case, table)

@@ -14,6 +14,7 @@ from soilml.errors import InputError, solvable
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import Readings, stack_readings
+from soilml.fitting.row_order import with_order_columns
 from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
 from soilml.gap.candidate_effects import candidate_effects, effect_names
 from soilml.gap.checks import (
@@ -76,6 +77,7 @@ from soilml.gap.verdict.remainder import (
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.operating_point import FROM_ORDER
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark, texts
 
@@ -163,7 +165,7 @@ def gap(
     """
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
-    table = with_rover_columns(case, as_table(table))
+    table = with_rover_columns(case, with_order_columns(case, as_table(table), FROM_ORDER))
     check_wheel_size(case, table)
     _check_size(table)
     table, excluded_rows = answered_rows(table)

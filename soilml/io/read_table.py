@@ -31,6 +31,8 @@ _LIMITS: dict[str, Limits] = {
     "speed_m_s": (-100.0, 100.0, "a speed between -100 and 100, in m/s"),
     "pass": (1.0 - 1e-9, 1e4, "the number of a pass, 1 or more"),
     "slip_angle_rad": (-1.6, 1.6, "an angle between -1.6 and 1.6, in rad"),
+    "progress": (-1e-9, 1.0 + 1e-9, "a share of the campaign, between 0 and 1"),
+    "load_direction": (-1.0 - 1e-9, 1.0 + 1e-9, "1 where the load last rose, -1 where it fell"),
     "slope_rad": (-1.4, 1.4, "a slope in rad, positive uphill"),
     "angle_rad": (-3.2, 3.2, "an angle in rad, from straight down, positive forward"),
     "wheel_radius_m": (0.0, 1e3, "a radius above zero and below 1000, in m"),

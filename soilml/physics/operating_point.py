@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, final
 
-from soilml.arrays import Real
+from soilml.arrays import Array, Real, namespace
 from soilml.parameters import Parameter
 
 #: Slip of 1 is a wheel that spins on the spot, -1 a locked wheel that slides: neither rolls.
@@ -42,9 +42,30 @@ class Operating:
     slip_angle: Annotated[
         Real | None, Parameter("rad", -1.6, 1.6, "between wheel plane and travel")
     ] = None
+    progress: Annotated[
+        Real | None, Parameter("1", 0.0, 1.0, "share of the campaign that is over")
+    ] = None
+    load_direction: Annotated[
+        Real | None, Parameter("1", -1.0, 1.0, "1 where the load last rose, -1 where it fell")
+    ] = None
     #: names of the gears that were driven, (n,); a model, which is of one gear, does not read it
     gear: Any = None
 
 
+#: Fields that follow from the order of the rows, and the column of each. A run is not set to them:
+#: rows that differ in nothing else are repeats.
+FROM_ORDER = {"progress": "progress", "load_direction": "load_direction"}
 #: Optional fields of `Operating`, and the column of each.
-COVARIATES = {"speed": "speed_m_s", "pass_number": "pass", "slip_angle": "slip_angle_rad"}
+COVARIATES = {
+    "speed": "speed_m_s",
+    "pass_number": "pass",
+    "slip_angle": "slip_angle_rad",
+    **FROM_ORDER,
+}
+
+
+def campaign_share(at: Operating) -> Array:
+    """Share of the campaign that is over at each row, (batch,); 1 where it is not known."""
+    if at.progress is None:
+        return namespace(at.slip).ones_like(at.slip)
+    return at.progress

@@ -101,8 +101,8 @@ def _fault(cls: Any) -> str:
         return "about is missing; it is a soilml.physics.effects.EffectCard"
     if about.kind not in KINDS:
         return f"about.kind is {about.kind!r}; there are: {', '.join(KINDS)}"
-    if unknown := [need for need in about.needs if need not in COVARIATES]:
-        return f"about.needs has {unknown[0]!r}; there are: {', '.join(COVARIATES)}"
+    if unknown := [need for need in (*about.needs, *about.uses) if need not in COVARIATES]:
+        return f"about.needs or uses has {unknown[0]!r}; there are: {', '.join(COVARIATES)}"
     return _fault_of_size(cls, about)
 
 

@@ -15,7 +15,7 @@ from datagen.blind_sets.run_schedules import COVARIATE_COLUMNS
 from datagen.blind_sets.soil_families import FAMILIES, FREE_PARAMETERS, RADIUS, WIDTH
 from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
 from soilml.config.case import read_case
-from soilml.physics.operating_point import COVARIATES
+from soilml.physics.operating_point import COVARIATES, FROM_ORDER
 
 PLAN = Plan("A", "slip-sinkage", 1.0, 0.01, 8, "dry-sand", 3, 7)
 OF_SOILML = {**MECHANISMS["A"], **MECHANISMS["S"]}
@@ -41,7 +41,8 @@ def batch(count, seed):
 def of_soilml(rows, effects=()):
     """Torque, drawbar pull and sinkage as the package has them, (3, n)."""
     soil = Soil(**{f.name: getattr(rows, f.name) for f in fields(Soil)})
-    at = Operating(**{f: getattr(rows, f) for f in ("slip", "load", *COVARIATES)})
+    conditions = COVARIATES.keys() - FROM_ORDER.keys()
+    at = Operating(**{f: getattr(rows, f) for f in ("slip", "load", *conditions)})
     force = Model(Wheel(radius=RADIUS, width=WIDTH), tuple(effects))(soil, at)
     return np.stack([force.torque, force.drawbar_pull, force.sinkage])
 

@@ -20,8 +20,15 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
-#: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on.
-USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0}
+#: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on,
+#: after the campaign, with a load cell that does not lag.
+USUAL_COVARIATES = {
+    "speed": 0.05,
+    "pass_number": 1.0,
+    "slip_angle": 0.0,
+    "progress": 1.0,
+    "load_direction": 0.0,
+}
 
 
 def planned_readings(case: Case, design: Table) -> Readings:

@@ -16,7 +16,7 @@ from soilml.fitting.readings import Readings
 from soilml.gap.design.planned_readings import USUAL_COVARIATES, carried_rows
 from soilml.parameters import declared
 from soilml.physics.effects.base import Effect
-from soilml.physics.operating_point import Operating
+from soilml.physics.operating_point import FROM_ORDER, Operating
 
 ROWS_PER_RUN, FEWEST_ROWS = 8, 3  # Rows of a proposed run, and the fewest that make a run
 #: Highest slip that is proposed: near 1 a wheel digs itself in before its readings are steady.
@@ -157,7 +157,7 @@ def _usual(readings: Readings) -> dict[str, Any]:
     usual = {}
     for field in USUAL_COVARIATES:
         value = getattr(readings.at, field)
-        if value is None:
+        if value is None or field in FROM_ORDER:
             continue
         typical = np.median(np.abs(value) if field == "speed" else value)
         if field == "pass_number":

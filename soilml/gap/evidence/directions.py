@@ -18,7 +18,7 @@ from soilml.fitting.predictions import PredictionRequest, linearise, predict_man
 from soilml.fitting.readings import Readings
 from soilml.gap.candidate_effects import gears_differ, with_effect
 from soilml.physics.effects.base import Effect
-from soilml.physics.operating_point import COVARIATES
+from soilml.physics.operating_point import COVARIATES, FROM_ORDER
 from soilml.remarks import Remark
 
 #: Step of the secant that gives a signature, in reference sizes. A secant is used because some
@@ -92,13 +92,16 @@ def _missing_covariate(case: Case, effect: type[Effect], readings: Readings) -> 
     """What these runs lack to test an effect; None where they have it."""
     if effect.about.varied and not gears_differ(case, effect.about.varied_dimension):
         return Remark("unvaried-gear", f"needs {effect.about.varied}", (effect.name,))
-    for field in effect.about.needs:
+    for field in (*effect.about.needs, *effect.about.uses):
         value = getattr(readings.at, field)
         if value is None:
             text = f"needs the column {COVARIATES[field]}"
             return Remark("missing-column", text, (effect.name,))
         values = np.broadcast_to(value, readings.run.shape)
-        if covariate_levels(field, values, readings.run).count < 2:
+        varies = bool(np.ptp(values) > 0.0)
+        if field not in FROM_ORDER:
+            varies = covariate_levels(field, values, readings.run).count > 1
+        if not varies:
             text = f"needs runs at several values of {COVARIATES[field]}"
             return Remark("constant-column", text, (effect.name,))
     return None

@@ -31,6 +31,8 @@ from soilml.physics.effects.sidewall_shear import SidewallShear as SidewallShear
 from soilml.physics.effects.depth_cohesion import DepthCohesion as DepthCohesion
 from soilml.physics.effects.rate_dependence import Rate as Rate
 from soilml.physics.effects.multipass import Multipass as Multipass
+from soilml.physics.effects.bearing_drift import BearingDrift as BearingDrift
+from soilml.physics.effects.cohesion_drift import CohesionDrift as CohesionDrift
 from soilml.physics.effects.lateral_slip import LateralSlip as LateralSlip
 from soilml.physics.effects.slope import Slope as Slope
 from soilml.physics.effects.load_transfer import LoadTransfer as LoadTransfer
@@ -39,6 +41,7 @@ from soilml.physics.effects.bearing_friction import BearingFriction as BearingFr
 from soilml.physics.effects.sensors import TorqueOffset as TorqueOffset
 from soilml.physics.effects.sensors import TorqueGain as TorqueGain
 from soilml.physics.effects.sensors import LoadGain as LoadGain
+from soilml.physics.effects.sensors import LoadHysteresis as LoadHysteresis
 from soilml.physics.effects.sensors import DrawbarOffset as DrawbarOffset
 from soilml.physics.effects.sensors import DrawbarGain as DrawbarGain
 from soilml.physics.effects.sensors import SinkageOffset as SinkageOffset

@@ -54,6 +54,8 @@ class EffectCard:
     isolate: str
     #: fields of `Operating` that must be given, and must vary for the effect to be identifiable
     needs: tuple[str, ...] = ()
+    #: fields of `Operating` that it uses where they are known
+    uses: tuple[str, ...] = ()
     #: what the runs of one gear cannot vary, so that a search for missing effects cannot test it
     varied: str = ""
     #: the dimension of the gear whose variation between several gears is what `varied` asks for

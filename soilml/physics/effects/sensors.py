@@ -214,6 +214,38 @@ class LoadGain(Effect):
 
 @final
 @dataclass(frozen=True, kw_only=True)
+class LoadHysteresis(Effect):
+    r"""The load cell lags: it reads too little while loads rise, too much while they fall.
+
+    .. math:: W' = (1 - e d) W
+
+    with W' as reported and d = 1 where the load last rose, -1 where it last fell, in the order of
+    the rows; d = 0 where that order is not known. References: ISO 376, reversibility error of a
+    force transducer, 2 e. Loads that only rise make it a wrong scale (`load-gain`); how far a load
+    has to fall until the cell reads the other branch is left out.
+    """
+
+    name: ClassVar[str] = "load-hysteresis"
+    about: ClassVar[EffectCard] = EffectCard(
+        text="the load cell lags behind loads that rise and fall",
+        source="ISO 376, reversibility error",
+        kind="sensor",
+        reference={"error": 0.03},
+        signs={"torque": +1, "sinkage": +1},
+        isolate="weighing the wheel on its stand after a lighter and after a heavier load",
+        uses=("load_direction",),
+        calibration=0.01,
+    )
+    error: Annotated[Real, Parameter("1", -0.3, 0.3, "e, half the reversibility error")] = 0.0
+
+    def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
+        if at.load_direction is None:
+            return at
+        return replace(at, load=at.load / (1.0 - self.error * at.load_direction))
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
 class SlipOffset(Effect):
     r"""The reported slip is off by the same amount in all rows.
 

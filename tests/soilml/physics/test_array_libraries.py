@@ -27,6 +27,8 @@ KNOWN = {
     "speed": np.linspace(-0.1, 0.3, 10),
     "pass_number": np.arange(10.0) % 3 + 1.0,
     "slip_angle": np.linspace(-0.3, 0.3, 10),
+    "progress": np.linspace(0.0, 1.0, 10),
+    "load_direction": np.arange(10.0) % 3 - 1.0,
 }
 
 
@@ -58,7 +60,7 @@ def test_gradients_flow_through_the_size_of_every_effect(name, gear):
     bare = Model(gear(radius=0.15, width=0.12))
     slip, known = (
         np.asarray([-0.4, -0.02, 0.2, 0.3, 0.6]),
-        {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.2},
+        {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.2, "load_direction": 1.0},
     )
 
     def value(x):

@@ -21,7 +21,13 @@ from soilml.physics.operating_point import COVARIATES
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
-KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
+KNOWN = {
+    "speed": 0.1,
+    "pass_number": 2.0,
+    "slip_angle": 0.15,
+    "progress": 0.8,
+    "load_direction": 1.0,
+}
 AT = Operating(slip=np.linspace(0.15, 0.7, 8), load=60.0, **KNOWN)
 PUBLISHED = Path(__file__).parents[1] / "declared_parameters.csv"
 CHANNELS = ("torque", "drawbar_pull", "sinkage")
@@ -63,6 +69,8 @@ def known_to(count):
         "speed": np.where(rows % 3, 1.0, -1.0) * 10.0 ** (-3 + 4 * (rows % 17) / 16),
         "pass_number": 1.0 + rows % 6,
         "slip_angle": -1.5 + 3.0 * (rows % 29) / 28,
+        "progress": (rows % 11) / 10,
+        "load_direction": 1.0 - rows % 3,
     }
 
 
@@ -163,7 +171,8 @@ def test_is_described(name):
     assert (card.calibration is not None) == (card.kind in ("rig", "sensor"))
     assert card.size == next(iter(parameters if card.kind in ("rig", "sensor") else card.reference))
     assert card.reference[card.size] != 0 and getattr(cls(), card.size) == 0
-    assert set(card.reference) <= set(parameters) and set(card.needs) <= set(COVARIATES)
+    assert set(card.reference) <= set(parameters)
+    assert {*card.needs, *card.uses} <= set(COVARIATES)
     check(cls())
     check(sized(name))
 

@@ -388,6 +388,18 @@ def test_an_exit_angle_given_as_a_share_of_the_entry_lies_behind_the_axle(b0):
     np.testing.assert_allclose(kappa.exit, -np.arccos(1.0 - 0.2 * 0.02 / 0.15), rtol=1e-9)
 
 
+def test_the_soil_of_a_campaign_drifts_from_its_first_row_on():
+    for progress, share in ((0.0, 0.0), (0.5, 0.5), (1.0, 1.0), (None, 1.0)):
+        at = replace(AT, progress=progress)
+        firm = {k: getattr(SAND, k) * np.exp(0.4 * share) for k in ("kc", "kphi")}
+        found = (WHEEL + EFFECTS["bearing-drift"](growth=0.4))(SAND, at)
+        same(found, WHEEL(replace(SAND, **firm), AT))
+        cohesive = replace(SAND, cohesion=SAND.cohesion + 600.0 * share)
+        same((WHEEL + EFFECTS["cohesion-drift"](gain=600.0))(SAND, at), WHEEL(cohesive, AT))
+    dry = (WHEEL + EFFECTS["cohesion-drift"](gain=-1e4))(SAND, AT)
+    same(dry, WHEEL(replace(SAND, cohesion=0.0), AT))
+
+
 def test_weight_pulls_back_on_a_slope_and_forward_in_reverse():
     model = WHEEL + EFFECTS["slope"](angle=0.2)
     flat = WHEEL(SAND, replace(RIG_AT, load=60.0 * np.cos(0.2)))
@@ -425,6 +437,13 @@ def test_a_load_cell_that_reads_a_quarter_too_much():
     for channel in CHANNELS:
         expected = getattr(WHEEL(SAND, replace(RIG_AT, load=48.0)), channel)
         np.testing.assert_allclose(getattr(found, channel), expected, rtol=1e-9)
+
+
+def test_a_load_cell_that_lags_reads_too_little_while_loads_rise():
+    model = WHEEL + EFFECTS["load-hysteresis"](error=0.2)
+    for direction, load in ((1.0, 75.0), (-1.0, 50.0), (0.0, 60.0), (None, 60.0)):
+        found = model(SAND, replace(RIG_AT, load_direction=direction))
+        same(found, WHEEL(SAND, replace(RIG_AT, load=load)))
 
 
 @pytest.mark.parametrize(

@@ -111,7 +111,7 @@ ABOUT = OWN[OWN.index("    about") : OWN.index("    strength")]
         (
             "        signs",
             "        needs=('moisture',),\n        signs",
-            "about.needs has 'moisture'",
+            "about.needs or uses has 'moisture'",
         ),
     ],
 )
