@@ -39,11 +39,14 @@ def join_key(part: CaseSets) -> Hashable:
     """Equal for parts that `joined_load_case` may join at little cost.
 
     They share gear and known covariates. Effects on stresses act at all points of every contact,
-    so that rows without such an effect are kept apart from those that have it.
+    and some multiply these points, so that rows without such an effect are kept apart from those
+    that have it.
     """
     known = tuple(name for name in COVARIATES if getattr(part.at, name) is not None)
-    on_stress = frozenset(e.name for e in part.case.model.effects if e.overrides("on_stress"))
-    return part.case.model.gear, known, on_stress
+    apart = frozenset(
+        e.name for e in part.case.model.effects if e.overrides("on_stress") or e.more_points
+    )
+    return part.case.model.gear, known, apart
 
 
 def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:

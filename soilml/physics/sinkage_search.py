@@ -109,7 +109,8 @@ def load_rises_with_sinkage(load_case: LoadCase) -> bool:
     the maximum stress far forward.
     """
     xp, effects = namespace(load_case.at.slip), load_case.effects
-    if any(effect.overrides(stage) for effect in effects for stage in STAGES_AT_SINKAGE):
+    others = [effect for effect in effects if not effect.load_rises]
+    if any(effect.overrides(stage) for effect in others for stage in STAGES_AT_SINKAGE):
         return False
     return not bool(xp.any(load_case.at.slip < 0))
 
@@ -176,7 +177,7 @@ def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array
 def _load_may_fall_with_sinkage(load_case: LoadCase, sinkage: Array) -> Array:
     """Rows in which downward shear or an effect may make the load fall with sinkage."""
     xp, effects = namespace(sinkage), load_case.effects
-    if any(effect.overrides("on_stress") for effect in effects):
+    if any(effect.overrides("on_stress") and not effect.load_rises for effect in effects):
         return xp.ones_like(sinkage, dtype=xp.bool)
     _, stresses = stresses_at_sinkage(load_case, sinkage, coarse=True)
     lift = stresses.shear * stresses.contact.frontal_area

@@ -41,6 +41,8 @@ class Camber(Effect):
         isolate="a spirit level on the side of the wheel, under load",
         calibration=0.03,
     )
+    load_rises: ClassVar[bool] = True
+    more_points: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (Wheel,)
     angle: Annotated[Real, Parameter("rad", 0.0, 0.5, "gamma, of the wheel's plane")] = 0.0
 

@@ -38,6 +38,7 @@ class Clogging(SlipLoadScaling):
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the same runs with the wheel brushed clean before each",
     )
+    load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
     layer: Annotated[Real, Parameter("m", 0.0, 0.1, "h, thickness of the layer of soil")] = 0.0
 

@@ -42,6 +42,7 @@ class CurvedEnvelope(SlipLoadScaling):
         family="strength envelope",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
     exponent: Annotated[Real, Parameter("1", 0.0, 0.8, "a, loss of power of the stress")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:

@@ -43,6 +43,7 @@ class EllipticPressure(SlipLoadScaling):
         family="shape of normal stress",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (Wheel,)
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "share of the ellipse")] = 0.0
 

@@ -38,6 +38,7 @@ class FirmBase(SlipLoadScaling):
         family="pressure by sinkage",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
     nearness: Annotated[Real, Parameter("1/m", 0.0, 500.0, "a, 1 / depth of the base")] = 0.0
     steepness: Annotated[Real, Parameter("1", 1.0, 12.0, "m, power of the depth")] = 4.0

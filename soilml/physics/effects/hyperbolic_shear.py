@@ -41,6 +41,7 @@ class HyperbolicShear(SlipLoadScaling):
         family="shear law",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "share of the hyperbola")] = 0.0
 
     def on_stress(self, stress: Stress, load_case: LoadCase) -> Stress:

@@ -42,6 +42,7 @@ class ParabolicPressure(SlipLoadScaling):
         family="shape of normal stress",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (Wheel,)
     share: Annotated[Real, Parameter("1", 0.0, 1.0, "share of the parabola")] = 0.0
 

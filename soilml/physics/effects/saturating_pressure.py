@@ -38,6 +38,7 @@ class SaturatingPressure(SlipLoadScaling):
         family="pressure by sinkage",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
+    load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel, Track)
     softness: Annotated[Real, Parameter("1/Pa", 0.0, 1e-3, "a, 1 / limit of pressure")] = 0.0
 

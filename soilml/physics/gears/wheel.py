@@ -29,8 +29,10 @@ BRAKING_NODES = 24
 #: fraction of the way to the maximum stress: errors at slips below -0.9 fall from 3e-5 to 4e-6.
 MOBILISED_WITHIN = 5.0
 COARSE_NODES = 5  # Enough for the load to a few per cent
-#: Nodes in each of the five or six parts of a rim that lies flat.
-FLAT_RIM_NODES, COARSE_FLAT_RIM_NODES = 12, 3
+#: Nodes in each part of a rim that lies flat, driving with five parts and braking with six. Against
+#: 48 of them the forces of driving rows differ by 2e-5 at most, of braking rows by 1e-5 in 99 % of
+#: them and by 3e-3 at most, in units of the load.
+FLAT_RIM_DRIVING_NODES, FLAT_RIM_BRAKING_NODES, FLAT_RIM_COARSE_NODES = 10, 12, 3
 
 
 @final
@@ -73,12 +75,13 @@ class Wheel(RigidWheel):
 
     def contact(self, geometry: WheelArc, at: Operating) -> Contact:
         """The points along the arc; more of them where a braking wheel shears both ways."""
-        xp = namespace(geometry.entry)
+        brakes = bool(namespace(geometry.entry).any(at.slip < 0))
         if geometry.tilt is not None:
             return sliced_contact(geometry, lambda rim: self.contact(rim, at))
         if geometry.chord is not None:
-            return flat_rim_contact(geometry, at, self.braking, FLAT_RIM_NODES)
-        if bool(xp.any(at.slip < 0)):
+            nodes = FLAT_RIM_BRAKING_NODES if brakes else FLAT_RIM_DRIVING_NODES
+            return flat_rim_contact(geometry, at, self.braking, nodes)
+        if brakes:
             return _braking_contact(geometry, at, self.braking, BRAKING_NODES)
         return _two_part_contact(geometry, at, self.braking, DRIVING_NODES)
 
@@ -87,7 +90,7 @@ class Wheel(RigidWheel):
         if geometry.tilt is not None:
             return sliced_contact(geometry, lambda rim: self.coarse_contact(rim, at))
         if geometry.chord is not None:
-            return flat_rim_contact(geometry, at, self.braking, COARSE_FLAT_RIM_NODES)
+            return flat_rim_contact(geometry, at, self.braking, FLAT_RIM_COARSE_NODES)
         return _two_part_contact(geometry, at, self.braking, COARSE_NODES)
 
     def profile_contact(

@@ -273,3 +273,18 @@ def test_a_prediction_without_equilibrium_counts_as_ten_sigma(dug):
     readings = dug[0].readings
     nowhere = np.full(len(readings), np.nan)
     assert gap_reduction(readings, readings.std, nowhere, readings.measured, "all").before == 100.0
+
+
+@pytest.mark.slow
+def test_two_forms_of_one_law_are_never_in_one_set():
+    case = case_of()
+    hidden = [EFFECTS["hyperbolic-shear"](share=1.0), EFFECTS["torque-offset"](offset=0.2)]
+    problem = fit_problem(case, driven(case, hidden, seed=4))
+    names = ("shear-softening", "hyperbolic-shear", "torque-offset", "drawbar-offset")
+    problem = replace(problem, effects={name: EFFECTS[name] for name in names})
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    softening = fitted(problem, soil, "shear-softening").fit
+    assert set(problem.effects_not_in(softening)) == {"torque-offset", "drawbar-offset"}
+    sets = [c.names for c in search(problem, soil, 0).candidates]
+    assert any(len(chosen) > 1 and "hyperbolic-shear" in chosen for chosen in sets)
+    assert not any({"shear-softening", "hyperbolic-shear"} <= set(chosen) for chosen in sets)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import input_box, solved
 
 from soilml import EFFECTS, Model, Operating, Status, Track, Wheel, soil
 from soilml.errors import InputError
@@ -46,8 +47,8 @@ def test_the_three_searches_find_the_same_sinkage():
     ]
     carried = load_at_sinkage(case, found[1][0].sinkage) / case.at.load
     np.testing.assert_allclose(carried, 1.0, atol=1e-7)
-    for force, solved in found:
-        assert solved.all() and not force.status.any()
+    for force, answered in found:
+        assert answered.all() and not force.status.any()
         for name in ("sinkage", "torque", "drawbar_pull", "entry_angle", "load"):
             reference = getattr(found[1][0], name)
             np.testing.assert_allclose(getattr(force, name), reference, rtol=1e-6, atol=1e-7)
@@ -188,3 +189,14 @@ def test_operating_points_out_of_their_range_are_refused_when_they_are_used():
             object.__setattr__(at, name, value)
         with pytest.raises(InputError, match=next(iter(wrong))):
             Model(WHEEL)(SAND, at)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name, cls in EFFECTS.items() if cls.load_rises])
+def test_an_effect_under_which_the_load_rises_needs_no_scan(name, monkeypatch):
+    box, cls = input_box(512, seed=21), EFFECTS[name]
+    quick = solved(box, [cls(**cls.about.reference)])
+    monkeypatch.setattr(cls, "load_rises", False)
+    scanned = solved(box, [cls(**cls.about.reference)])
+    np.testing.assert_array_equal(quick.status, scanned.status)
+    np.testing.assert_allclose(quick.sinkage, scanned.sinkage, rtol=1e-9)
