@@ -12,7 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.physics.contact import Force
-from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.physics.operating_point import AFTER_CAMPAIGN, COVARIATES, Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
@@ -40,7 +40,8 @@ def simulate(
     slip, load
         Slip ratios and vertical loads (N), (n,) or numbers.
     speed, pass_number, slip_angle
-        Speed in m/s, pass and slip angle in rad of all rows, where effects need them.
+        Speed in m/s, pass and slip angle in rad of all rows, where effects need them. What drifts
+        in the order of the rows is as after the campaign.
     run
         Name of the run of each row, (n,) or one: a column `run`.
     seed
@@ -71,6 +72,8 @@ def simulate(
     if case.gears:
         raise InputError(f"simulate takes one gear; this case has {', '.join(case.gears)}")
     known = {"speed": speed, "pass_number": pass_number, "slip_angle": slip_angle}
+    used = {field for effect in case.model.effects for field in effect.about.uses}
+    known |= {field: value for field, value in AFTER_CAMPAIGN.items() if field in used}
     slips, loads = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v, float)) for v in (slip, load)))
     parts = []
     for first in range(0, slips.size, BLOCK):

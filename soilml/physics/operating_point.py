@@ -55,6 +55,8 @@ class Operating:
 #: Fields that follow from the order of the rows, and the column of each. A run is not set to them:
 #: rows that differ in nothing else are repeats.
 FROM_ORDER = {"progress": "progress", "load_direction": "load_direction"}
+#: Their values after a campaign, where no order is known.
+AFTER_CAMPAIGN = {"progress": 1.0, "load_direction": 0.0}
 #: Optional fields of `Operating`, and the column of each.
 COVARIATES = {
     "speed": "speed_m_s",

@@ -62,6 +62,8 @@ def run(args: argparse.Namespace) -> int:
     print(f"{args.name}: {about.text}\nof the {about.kind}, acts on: {acts}")
     if about.needs:
         print(f"needs: {', '.join(COVARIATES[field] for field in about.needs)}")
+    if about.family:
+        print(f"family: {about.family}")
     if about.uses:
         print(f"uses, where known: {', '.join(COVARIATES[field] for field in about.uses)}")
     print(f"distinguished from others by: {about.isolate}\nsource: {about.source}\n")

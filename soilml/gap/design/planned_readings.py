@@ -16,19 +16,13 @@ from soilml.fitting.operating_points import operating_points, with_rover_columns
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, positive_std
 from soilml.io.table import Table
-from soilml.physics.operating_point import Operating
+from soilml.physics.operating_point import AFTER_CAMPAIGN, Operating
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
 #: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on,
 #: after the campaign, with a load cell that does not lag.
-USUAL_COVARIATES = {
-    "speed": 0.05,
-    "pass_number": 1.0,
-    "slip_angle": 0.0,
-    "progress": 1.0,
-    "load_direction": 0.0,
-}
+USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0, **AFTER_CAMPAIGN}
 
 
 def planned_readings(case: Case, design: Table) -> Readings:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml import EFFECTS, Case, Model, Wheel, soil
+from soilml import EFFECTS, Case, Model, Wheel, simulate, soil
 from soilml.fitting.levels import replicate_rows
 from soilml.fitting.operating_points import operating_points
 from soilml.fitting.row_order import campaign_progress, load_directions, with_order_columns
@@ -63,6 +63,16 @@ def test_sorted_rows_have_no_progress_unless_they_were_timed():
     assert "progress" not in with_order_columns(PLAIN, Table(columns), FROM_ORDER)
     timed = Table(columns | {"time_s": np.arange(24.0)})
     assert "progress" in with_order_columns(PLAIN, timed, FROM_ORDER)
+
+
+def test_simulated_rows_say_that_the_campaign_is_over():
+    case = Case(PLAIN.model + EFFECTS["load-hysteresis"](error=0.1), SAND)
+    simulated = simulate(case, slip=[0.1, 0.3], load=[60.0, 40.0])
+    assert simulated["load_direction"].tolist() == [0.0, 0.0]
+    assert "progress" not in simulated
+    np.testing.assert_array_equal(
+        simulated["torque_Nm"], simulate(PLAIN, slip=[0.1, 0.3], load=[60.0, 40.0])["torque_Nm"]
+    )
 
 
 def test_rows_that_differ_in_their_order_alone_are_repeats():
