@@ -4,8 +4,9 @@ The wheel and the mechanisms are an independent implementation, which imports no
 that an error in the analysis cannot hide in the data that test it.
 
 `reference_wheel` has the wheel and the stages at which a mechanism acts; `catalogued` and
-`uncatalogued` have the mechanisms, a tuple for each family of laws; `soil_families` has soils and
-wheels, and what the analyst is given of them, right or wrong; `run_schedules` the operating points;
+`uncatalogued` have the mechanisms, `law_families` other laws of the soil and soils that change;
+`soil_families` has soils and wheels, and what the analyst is given of them, right or wrong;
+`run_schedules` the operating points;
 `reading_errors` what readings have beside the forces, by place (smooth discrepancies), by time
 (autocorrelation) and by chance; `plans` the tiers and the sets to simulate; `blind_set` the set of
 a plan, and its truth.

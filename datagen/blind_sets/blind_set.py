@@ -34,6 +34,7 @@ from datagen.blind_sets.run_schedules import (
     RunSchedule,
     design_schedule,
     heavier_schedule,
+    rows_between,
     slip_range,
     with_both_gears,
 )
@@ -63,18 +64,21 @@ Columns = dict[str, NDArray[Any]]
 
 @dataclass(frozen=True)
 class BlindSet:
-    """Measured runs, a held-out region, the analyst's model, and the truth.
+    """Measured runs, rows that are held out, the analyst's model, and the truth.
 
     `columns` and `region` are columns by name, each (rows,): run, slip, load_N, torque_Nm,
-    drawbar_pull_N, sinkage_m, the covariates that vary, and gear where there are two. `region` is
-    1.3 to 1.6 times heavier than the heaviest run. Channels that were not measured are NaN. `model`
+    drawbar_pull_N, sinkage_m, the covariates that vary, gear where there are two, and time_s where
+    it was recorded. `region` is 1.3 to 1.6 times heavier than the heaviest run; `between` has rows
+    of the same runs at other slips. Channels that were not measured are NaN. `model`
     is the text of a model file without the hidden mechanism. In `truth`, `runs_true` and
-    `region_true` are the readings without noise; `runs_steady` and `runs_without` are without
-    scatter and discrepancy as well, `runs_without` and `region_without` without the mechanism.
+    `region_true` are the readings without noise, as is `between_true`; `runs_steady` and
+    `runs_without` are without scatter and discrepancy as well, `runs_without` and `region_without`
+    without the mechanism.
     """
 
     columns: Columns
     region: Columns
+    between: Columns
     model: str
     truth: dict[str, Any]
 
@@ -120,8 +124,14 @@ def draw_blind_set(plan: Plan) -> BlindSet:
             np.isfinite(v).all() for p in (*(s for s, _ in simulated), steady, *bare) for v in p
         ):
             continue
-        extra = draw_discrepancies(plan.discrepancy, (runs, region), simulated[0][0], extras)
-        true = [_sum(s, e) for (s, _), e in zip(simulated, extra, strict=True)]
+        between = rows_between(runs, np.random.default_rng((plan.seed, attempt, 2)))
+        inside = _scattered(between, soil, wheels, active, simulated[0][1])
+        if not all(np.isfinite(v).all() for v in inside):
+            continue
+        schedules = (runs, region, between)
+        extra = draw_discrepancies(plan.discrepancy, schedules, simulated[0][0], extras)
+        true = [_sum(s, e) for (s, _), e in zip(simulated, extra[:2], strict=True)]
+        inside = _sum(inside, extra[2])
         steady = _sum(steady, extra[1])
         sinkages = [(t[2], s[2]) for t, (s, _) in zip(true, simulated, strict=True)]
         if all(np.all(one >= LEAST_SINKAGE * other) for one, other in sinkages):
@@ -131,10 +141,15 @@ def draw_blind_set(plan: Plan) -> BlindSet:
     declared = sensors(plan.noise)
     nominal = nominal_soil(soil, plan.free, generator)
     missing = draw_missing(extras) if plan.design == "missing-channels" else ()
+    if plan.design == "torque-alone":
+        missing = CHANNELS[1:]
     tables = [
         _measure(d, t, declared, plan.tier, missing, generator)
-        for d, t in zip((runs, region), true, strict=True)
+        for d, t in zip((runs, region, between), (*true, inside), strict=True)
     ]
+    if plan.timed:
+        for d, table in zip((runs, region, between), tables, strict=True):
+            table["time_s"] = _times(d)
     truth = {
         "plan": asdict(plan),
         "causes": [
@@ -169,8 +184,12 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         "runs_without": _by_channel(bare[0]),
         "region_true": _by_channel(steady),
         "region_without": _by_channel(bare[1]),
+        "between_true": _by_channel(inside),
+        "between_elapsed": between.elapsed.tolist(),
+        "region_elapsed": region.elapsed.tolist(),
     }
-    return BlindSet(tables[0], tables[1], _model(nominal, plan.free, wheels, declared), truth)
+    model = _model(nominal, plan.free, wheels, declared)
+    return BlindSet(tables[0], tables[1], tables[2], model, truth)
 
 
 def write_blind_set(plan: Plan, folder: Path, truth_folder: Path) -> None:
@@ -200,6 +219,7 @@ def _rows(schedule: RunSchedule, soil: dict[str, float], wheels: Wheels) -> Whee
     size = schedule.slip.size
     full = {name: np.full(size, value) for name, value in soil.items()}
     full["radius"], full["width"] = np.array(wheels)[schedule.gear].T
+    full["elapsed"] = schedule.elapsed
     return WheelState(slip=schedule.slip, load=schedule.load, **schedule.covariates, **full)
 
 
@@ -215,12 +235,31 @@ def _simulate(
     runs = int(schedule.run.max()) + 1
     phi = SCATTER_PHI * generator.standard_normal(runs) * scatter
     k = np.exp(SCATTER_K * generator.standard_normal(runs) * scatter)
+    drawn = {"friction_angle_offset_rad": phi.tolist(), "modulus_factor": k.tolist()}
+    return _scattered(schedule, soil, wheels, active, drawn), drawn
+
+
+def _scattered(
+    schedule: RunSchedule,
+    soil: dict[str, float],
+    wheels: Wheels,
+    active: ActiveMechanisms,
+    scatter: dict[str, list[float]],
+) -> list[Floats]:
+    """True channels of rows whose runs have this scatter."""
+    phi = np.asarray(scatter["friction_angle_offset_rad"])[schedule.run]
+    k = np.asarray(scatter["modulus_factor"])[schedule.run]
     rows = _rows(schedule, soil, wheels)
     values = {**vars(rows)}
-    values["friction_angle"] = rows.friction_angle + phi[schedule.run]
-    values["kc"], values["kphi"] = rows.kc * k[schedule.run], rows.kphi * k[schedule.run]
-    channels = _channels(WheelState(**values), schedule, active)
-    return channels, {"friction_angle_offset_rad": phi.tolist(), "modulus_factor": k.tolist()}
+    values["friction_angle"] = rows.friction_angle + phi
+    values["kc"], values["kphi"] = rows.kc * k, rows.kphi * k
+    return _channels(WheelState(**values), schedule, active)
+
+
+def _times(schedule: RunSchedule) -> Floats:
+    """Times (s) of the rows: a run takes a quarter of an hour, its rows follow in ten seconds."""
+    first = np.searchsorted(schedule.run, schedule.run)
+    return np.asarray(900.0 * schedule.run + 10.0 * (np.arange(schedule.run.size) - first))
 
 
 def _channels(rows: WheelState, schedule: RunSchedule, active: ActiveMechanisms) -> list[Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import cycle, groupby, islice
 from typing import TypeVar
@@ -10,12 +10,13 @@ from typing import TypeVar
 import numpy as np
 
 from datagen.blind_sets.catalogued import RIG_MECHANISMS, SENSOR_MECHANISMS, TEXTBOOK_FORMS
+from datagen.blind_sets.law_families import LAW_MECHANISMS, TREND_MECHANISMS
 from datagen.blind_sets.reference_wheel import Mechanism
 from datagen.blind_sets.soil_families import FAMILIES
 from datagen.blind_sets.uncatalogued import ALTERNATIVE_FORMS, UNCATALOGUED_MECHANISMS
 
 #: Tier -> mechanism by its key. A: textbook form, soil, wheel and rig; B: alternative form; C: in
-#: no catalogue of the analyst; S: sensors.
+#: no catalogue of the analyst; S: sensors; L: another law of the soil; T: a soil that changes.
 MECHANISMS: dict[str, dict[str, Mechanism]] = {
     tier: {mechanism.key: mechanism for mechanism in mechanisms}
     for tier, mechanisms in (
@@ -23,6 +24,8 @@ MECHANISMS: dict[str, dict[str, Mechanism]] = {
         ("B", ALTERNATIVE_FORMS),
         ("C", UNCATALOGUED_MECHANISMS),
         ("S", SENSOR_MECHANISMS),
+        ("L", LAW_MECHANISMS),
+        ("T", TREND_MECHANISMS),
     )
 }
 
@@ -117,7 +120,17 @@ DESIGN_COUNTS = {
     "braking": (16, 6),
     "two-gears": (16, 4),
 }
-DESIGN_RUNS = {"one-run": (1,), "few-runs": (2, 3)}  # Number of runs of designs that prescribe it
+#: Number of runs, and sizes, of designs that prescribe them.
+DESIGN_RUNS = {"one-run": (1,), "few-runs": (2, 3), "few-rows": (1,)}
+DESIGN_SIZES = {"few-rows": (1.0, 2.0, 3.0)}
+
+#: Sets beside those above: laws and trends as `SWEEP_COUNTS` has them; the tiers of designs, with
+#: how many sets have a mechanism and how many have none.
+LATER_SWEEPS = {"L": (2, (0.0, 0.02, 0.04)), "T": (2, DISCREPANCIES[:3])}
+LATER_DESIGNS = {
+    "few-rows": (("A", "B", "S"), 48, 8),
+    "torque-alone": (("A", "B", "C", "S"), 36, 8),
+}
 
 
 @dataclass(frozen=True)
@@ -148,6 +161,11 @@ class Plan:
         return self.scatter > 0.0
 
     @property
+    def timed(self) -> bool:
+        """Whether the time of each row was recorded: half of tiers L and T."""
+        return self.tier in ("L", "T") and self.seed % 2 == 0
+
+    @property
     def scatter(self) -> float:
         """Scatter of the soil from run to run, relative to the usual one."""
         if self.design == "unequal-soils":
@@ -173,7 +191,7 @@ def plan_matrix(full: bool, seed: int = 0) -> list[Plan]:
 
 
 def benchmark_plans(seed: int = 0) -> list[Plan]:
-    """The plans of the benchmark with discrepancies and designs, about 700.
+    """The plans of the benchmark with discrepancies and designs, about 850.
 
     Within each tier and design, all levels of noise, size, runs, soil family and number of free
     parameters are equally frequent. Seeds differ from those of `plan_matrix`.
@@ -184,7 +202,7 @@ def benchmark_plans(seed: int = 0) -> list[Plan]:
         generator = np.random.default_rng((seed, 1, number))
         design = cells[0][3]
         noise = _balanced(NOISE_LEVELS, len(cells), generator)
-        size = _balanced(SIZES, len(cells), generator)
+        size = _balanced(DESIGN_SIZES.get(design, SIZES), len(cells), generator)
         runs = _balanced(DESIGN_RUNS.get(design, RUNS), len(cells), generator)
         family = _balanced(tuple(FAMILIES), len(cells), generator)
         free = _balanced(FREE_COUNTS, len(cells), generator)
@@ -208,13 +226,29 @@ def benchmark_plans(seed: int = 0) -> list[Plan]:
 
 def _benchmark_cells(seed: int) -> Iterator[tuple[str, str, float, str]]:
     """Tier, mechanism, discrepancy and design of every set, sorted by tier within a design."""
-    for tier, (count, discrepancies) in SWEEP_COUNTS.items():
+    designs = {design: (("A", "B", "S"), *counts) for design, counts in DESIGN_COUNTS.items()}
+    yield from _sweep_cells(SWEEP_COUNTS)
+    yield from _design_cells(designs, seed, 0)
+    yield from _sweep_cells(LATER_SWEEPS)
+    yield from _design_cells(LATER_DESIGNS, seed, len(designs))
+
+
+def _sweep_cells(
+    counts: Mapping[str, tuple[int, tuple[float, ...]]],
+) -> Iterator[tuple[str, str, float, str]]:
+    for tier, (count, discrepancies) in counts.items():
         for cause in mechanism_keys(tier):
             for discrepancy in discrepancies:
                 yield from [(tier, cause, discrepancy, "sweep")] * count
-    for number, (design, (with_cause, without)) in enumerate(DESIGN_COUNTS.items()):
+
+
+def _design_cells(
+    designs: Mapping[str, tuple[tuple[str, ...], int, int]], seed: int, first: int
+) -> Iterator[tuple[str, str, float, str]]:
+    """Sets of designs, whose mechanisms of some tiers are in random order; `first` numbers them."""
+    for number, (design, (tiers, with_cause, without)) in enumerate(designs.items(), first):
         generator = np.random.default_rng((seed, 2, number))
-        choices = [c for tier in ("A", "B", "S") for c in _testable(tier, design)]
+        choices = [c for tier in tiers for c in _testable(tier, design)]
         order = [choices[i] for i in generator.permutation(len(choices))]
         usual = cycle(DISCREPANCIES[:3])
         cells = [(*cause, next(usual), design) for cause in islice(cycle(order), with_cause)]
@@ -230,7 +264,7 @@ def _testable(tier: str, design: str) -> list[tuple[str, str]]:
     if design == "braking" and tier == "B":
         return []
     keys = mechanism_keys(tier)
-    if design == "one-run":
+    if design in ("one-run", "few-rows"):
         keys = [key for key in keys if not active_mechanisms(tier, key)[0].needs]
     return [(tier, key) for key in keys]
 

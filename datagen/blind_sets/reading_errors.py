@@ -35,38 +35,39 @@ SmoothFunction = Callable[[Floats, Floats], Floats]
 
 def draw_discrepancies(
     rms: float,
-    schedules: tuple[RunSchedule, RunSchedule],
+    schedules: tuple[RunSchedule, ...],
     true: list[Floats],
     generator: np.random.Generator,
-) -> tuple[list[Floats], list[Floats]]:
-    """The discrepancies of all channels, independent of each other; zeros for an rms of zero.
+) -> list[list[Floats]]:
+    """The discrepancies of all channels in each schedule; zeros for an rms of zero.
+
+    Channels are independent of each other.
 
     `true` are the noise-free readings of the runs. The other arguments, and the errors, are those
     of `draw_discrepancy`.
     """
     if rms == 0.0:
-        none = [[np.zeros(d.slip.size) for _ in true] for d in schedules]
-        return none[0], none[1]
-    pairs = [draw_discrepancy(rms, schedules, t, generator) for t in true]
-    return [runs for runs, _ in pairs], [region for _, region in pairs]
+        return [[np.zeros(d.slip.size) for _ in true] for d in schedules]
+    by_channel = [draw_discrepancy(rms, schedules, t, generator) for t in true]
+    return [list(channels) for channels in zip(*by_channel, strict=True)]
 
 
 def draw_discrepancy(
     rms: float,
-    schedules: tuple[RunSchedule, RunSchedule],
+    schedules: tuple[RunSchedule, ...],
     true: Floats,
     generator: np.random.Generator,
-) -> tuple[Floats, Floats]:
+) -> list[Floats]:
     """The discrepancy of one channel in the runs and in the held-out region.
 
     It is one smooth function of slip and load, the same in all runs: a sum of a few cosines, bumps
     or steps with random positions, directions and correlation lengths.
 
     rms: Root mean square over the rows of the runs, as a fraction of the largest absolute reading.
-    schedules: Runs and region, of n and m rows.
+    schedules: Runs and region, of n and m rows, and others where the function is evaluated too.
     true: Noise-free readings of the runs, (n,).
 
-    Returns: (n,) and (m,), in the unit of the channel.
+    Returns: (n,), (m,) and so on, in the unit of the channel.
 
     Raises `RuntimeError` where no function is found that is at most `MAX_OVER_RMS` times its rms
     everywhere.
@@ -78,11 +79,12 @@ def draw_discrepancy(
         points = [
             np.stack([d.slip / lengths[0], np.log(d.load) / lengths[1]], axis=0) for d in schedules
         ]
-        function = kind(np.concatenate(points, axis=1), generator)
-        runs, region = (function(p[0], p[1]) for p in points)
+        function = kind(np.concatenate(points[:2], axis=1), generator)
+        values = [function(p[0], p[1]) for p in points]
+        runs, region = values[:2]
         unit = float(np.sqrt(np.mean(runs**2)))
         if max(np.abs(runs).max(), np.abs(region).max()) <= MAX_OVER_RMS * unit:
-            return scale * runs / unit, scale * region / unit
+            return [scale * value / unit for value in values]
     raise RuntimeError("no smooth function is of similar size in the runs and in the region")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import final
 
 import numpy as np
@@ -36,6 +36,8 @@ class WheelState:
     speed: Floats  # m/s
     pass_number: Floats
     slip_angle: Floats  # rad
+    #: share of the campaign that is over, 0 at its first run and 1 at its last
+    elapsed: Floats = field(default_factory=lambda: np.zeros(1))
 
     @property
     def travel_ratio(self) -> Floats:
@@ -107,6 +109,9 @@ class Mechanism:
     #: the soil under this wheel
     soil: Callable[[WheelState, float], WheelState] | None = None
     arc: Callable[[ContactArc, WheelState, float], ContactArc] | None = None
+    #: normal stress, the way from either end of the contact (0) to its largest stress (1), and that
+    #: largest stress; (points, n) but the last, (n,)
+    shape: Callable[[Floats, Floats, Floats, WheelState, float], Floats] | None = None
     #: normal stress and its depth, (points, n)
     pressure: Callable[[Floats, Floats, WheelState, float], Floats] | None = None
     shear: Callable[[ContactPoints, ContactArc, WheelState, float], Floats] | None = None
@@ -135,6 +140,8 @@ def _quadrature() -> tuple[Floats, Floats]:
 
 
 NODE, WEIGHT = _quadrature()
+#: Of the points of both halves of a contact, the way from its end to the largest stress.
+WAY = np.concatenate([NODE, NODE])
 
 
 def solve_equilibrium(rows: WheelState, active: ActiveMechanisms = ()) -> SoilReaction:
@@ -219,8 +226,13 @@ def _points(
     active: ActiveMechanisms,
 ) -> ContactPoints:
     depth = _cosine_difference(arc.entry - mapped, mapped, arc.entry) * arc.radius
-    normal = (rows.kc / rows.width + rows.kphi) * depth**rows.n
+    modulus = rows.kc / rows.width + rows.kphi
+    normal = modulus * depth**rows.n
     for mechanism, size in active:
+        if mechanism.shape is not None:
+            front = arc.entry - arc.peak
+            deepest = _cosine_difference(arc.peak, front, arc.entry) * arc.radius
+            normal = mechanism.shape(normal, WAY, modulus * deepest**rows.n, rows, size)
         if mechanism.pressure is not None:
             normal = mechanism.pressure(normal, depth, rows, size)
     strength = rows.cohesion + normal * np.tan(rows.friction_angle)

@@ -11,6 +11,7 @@ from datagen.blind_sets.reference_wheel import Floats
 
 #: Number of rows in all runs; number of runs and of rows per run in the held-out region.
 POINTS, REGION_RUNS, REGION_POINTS = 64, 3, 8
+ROWS_BETWEEN = 24  # Number of rows of the same runs that the analyst does not get
 SLIP = (0.05, 0.6)
 LOAD = (40.0, 150.0)  # N
 REGION_LOAD_RATIOS = (1.3, 1.45, 1.6)  # The region's loads over the heaviest load measured
@@ -30,7 +31,10 @@ DESIGNS = {
     "unequal-soils": "the soil differs from run to run three times as much as in the others",
     "braking": "slips from braking to driving",
     "two-gears": "two wheels of different size, or with and without lugs, at the same points",
+    "few-rows": "one run of five to ten rows at one load, as most published tests are",
+    "torque-alone": "torque is the only channel that was measured",
 }
+FEW_ROWS = (5, 10)  # Fewest and most rows of a design of few
 BRAKING_SLIP = (-0.4, 0.6)  # Slips of a design that brakes
 #: Standard deviation of a load about its level, as a fraction, drawn for each set.
 LOAD_JITTER = (0.003, 0.08)
@@ -45,7 +49,8 @@ DECOY_PROBABILITY = 0.3  # Probability that a covariate without influence varies
 class RunSchedule:
     """Slip, load (N) and covariates of rows, all (rows,); `run` numbers each row's run from 0.
 
-    `gear` numbers the wheel of each row from 0.
+    `gear` numbers the wheel of each row from 0; `elapsed` is the share of the campaign that is
+    over.
     """
 
     run: NDArray[np.int64]
@@ -53,6 +58,7 @@ class RunSchedule:
     slip: Floats
     load: Floats
     gear: NDArray[np.int64]
+    elapsed: Floats
     covariates: dict[str, Floats]
     varied: tuple[str, ...]
 
@@ -66,6 +72,10 @@ def design_schedule(
     runs is rounded to two loads at least, each driven two or three times. Two gears halve it: each
     run is driven with both wheels.
     """
+    if design == "few-rows":
+        level = LOAD[0] * (LOAD[1] / LOAD[0]) ** generator.uniform()
+        rows = int(generator.integers(FEW_ROWS[0], FEW_ROWS[1] + 1))
+        return _driven(np.full(runs, level), needs, generator, points=rows)
     if design in ("one-load", "one-run", "jittered-one-load"):
         level = LOAD[0] * (LOAD[1] / LOAD[0]) ** generator.uniform()
         schedule = _driven(np.full(runs, level), needs, generator)
@@ -117,7 +127,27 @@ def heavier_schedule(
     load = runs.load.max() * np.array(REGION_LOAD_RATIOS)
     values = {name: _spread_over_range(name, REGION_RUNS, generator) for name in COVARIATE_DEFAULTS}
     names = [f"region_{i + 1}" for i in range(REGION_RUNS)]
-    return _schedule(names, load, REGION_POINTS, slip, set(runs.varied), values, generator)
+    region = _schedule(names, load, REGION_POINTS, slip, set(runs.varied), values, generator)
+    return replace(region, elapsed=np.ones(region.slip.size))
+
+
+def rows_between(runs: RunSchedule, generator: np.random.Generator) -> RunSchedule:
+    """Rows at other slips of the same runs, each within the slips of its run."""
+    of = np.sort(generator.integers(runs.slip.size, size=ROWS_BETWEEN))
+    low = np.asarray([runs.slip[runs.run == i].min() for i in range(int(runs.run.max()) + 1)])
+    high = np.asarray([runs.slip[runs.run == i].max() for i in range(int(runs.run.max()) + 1)])
+    share = generator.uniform(0.0, 1.0, ROWS_BETWEEN)
+    slip = low[runs.run[of]] + share * (high - low)[runs.run[of]]
+    return RunSchedule(
+        run=runs.run[of],
+        names=runs.names[of],
+        slip=np.round(slip, 4),
+        load=runs.load[of],
+        gear=runs.gear[of],
+        elapsed=runs.elapsed[of],
+        covariates={name: values[of] for name, values in runs.covariates.items()},
+        varied=runs.varied,
+    )
 
 
 def _driven(
@@ -167,6 +197,7 @@ def _repeated(schedule: RunSchedule, times: int) -> RunSchedule:
         slip=np.tile(schedule.slip, times),
         load=np.tile(schedule.load, times),
         gear=np.tile(schedule.gear, times),
+        elapsed=run / max(runs * times - 1, 1),
         covariates={name: np.tile(v, times) for name, v in schedule.covariates.items()},
         varied=schedule.varied,
     )
@@ -192,6 +223,7 @@ def _schedule(
         slip=slip,
         load=np.round(load, 2)[run],
         gear=np.zeros(run.size, dtype=np.int64),
+        elapsed=run / max(runs - 1, 1),
         covariates={
             name: values[name][run] if name in varied else np.full(run.size, constant)
             for name, constant in COVARIATE_DEFAULTS.items()

@@ -100,7 +100,7 @@ def test_noise_strays_about_the_true_readings_with_discrepancy():
 @pytest.mark.slow
 @pytest.mark.parametrize("design", DESIGNS)
 def test_a_design_is_driven_as_it_says(design):
-    runs = {"one-run": 1, "few-runs": 3}.get(design, 8)
+    runs = {"one-run": 1, "few-runs": 3, "few-rows": 1}.get(design, 8)
     for seed in range(3):
         drawn = draw_blind_set(replace(PLAN, design=design, runs=runs, seed=seed))
         columns = drawn.columns
@@ -111,6 +111,14 @@ def test_a_design_is_driven_as_it_says(design):
             assert levels == 1 and count == 8
         if design == "one-run":
             assert levels == 1 and count == 1 and len(load) == 24
+        if design == "few-rows":
+            assert levels == 1 and count == 1 and 5 <= len(load) <= 10
+            assert all(np.isfinite(columns[name]).all() for name in CHANNELS)
+        if design == "torque-alone":
+            assert np.isfinite(columns["torque_Nm"]).all()
+            assert (
+                np.isnan(columns["drawbar_pull_N"]).all() and np.isnan(columns["sinkage_m"]).all()
+            )
         if design == "few-runs":
             assert levels == 3 and count == 3
         if design.startswith("jittered"):
@@ -168,7 +176,7 @@ def test_what_was_not_measured_is_blank_and_readable(tmp_path):
 
 def test_the_benchmark_is_spread_over_tiers_discrepancies_and_designs():
     plans = benchmark_plans()
-    assert 600 < len(plans) < 750 and plans == benchmark_plans()
+    assert 850 < len(plans) < 920 and plans == benchmark_plans()
     assert len({plan.seed for plan in plans}) == len(plans)
     assert not {p.seed for p in plans} & {p.seed for p in benchmark_plans(1)}
     assert {plan.design for plan in plans} == set(DESIGNS)
@@ -183,9 +191,29 @@ def test_the_benchmark_is_spread_over_tiers_discrepancies_and_designs():
         bare = plan.tier == "D" or plan.tier.startswith("N")
         assert (plan.size == 0.0) == bare == (plan.cause == "")
         assert (plan.tier != "D") or plan.discrepancy > 0.0
-        if plan.design == "one-run":
+        if plan.design in ("one-run", "few-rows"):
             assert plan.runs == 1
             assert not any(m.needs for m in active_mechanisms(plan.tier, plan.cause))
+
+
+def test_rows_between_are_of_the_same_runs_at_other_slips():
+    drawn = draw_blind_set(replace(PLAN, tier="B", cause="slip-sinkage/square", seed=8, size=2.0))
+    columns, between = drawn.columns, drawn.between
+    assert drawn.truth["scatter"] and len(between["slip"]) == 24
+    for name, slip, load in zip(between["run"], between["slip"], between["load_N"], strict=True):
+        own = columns["run"] == name
+        assert set(columns["load_N"][own]) == {load}
+        assert columns["slip"][own].min() <= slip <= columns["slip"][own].max()
+        assert slip not in columns["slip"][own]
+    for name in CHANNELS:
+        true = np.array(drawn.truth["between_true"][name])
+        near = np.argmin(np.abs(between["slip"][:, None] - columns["slip"]), axis=1)
+        same = between["run"] == columns["run"][near]  # the nearest slip, of the same soil
+        assert same.any()
+        there = np.array(drawn.truth["runs_true"][name])[near]
+        gap = np.abs(between["slip"] - columns["slip"][near])
+        steepest = np.ptp(drawn.truth["runs_true"][name]) / 0.05
+        assert (np.abs(true - there)[same] <= steepest * gap[same] + 1e-12).all()
 
 
 def test_two_gears_are_driven_at_the_same_points_on_one_soil():

@@ -34,6 +34,7 @@ def batch(count, seed):
         speed=rng.uniform(0.01, 0.2, count),
         pass_number=rng.integers(1, 4, count).astype(float),
         slip_angle=rng.uniform(0.0, 0.3, count),
+        elapsed=np.linspace(0.2, 1.0, count),
         **{name: np.array([s[name] for s in soils]) for name in soils[0]},
     )
 
