@@ -1,7 +1,7 @@
 """Measure the gap workflow on hidden effects, and write docs/benchmarks/gap.md.
 
 python bench/gap.py --every 20                 a quick look at the sealed sets
-python bench/gap.py --seed 1 --keep dev.json   sets to tune on; the records are kept
+python bench/gap.py --seed 1 --keep dev.json   sets to tune on; run again, it goes on from there
 python bench/gap.py --table dev.json           the pages of records that were kept
 
 Set OMP_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1: the analyses themselves run side by side.
@@ -12,6 +12,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from dataclasses import asdict, fields
+from hashlib import sha256
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -41,7 +43,7 @@ def run() -> None:
         sets = [s for file in args.table for s in from_json(json.loads(Path(file).read_text()))]
     else:
         sets = _judge(_plans(args), args.jobs, args.keep)
-    text = gap_pages.text(sets)
+    text = gap_pages.text(sets, from_json(_read(args.before)))
     print(text)
     if args.write:
         gap_reliability.save_picture(sets, ROOT / gap_pages.PICTURE)
@@ -59,11 +61,18 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--factorial", action="store_true", help="the 1593 sets without discrepancy instead"
     )
+    parser.add_argument(
+        "--before", metavar="FILE.json", help="records of an earlier state, for a column beside"
+    )
     parser.add_argument("--every", type=int, default=1, metavar="K", help="take each K-th plan")
     parser.add_argument("--tier", help="only sets of this tier")
     parser.add_argument("--design", help="only sets of this design")
     parser.add_argument("--jobs", type=int, help="analyses at a time (default: cores)")
-    parser.add_argument("--keep", metavar="FILE.json", help="write the record of every set")
+    parser.add_argument(
+        "--keep",
+        metavar="FILE.json",
+        help="keep the records; those of this state of the package are not made again",
+    )
     parser.add_argument(
         "--table", nargs="+", metavar="FILE.json", help="print the pages of kept records"
     )
@@ -86,19 +95,39 @@ def _plans(args: argparse.Namespace) -> list[Plan]:
 
 
 def _judge(plans: list[Plan], processes: int | None, keep: str | None) -> list[Judged]:
-    """The records of all plans, in their order."""
-    jobs = list(enumerate(plans))
-    sets: list[Judged] = []
+    """The records of all plans, in their order; those that were kept are not made again."""
+    state = _state()
+    kept = {_key(s): s for s in _read(keep) if s.get("state") == state}
+    jobs = [job for job in enumerate(plans) if _key(asdict(job[1])) not in kept]
     with (
         process_map(judged, jobs, processes) as records,
         progress_bar("analysing", len(jobs)) as done,
     ):
-        for record in records:
-            sets.append(record)
-            done(len(sets))
-            if keep and (len(sets) % KEEP_EVERY == 0 or len(sets) == len(jobs)):
-                save_text(keep, json.dumps(sets))
-    return sets
+        for count, record in enumerate(records, 1):
+            kept[_key(record)] = record | {"state": state}
+            done(count)
+            if keep and (count % KEEP_EVERY == 0 or count == len(jobs)):
+                save_text(keep, json.dumps(list(kept.values())))
+    return from_json([kept[_key(asdict(plan))] for plan in plans])
+
+
+def _read(file: str | None) -> list[Judged]:
+    """The records of a file, none without one."""
+    return json.loads(Path(file).read_text()) if file and Path(file).exists() else []
+
+
+def _key(record: Judged) -> tuple[object, ...]:
+    """What tells the plan of a record from those of others."""
+    return tuple(record[f.name] for f in fields(Plan))
+
+
+def _state() -> str:
+    """A digest of all source that a record depends on."""
+    digest = sha256()
+    for folder in ("soilml", "datagen/blind_sets"):
+        for file in sorted((ROOT / folder).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 if __name__ == "__main__":

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import column
+
+#: Columns that regressions use where they vary.
+COVARIATES = ("speed_m_s", "pass", "slip_angle_rad", "time_s")
 
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
@@ -94,54 +98,61 @@ def _forest(slip: np.ndarray, load: np.ndarray, channel: np.ndarray, r: np.ndarr
     return "gap" if forest.fit(x, r).oob_score_ > 0.0 else ""
 
 
-def remainders(
+#: Regressions of the residuals of a soil-only fit; the others are of the readings themselves.
+BESIDE_SOIL = ("Gaussian process", "quadratic")
+
+
+def learned(
     case: Case,
     table: Table,
     plain: dict[str, np.ndarray],
-    region: Table,
+    parts: Sequence[Table],
     measured: Sequence[str],
-    *,
-    everything: bool,
-) -> dict[str, dict[str, np.ndarray]]:
-    """What regressions of the residuals of a soil-only fit on slip and load predict in a region.
+) -> dict[str, list[dict[str, np.ndarray]]]:
+    """What regressions on slip, load and covariates predict for other rows, by label and part.
 
-    A Gaussian process, and the other regressions where `everything` is wanted.
+    Those of `BESIDE_SOIL` are of the residuals of a soil-only fit, whose predictions at the rows of
+    the table are `plain`; what they predict is to be added to the soil's. The others know no
+    physics.
     """
-    from sklearn.ensemble import RandomForestRegressor
+    from sklearn.ensemble import GradientBoostingRegressor
     from sklearn.gaussian_process import GaussianProcessRegressor
     from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
     from sklearn.linear_model import Ridge
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import PolynomialFeatures
 
+    varied = [name for name in COVARIATES if name in table and np.ptp(table[name]) > 0.0]
+
     def features(rows: Table) -> np.ndarray:
         columns = [rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4]
+        columns += [rows[name] / np.ptp(table[name]) for name in varied]
         if "gear" in rows:
             columns.append(np.unique(rows["gear"], return_inverse=True)[1])
         return np.column_stack(columns)
 
-    width = features(table).shape[1]
+    x = features(table)
 
     def process() -> GaussianProcessRegressor:
-        kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0] * width, (0.2, 20.0)) + WhiteKernel(
-            1.0
-        )
-        return GaussianProcessRegressor(kernel, random_state=0)
+        kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0] * x.shape[1], (0.2, 20.0))
+        return GaussianProcessRegressor(kernel + WhiteKernel(1.0), random_state=0)
 
-    makers = {"Gaussian process": process}
-    others = {
-        "random forest": lambda: RandomForestRegressor(200, min_samples_leaf=2, random_state=0),
+    makers: dict[str, Callable[[], Any]] = {
+        "Gaussian process": process,
         "quadratic": lambda: make_pipeline(PolynomialFeatures(2), Ridge(1e-3)),
+        "process of readings": process,
+        "ridge": lambda: make_pipeline(PolynomialFeatures(2), Ridge(1e-3)),
+        "boosted trees": lambda: GradientBoostingRegressor(random_state=0, min_samples_leaf=3),
     }
-    makers |= others if everything else {}
-    found: dict[str, dict[str, np.ndarray]] = {label: {} for label in makers}
+    found: dict[str, list[dict[str, np.ndarray]]] = {label: [{} for _ in parts] for label in makers}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for name in measured:
-            key = column(name)
-            std = case.noise[key].std(table[key])
-            scale = float(np.median(std))
+            scale = float(np.median(case.noise[column(name)].std(table[column(name)])))
             for label, make in makers.items():
-                learned = make().fit(features(table), (table[key] - plain[name]) / scale)
-                found[label][name] = learned.predict(features(region)) * scale
+                base = plain[name] if label in BESIDE_SOIL else np.mean(table[column(name)])
+                model = make().fit(x, (table[column(name)] - base) / scale)
+                for part, rows in zip(found[label], parts, strict=True):
+                    added = model.predict(features(rows)) * scale
+                    part[name] = added if label in BESIDE_SOIL else added + base
     return found

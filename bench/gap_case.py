@@ -25,21 +25,22 @@ from soilml.remarks import texts
 
 #: Solutions by which the speed of the machine is measured.
 SOLUTIONS = 4000
+#: The covariate of effects that follow the order of the rows.
+ORDER = "progress"
 #: The other methods are run on one set in so many.
 EVERY = 8
-#: Statuses for which the held-out region is compared with that of a Gaussian process.
-NAMED = ("named", "partly-named")
 
 
 def judged(job: tuple[int, Plan]) -> dict[str, Any]:
     """The record of one plan: what was hidden, what was said, and how far it is from the truth."""
     number, plan = job
     drawn = draw_blind_set(plan)
-    table, region = Table(dict(drawn.columns)), Table(dict(drawn.region))
+    table = Table(dict(drawn.columns))
     truth = tuple(sorted(cause["name"] for cause in drawn.truth["causes"]))
     record: dict[str, Any] = asdict(plan) | {
         "truth": truth,
         "catalogued": bool(truth) and {n.partition("@")[0] for n in truth} <= set(EFFECTS),
+        "relatives": _relatives(plan.tier, truth),
         "rows": len(table),
         "signal": 0.0,
         "snr": 0.0,
@@ -54,9 +55,19 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
     except Exception as error:  # a crash is a finding of the benchmark, not its end
         return record | {"status": "crash", "sentence": f"{type(error).__name__}: {error}"}
     record |= {"seconds": time.process_time() - started} | _said(report)
-    if report.gap and report.soil_before:
-        record |= _compared(number, case, report, table, region, drawn, truth)
+    if report.soil_before:
+        record |= _compared(number, case, report, table, drawn, truth)
     return record
+
+
+def _relatives(tier: str, truth: tuple[str, ...]) -> list[str]:
+    """Effects that are right too: those of the law's family, or of a soil that changes."""
+    if tier == "T":
+        return [n for n, e in EFFECTS.items() if ORDER in getattr(e.about, "uses", ())]
+    families = {getattr(EFFECTS[n].about, "family", "") for n in truth if n in EFFECTS} - {""}
+    if tier != "L" or not families:
+        return []
+    return [n for n, e in EFFECTS.items() if getattr(e.about, "family", "") in families]
 
 
 def _solutions_per_second(case: Case) -> float:
@@ -89,6 +100,10 @@ def _said(report: GapReport) -> dict[str, Any]:
         "unclaimed": list(report.best_unclaimed),
         "reasons": texts(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
+        "beside_remainder": {
+            k: (s.before, s.after) for k, s in getattr(report, "gap_beside_remainder", {}).items()
+        },
+        "codes": sorted({r.code for r in (*report.reasons, *report.notes, *report.conditions)}),
     }
 
 
@@ -97,12 +112,11 @@ def _compared(
     case: Case,
     report: GapReport,
     table: Table,
-    region: Table,
     drawn: BlindSet,
     truth: tuple[str, ...],
 ) -> dict[str, Any]:
-    """Soil and held-out region beside the truth, and the other methods on some sets."""
-    soil, target = drawn.truth["soil"], drawn.truth["region_true"]
+    """Soil and held-out rows beside the truth, and the other methods on some sets."""
+    soil = drawn.truth["soil"]
     measured = tuple(n for n in CHANNELS if np.isfinite(table[column(n)]).any())
     soil_only = case.with_values({k: v.value for k, v in report.soil_before.items()})
     compared: dict[str, Any] = {
@@ -117,27 +131,29 @@ def _compared(
             if name in report.soil_before
         }
     }
-    plain = _predicted(soil_only, region)
-    distance = {
-        "soil": _rms(case, plain, target, measured),
-        "named": _rms(case, _predicted(report.model, region), target, measured),
-    }
+    models = {"soil": soil_only, "named": report.model}
     plain_design = len(measured) == len(CHANNELS) and "gear" not in table
-    full = number % EVERY == 0 and plain_design
-    if full:
+    if number % EVERY == 0 and plain_design:
         compared["naming"] = gap_baselines.names(soil_only, table, case)
         if truth and set(truth) <= set(EFFECTS):
             own = {name: EFFECTS[name] for name in truth}
-            oracle = gap(case, table, effects=own, seed=0).model
-            distance["oracle"] = _rms(case, _predicted(oracle, region), target, measured)
-    if full or report.status in NAMED:
-        learned = gap_baselines.remainders(
-            case, table, _predicted(soil_only, table), region, measured, everything=full
-        )
-        for label, added in learned.items():
-            y = {name: plain[name] + added[name] for name in measured}
-            distance[label] = _rms(case, y, target, measured)
-    return compared | {"region": distance}
+            models["oracle"] = gap(case, table, effects=own, seed=0).model
+    parts = {"region": drawn.region, "between": drawn.between}
+    rows = [
+        Table(dict(columns) | {ORDER: np.asarray(drawn.truth[f"{part}_elapsed"])})
+        for part, columns in parts.items()
+    ]
+    learned = gap_baselines.learned(case, table, _predicted(soil_only, table), rows, measured)
+    for i, (part, at) in enumerate(zip(parts, rows, strict=True)):
+        target = drawn.truth[f"{part}_true"]
+        predicted = {label: _predicted(model, at) for label, model in models.items()}
+        for label, values in learned.items():
+            added = values[i]
+            if label in gap_baselines.BESIDE_SOIL:
+                added = {name: predicted["soil"][name] + added[name] for name in measured}
+            predicted[label] = added
+        compared[part] = {label: _rms(case, y, target, measured) for label, y in predicted.items()}
+    return compared
 
 
 def _predicted(case: Case, table: Table) -> dict[str, np.ndarray]:
@@ -149,7 +165,10 @@ def _predicted(case: Case, table: Table) -> dict[str, np.ndarray]:
             for name, values in _predicted(case.of_gear(gear), _without_gear(table, own)).items():
                 y[name][own] = values
         return y
-    force = case.model(case.soil, operating_points(table))
+    at = operating_points(table)
+    force = case.model(case.soil, at)
+    if (remainder := getattr(case, "remainder", None)) is not None:
+        force = remainder.added_to(force, at.slip, at.load)
     return {name: np.asarray(getattr(force, name)) for name in CHANNELS}
 
 

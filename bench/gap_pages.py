@@ -9,10 +9,12 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+import gap_families
+import gap_held_out
 import gap_reliability
 import gap_table
 import numpy as np
-from gap_records import Judged, bare, first, holds, nameable, rate, unique
+from gap_records import Judged, bare, first, holds, nameable, own_figures, rate, table, unique
 
 from datagen.blind_sets.run_schedules import DESIGNS
 
@@ -36,6 +38,8 @@ TIERS = {
     "B": "the right cause by another law, half of them with run-to-run scatter",
     "C": "a cause outside the catalogue",
     "S": "a sensor's bias alone",
+    "L": "a law of the soil is another one: of shear, normal stress, bearing or strength",
+    "T": "the soil changes from run to run: it dries, friction or bearing drift",
     "M": "two effects",
     "D": "a smooth discrepancy alone",
     "N0": "no cause",
@@ -47,16 +51,16 @@ TIERS = {
 PICTURE = "docs/gap_reliability.png"
 
 
-def text(sets: Sequence[Judged]) -> str:
-    """The sections of the page docs/benchmarks/gap.md, after its title."""
-    parts = [_head(sets), _gates(sets), _statuses(sets), _reliability(sets), _naming(sets)]
-    parts += [_snr(sets), _confusion(sets), _region(sets), _soil(sets), _designs(sets)]
+def text(sets: Sequence[Judged], before: Sequence[Judged] = ()) -> str:
+    """The sections of the page docs/benchmarks/gap.md, after its title.
+
+    `before` are records of an earlier state of the package, for a column of the gates.
+    """
+    usual = [s for s in sets if not own_figures(s)]
+    parts = [_head(sets), _gates(sets, before), _statuses(sets), gap_held_out.text(sets)]
+    parts += [gap_families.text(sets), _reliability(sets), _naming(sets), _snr(sets)]
+    parts += [_confusion(sets), _region(usual), _soil(usual), _designs(sets)]
     return "\n".join(part for part in parts if part)
-
-
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
-    return "\n".join([*lines, *["| " + " | ".join(row) + " |" for row in rows]]) + "\n"
 
 
 def _head(sets: Sequence[Judged]) -> str:
@@ -90,15 +94,21 @@ def _speed(sets: Sequence[Judged]) -> str:
     )
 
 
-def _gates(sets: Sequence[Judged]) -> str:
+def _gates(sets: Sequence[Judged], before: Sequence[Judged]) -> str:
+    former = {f.name: f.measured for f in gap_table.figures(before)}
+    header = ("figure", "measured", "gate", "met")
     rows = [
         (f.name, f.measured, f.gate, "" if f.met is None else "yes" if f.met else "**no**")
         for f in gap_table.figures(sets)
     ]
+    words = ""
+    if before:
+        header = (header[0], "before", *header[1:])
+        rows = [(row[0], former.get(row[0], "-"), *row[1:]) for row in rows]
+        words = f" *Before* is an earlier state of the package, on {len(before)} sets."
     return (
         "## Gates\n\nRates with their 95 % interval. Designs with one load are judged by their "
-        "suspects, all others by their cause set.\n\n"
-        + _table(("figure", "measured", "gate", "met"), rows)
+        f"suspects, all others by their cause set.{words}\n\n" + table(header, rows)
     )
 
 
@@ -110,7 +120,7 @@ def _counts(groups: dict[str, list[Judged]], label: str) -> str:
     for name, own in groups.items():
         count = Counter(s["status"] for s in own)
         rows.append((name, str(len(own)), *[str(count[x]) for x in statuses]))
-    return _table((label, "sets", *statuses), rows)
+    return table((label, "sets", *statuses), rows)
 
 
 def _statuses(sets: Sequence[Judged]) -> str:
@@ -138,7 +148,7 @@ def _statuses(sets: Sequence[Judged]) -> str:
         "SNR of 3 or more, at several loads, by discrepancy.\n\n"
         + _counts(groups, "discrepancy")
         + "\n"
-        + _table(
+        + table(
             ("discrepancy", "cause set contains the cause", "right when unique", "its size"), rows
         )
         + "\nWhat was said of a discrepancy alone (tier D).\n\n"
@@ -169,7 +179,7 @@ def _reliability(sets: Sequence[Judged]) -> str:
         f"## Reliability of stated probabilities\n\n![reliability](../{Path(PICTURE).name})\n\n"
         f"{len(stated)} statements, one for each effect that a set could test. A statement is true "
         "if the effect was hidden in that set.\n\n"
-        + _table(("stated, mean", "hidden", "difference"), rows)
+        + table(("stated, mean", "hidden", "difference"), rows)
     )
 
 
@@ -196,7 +206,7 @@ def _naming(sets: Sequence[Judged]) -> str:
     return (
         "## Names, side by side\n\nThe first name is the truth (one hidden effect of the "
         "catalogue), and false alarms (tiers N).\n\n"
-        + _table(("method", "first name right", "false alarms"), rows)
+        + table(("method", "first name right", "false alarms"), rows)
     )
 
 
@@ -215,7 +225,7 @@ def _snr(sets: Sequence[Judged]) -> str:
                 f"{np.mean(size):.2f}" if size else "-",
             )
         )
-    return "## Naming against separating SNR\n\n" + _table(
+    return "## Naming against separating SNR\n\n" + table(
         ("separating SNR", "first is the truth", "cause set contains it", "mean size of the set"),
         rows,
     )
@@ -240,9 +250,9 @@ def _confusion(sets: Sequence[Judged]) -> str:
     return (
         "## Weakest cells of the confusion matrix\n\nTruth outside the cause set, separating SNR "
         "of 3 or more.\n\n"
-        + _table(("truth", "said instead", "sets"), rows)
+        + table(("truth", "said instead", "sets"), rows)
         + "\n## By cause\n\n"
-        + _table(("truth", "cause set contains it", "first", "right when unique"), per)
+        + table(("truth", "cause set contains it", "first", "right when unique"), per)
     )
 
 
@@ -260,7 +270,7 @@ def _region(sets: Sequence[Judged]) -> str:
         "## Held-out region: 1.3 to 1.6 times the heaviest load\n\nRMS distance to the noise-free "
         "readings relative to the soil alone, by discrepancy: median over sets that are named or "
         "partly named. In these sets the soil alone is more than twice the noise away.\n\n"
-        + _table(("explanation", *[f"{d:.0%}" for d in levels]), rows)
+        + table(("explanation", *[f"{d:.0%}" for d in levels]), rows)
     )
 
 
@@ -277,7 +287,7 @@ def _soil(sets: Sequence[Judged]) -> str:
             off = [[abs(v[k] - v["true"]) * scale for v in values] for k in ("before", "after")]
             cells = [f"{np.median(x):.3g} {unit}" for x in off]
             rows.append((name.replace("_", " "), *cells))
-    return "## Error of the soil, before and after the effect is named (median)\n\n" + _table(
+    return "## Error of the soil, before and after the effect is named (median)\n\n" + table(
         ("parameter", "before", "after"), rows
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from scipy.stats import beta
@@ -14,9 +15,44 @@ UNIQUE_STATUSES = ("named", "partly-named", "form-open")
 #: Statuses that state an explanation.
 CLAIMING_STATUSES = (*UNIQUE_STATUSES, "class")
 #: Designs that leave suspects, not names: they are judged by those.
-SUSPECT_DESIGNS = ("one-load", "one-run", "jittered-one-load")
+SUSPECT_DESIGNS = ("one-load", "one-run", "jittered-one-load", "few-rows")
+#: Tiers and designs with figures of their own, which the others do not count.
+LATER_TIERS, LATER_DESIGNS = ("L", "T"), ("few-rows", "torque-alone")
 #: Separation, in sigma, from which an effect can be named.
 NAMEABLE_SIGMA = 3.0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A line of the table; `met` is None where there is no gate or nothing was measured."""
+
+    name: str
+    measured: str
+    gate: str = ""
+    met: bool | None = None
+
+
+def share(name: str, hits: int, count: int, gate: str = "") -> Figure:
+    """A rate with a gate such as '>= 0.95'."""
+    met = reaches(hits / count, gate) if gate and count else None
+    return Figure(name, rate(hits, count), gate, met)
+
+
+def reaches(value: float, gate: str) -> bool:
+    """Whether a value is on the right side of a gate such as '<= 0.5'."""
+    relation, goal = gate.split()
+    return value >= float(goal) if relation == ">=" else value <= float(goal)
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = ["| " + " | ".join(header) + " |", "|" + "---|" * len(header)]
+    return "\n".join([*lines, *["| " + " | ".join(row) + " |" for row in rows]]) + "\n"
+
+
+def own_figures(s: Judged) -> bool:
+    """Whether a set has figures of its own, which the others do not count."""
+    return s["tier"] in LATER_TIERS or s["design"] in LATER_DESIGNS
 
 
 def unique(s: Judged) -> bool:
@@ -42,6 +78,12 @@ def right(s: Judged) -> bool:
 def suspected(s: Judged, most: int) -> bool:
     """Whether the truth is among so many first suspects, or claimed explanations without them."""
     return s["truth"] in (s.get("suspects") or s.get("cause_set") or ())[:most]
+
+
+def related(s: Judged) -> bool:
+    """Whether the likeliest explanation has an effect of the truth, or of its family."""
+    likeliest = (s.get("cause_set") or s.get("suspects") or ((),))[0]
+    return bool({*s["truth"], *s.get("relatives", ())} & set(likeliest))
 
 
 def nameable(s: Judged) -> bool:

@@ -34,7 +34,9 @@ class Bin:
 def statements(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
     """(n,) stated probabilities, ascending, and (n,) whether the effect was hidden in that set."""
     pairs = [
-        (p, name in s["truth"]) for s in sets for name, p in s.get("probabilities", {}).items()
+        (p, name in s["truth"] or (s["tier"] == "T" and name in s.get("relatives", ())))
+        for s in sets
+        for name, p in s.get("probabilities", {}).items()
     ]
     stated = np.asarray([p for p, _ in pairs], dtype=np.float64)
     order = np.argsort(stated, kind="stable")

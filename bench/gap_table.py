@@ -4,20 +4,24 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
+import gap_families
+import gap_held_out
 import gap_reliability
 import numpy as np
 from gap_records import (
     CLAIMING_STATUSES,
     SUSPECT_DESIGNS,
+    Figure,
     Judged,
     bare,
     holds,
     nameable,
+    own_figures,
     rate,
     right,
     scattered,
+    share,
     suspected,
     unique,
 )
@@ -31,56 +35,39 @@ ROW_LIMITS = (24, 48, 72)
 REGION_GAP = 2.0
 
 
-@dataclass(frozen=True)
-class Figure:
-    """A line of the table; `met` is None where there is no gate or nothing was measured."""
-
-    name: str
-    measured: str
-    gate: str = ""
-    met: bool | None = None
-
-
 def figures(sets: Sequence[Judged]) -> list[Figure]:
     """Every figure of the benchmark with its gate."""
+    usual = [s for s in sets if not own_figures(s)]
     return [
-        *_naming(sets),
-        *_false_names(sets),
-        *_silence(sets),
-        *_suspects(sets),
+        *_naming(usual),
+        *_false_names(usual),
+        *_silence(usual),
+        *_suspects(usual),
+        *gap_families.figures(sets),
         *_probabilities(sets),
-        *_region(sets),
-        *_soil(sets),
+        *gap_held_out.figures(sets),
+        *_region(usual),
+        *_soil(usual),
         *_time(sets),
     ]
 
 
-def _share(name: str, hits: int, count: int, gate: str = "") -> Figure:
-    """A rate with a gate such as '>= 0.95'."""
-    met = None
-    if gate and count:
-        relation, goal = gate.split()
-        share = hits / count
-        met = share >= float(goal) if relation == ">=" else share <= float(goal)
-    return Figure(name, rate(hits, count), gate, met)
-
-
 def named_designs(sets: Sequence[Judged]) -> list[Judged]:
-    """Sets whose designs can name a cause."""
-    return [s for s in sets if s["design"] not in SUSPECT_DESIGNS]
+    """Sets whose designs can name a cause, of tiers without figures of their own."""
+    return [s for s in sets if s["design"] not in SUSPECT_DESIGNS and not own_figures(s)]
 
 
 def _naming(sets: Sequence[Judged]) -> Iterator[Figure]:
     own = [s for s in named_designs(sets) if nameable(s)]
-    for level, goal in ((0.0, ">= 0.95"), (0.01, ">= 0.93"), (0.02, ">= 0.90"), (0.04, "")):
+    for level, goal in ((0.0, ">= 0.95"), (0.01, ">= 0.93"), (0.02, ">= 0.90"), (0.04, ">= 0.85")):
         part = [s for s in own if s["discrepancy"] == level]
         text = f"right cause in the cause set, SNR >= 3, discrepancy {level:.0%}"
-        yield _share(text, sum(map(holds, part)), len(part), goal)
+        yield share(text, sum(map(holds, part)), len(part), goal)
     alone = [s for s in sets if unique(s)]
-    yield _share("right when unique, all tiers", sum(map(right, alone)), len(alone), ">= 0.95")
+    yield share("right when unique, all tiers", sum(map(right, alone)), len(alone), ">= 0.95")
     known = [s for s in alone if s["catalogued"]]
     text = "right when unique, cause in the catalogue"
-    yield _share(text, sum(map(right, known)), len(known))
+    yield share(text, sum(map(right, known)), len(known))
 
 
 def _false_names(sets: Sequence[Judged]) -> Iterator[Figure]:
@@ -91,20 +78,20 @@ def _false_names(sets: Sequence[Judged]) -> Iterator[Figure]:
         "cause outside the catalogue": [s for s in sets if s["tier"] == "C"],
     }
     for name, own in groups.items():
-        yield _share(f"falsely unique: {name}", sum(map(unique, own)), len(own), "<= 0.05")
+        yield share(f"falsely unique: {name}", sum(map(unique, own)), len(own), "<= 0.05")
     for name in ("null", "scatter"):
         own = groups[name]
         hits = sum(s["status"] in CLAIMING_STATUSES for s in own)
-        yield _share(f"an effect stated, alone or in a class: {name}", hits, len(own))
+        yield share(f"an effect stated, alone or in a class: {name}", hits, len(own))
 
 
 def _silence(sets: Sequence[Judged]) -> Iterator[Figure]:
     own = [s for s in sets if nameable(s)]
     for status, goal in (("unknown", "<= 0.05"), ("no-gap", "<= 0.02")):
         hits = sum(s["status"] == status for s in own)
-        yield _share(f"`{status}`, cause in the catalogue, SNR >= 3", hits, len(own), goal)
+        yield share(f"`{status}`, cause in the catalogue, SNR >= 3", hits, len(own), goal)
     hits = sum(s["status"] == "crash" for s in sets)
-    yield _share("analysis ended by an error", hits, len(sets), "<= 0.0")
+    yield share("analysis ended by an error", hits, len(sets), "<= 0.0")
 
 
 def _suspects(sets: Sequence[Judged]) -> Iterator[Figure]:
@@ -112,10 +99,10 @@ def _suspects(sets: Sequence[Judged]) -> Iterator[Figure]:
     for most, place, goal in ((1, "first", ">= 0.75"), (3, "in the first three", ">= 0.95")):
         own = [s for s in every if nameable(s)]
         hits = sum(suspected(s, most) for s in own)
-        yield _share(f"one load, SNR >= 3: truth {place} among suspects", hits, len(own), goal)
+        yield share(f"one load, SNR >= 3: truth {place} among suspects", hits, len(own), goal)
         own = [s for s in every if s["signal"] >= 2.0 * 3.0]
         hits = sum(suspected(s, most) for s in own)
-        yield _share(f"one load, signature of 6 sigma: truth {place}", hits, len(own))
+        yield share(f"one load, signature of 6 sigma: truth {place}", hits, len(own))
 
 
 def _probabilities(sets: Sequence[Judged]) -> Iterator[Figure]:
