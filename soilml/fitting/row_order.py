@@ -24,8 +24,9 @@ MOST_EXPLAINED, DEGREE = 0.95, 2
 def with_order_columns(case: Case, table: Table, fields: Collection[str] | None = None) -> Table:
     """The table with the columns of `FROM_ORDER` that it lacks.
 
-    Those of `fields`; None: those that effects of the case use. Where slip and load follow from the
-    order of the rows and no times are known, there is no progress.
+    Those of `fields`; None: those that effects of the case use. There is no progress where slip and
+    load follow from the order of the rows and no times are known, and none between two runs, which
+    may differ for any reason.
     """
     if fields is None:
         models = (case.model, *case.gears.values())
@@ -35,7 +36,9 @@ def with_order_columns(case: Case, table: Table, fields: Collection[str] | None 
         return table
     progress = campaign_progress(table)
     columns = {}
-    if "progress" in wanted and (_has_times(table) or not _is_sorted(table, progress)):
+    runs = np.unique(table["run"]).size if "run" in table else 1
+    ordered = runs != 2 and (_has_times(table) or not _is_sorted(table, progress))
+    if "progress" in wanted and ordered:
         columns[FROM_ORDER["progress"]] = progress
     if "load_direction" in wanted:
         order = np.argsort(progress, kind="stable")

@@ -156,8 +156,8 @@ def _usual(readings: Readings) -> dict[str, Any]:
     """The covariates of a plain run as most rows were driven, forward and on the first pass."""
     usual = {}
     for field in USUAL_COVARIATES:
-        value = getattr(readings.at, field)
-        if value is None or field in FROM_ORDER:
+        value = None if field in FROM_ORDER else getattr(readings.at, field)
+        if value is None:
             continue
         typical = np.median(np.abs(value) if field == "speed" else value)
         if field == "pass_number":

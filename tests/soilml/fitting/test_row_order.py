@@ -16,9 +16,9 @@ RNG = np.random.default_rng(5)
 
 
 def rows(count=16, **more):
-    """Rows of two runs at slips and loads in no order."""
+    """Rows of four runs at slips and loads in no order."""
     columns = {
-        "run": np.repeat(["a", "b"], count // 2),
+        "run": np.repeat(["a", "b", "c", "d"], count // 4),
         "slip": RNG.permutation(np.linspace(0.1, 0.6, count)),
         "load_N": RNG.permutation(np.repeat([40.0, 60.0], count // 2)),
     }
@@ -40,9 +40,9 @@ def test_a_load_falls_where_it_is_clearly_below_the_last_largest(loads, directio
 def test_progress_is_that_of_one_clock_else_that_of_the_rows():
     even = np.arange(16) / 15
     np.testing.assert_allclose(campaign_progress(rows()), even)
-    time = np.append(np.linspace(0.0, 70.0, 8), np.linspace(130.0, 200.0, 8))
+    time = np.ravel([start + np.linspace(0.0, 10.0, 4) for start in (0.0, 15.0, 130.0, 190.0)])
     np.testing.assert_allclose(campaign_progress(rows(time_s=time)), time / 200.0)
-    anew = np.tile(np.linspace(0.0, 70.0, 8), 2)  # a clock that starts again with each run
+    anew = np.tile(np.linspace(0.0, 70.0, 4), 4)  # a clock that starts again with each run
     np.testing.assert_allclose(campaign_progress(rows(time_s=anew)), even)
 
 
@@ -63,6 +63,11 @@ def test_sorted_rows_have_no_progress_unless_they_were_timed():
     assert "progress" not in with_order_columns(PLAIN, Table(columns), FROM_ORDER)
     timed = Table(columns | {"time_s": np.arange(24.0)})
     assert "progress" in with_order_columns(PLAIN, timed, FROM_ORDER)
+
+
+def test_two_runs_that_differ_may_do_so_for_any_reason():
+    two = rows(run=np.repeat(["a", "b"], 8))
+    assert "progress" not in with_order_columns(PLAIN, two, FROM_ORDER)
 
 
 def test_simulated_rows_say_that_the_campaign_is_over():
