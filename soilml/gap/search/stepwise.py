@@ -199,7 +199,9 @@ def _fit_level(
         noise_start = None
         if hidden and single:
             alone = base.noise_only
-            noise_start = _off_bounds(soil) if alone is None else alone.start_values()
+            noise_start = {path: off_bounds(x) for path, x in soil.start_values().items()}
+            if alone is not None:
+                noise_start = alone.start_values()
         start = base.catalogue_law.fit.start_values()
         requests.append(CandidateRequest(names, start, smaller, noise_start))
     fitted = fit_candidates(problem, requests)
@@ -217,13 +219,13 @@ def _fit_level(
     return [shaped.get(c.names, c) for c in fitted]
 
 
-def _off_bounds(soil: Solution) -> dict[str, float]:
-    """The coordinates of a fit of the soil, nearer to the middle of their priors.
+def off_bounds(x: float) -> float:
+    """A coordinate of the soil nearer to the middle of its prior.
 
     Where an effect is missing, soil parameters are often at a bound, from which the fit with the
     effect would not move.
     """
-    return {path: 0.5 + INWARD * (x - 0.5) for path, x in soil.start_values().items()}
+    return 0.5 + INWARD * (x - 0.5)
 
 
 def _is_complete(problem: FitProblem, best: Explanation, seed: int) -> bool:

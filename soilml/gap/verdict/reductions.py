@@ -16,6 +16,7 @@ from soilml.gap.evidence.problem import FitProblem, StartedFit, covariance_at, f
 from soilml.gap.report.results import BeforeAfter, GapReduction
 from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
+from soilml.gap.search.stepwise import off_bounds
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal
@@ -45,15 +46,27 @@ def gap_reduction(
 def plain_fit(problem: FitProblem, soil: Solution, shown: Explanation) -> Solution:
     """An explanation fitted as the soil alone is: under noise and scatter, without a remainder.
 
-    It starts from the optimum beside a remainder and from the soil alone, so that its objective is
-    at most that of the soil alone.
+    It starts from the optimum beside a remainder, and from the soil alone with the effect absent
+    and of usual size, so that its objective is at most that of the soil alone; it is the soil alone
+    where the model refuses the explanation.
     """
     fit = shown.fit
     absent = {c.path: 0.0 for c in fit.coordinates if c.effect}
-    starts = [fit.start_values(), soil.start_values() | absent]
+    alone = soil.start_values()
+    starts = [
+        fit.start_values(),
+        alone | absent,
+        {path: off_bounds(x) for path, x in alone.items()},
+    ]
     found = fit_many(problem, [StartedFit(fit.case, fit.coordinates, start) for start in starts])
     solved = [one for one in found if not isinstance(one, InputError)]
-    return min(solved, key=lambda one: one.objective, default=fit)
+    return min([*solved, soil], key=lambda one: _objective_at(problem, one))
+
+
+def _objective_at(problem: FitProblem, fit: Solution) -> float:
+    """The objective of a fit under the noise and scatter of a problem."""
+    at = fit.whitened_by(problem.covariance.whiten)
+    return float(at.problem.objective(at.residual, at.x))
 
 
 def gap_reductions(
@@ -63,7 +76,8 @@ def gap_reductions(
 
     Before is the soil alone, after the explanation shown; both are of the same kind. Without the
     remainder, both are fitted under noise and scatter, and the total of the fitted rows is the sum
-    of squares that these fits minimise, over the number of readings.
+    of squares that these fits minimise, over the number of readings: that of whitened residuals,
+    and of deviations from priors of effects and tests of the soil.
 
     after: The explanation shown, or the soil alone, by `plain_fit`.
     """
@@ -71,7 +85,8 @@ def gap_reductions(
     readings, std = problem.readings, problem.covariance.std
     fitted = gap_reduction(readings, std, soil.prediction, after.prediction, "all rows fitted")
     count = len(readings)
-    fitted = replace(fitted, before=soil.cost / count, after=after.cost / count)
+    squares = [_objective_at(problem, fit) / count for fit in (soil, after)]
+    fitted = replace(fitted, before=squares[0], after=squares[1])
     parts = held_out_folds(readings, seed)
     none = np.zeros(len(readings.channels))
     models = [(soil, none)] if shown is None else [(soil, none), (after, none)]
