@@ -22,6 +22,7 @@ _HOME = {
     "SoilmlError": "soilml.errors",
     "simulate": "soilml.fitting.simulation",
     "gap": "soilml.gap",
+    "adapt": "training.adaptation",
     "METHODS": "soilml.identification",
     "identify": "soilml.identification",
     "read_table": "soilml.io.read_table",

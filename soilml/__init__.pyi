@@ -30,5 +30,6 @@ from soilml.physics.soils import Soil as Soil
 from soilml.physics.soils import soil as soil
 from soilml.physics.soils import soil_catalogue as soil_catalogue
 from soilml.row_status import Status as Status
+from training.adaptation import adapt as adapt
 
 __version__: str

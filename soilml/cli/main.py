@@ -33,6 +33,7 @@ friction angle and shear modulus, each with its uncertainty.
   from data to a model file    soilml train
   from a model file to C       soilml export-c
   to a graph of fixed shapes   soilml export-step
+  from a campaign to a file    soilml adapt
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
@@ -58,6 +59,7 @@ COMMANDS = {
     "bevameter": "soilml.cli.commands.bevameter",
     "audit": "soilml.cli.commands.audit",
     "gap": "soilml.cli.commands.gap",
+    "adapt": "training.commands.adapt",
     "generate": "datagen.commands.generate",
     "train": "training.commands.train",
     "export-c": "training.commands.export_c",

@@ -1,0 +1,206 @@
+"""What `soilml adapt` gives a board whose wheel does something that its model lacks.
+
+    python bench/adapt.py                     the table of hidden effects, resumed in build/adapt
+    python bench/adapt.py --only slip-sinkage --seeds 5
+    python bench/adapt.py campaign DIR        the log, model and soil of one world, for a trial
+
+Each world is a campaign of 64 rows of a blind set, whose simulator shares no code with the package,
+with an effect that the model file lacks. `adapt` sees the campaign alone. Its two files then
+estimate 40 other soils of the same bearing values from 16 torque readings each, with the same
+hidden effect. The error of the board is the root mean square error of c, phi and K over the prior's
+standard deviation; after the adaptation the board has the file that `adapt` recommends.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from datagen.blind_sets import Plan, draw_blind_set, write_blind_set
+from datagen.blind_sets.plans import active_mechanisms
+from datagen.blind_sets.reading_errors import sensors
+from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
+from datagen.blind_sets.soil_families import FAMILIES, PRIOR, RADIUS, WIDTH
+from soilml import Estimator, adapt, read_case, read_table
+from soilml.io.text_tables import format_table
+from soilml.quantities import SHEAR, column
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+#: Hidden effects, by tier and key of the blind sets, at their reference sizes.
+WORLDS = (
+    ("A", "slip-sinkage"),
+    ("A", "exit-angle"),
+    ("A", "grousers"),
+    ("A", "bulldozing"),
+    ("A", "stress-shift"),
+    ("A", "sidewall-shear"),
+    ("A", "shear-softening"),
+    ("B", "slip-sinkage/square"),
+    ("S", "torque-gain"),
+    ("C", "stiff-layer"),
+)
+SEEDS = (5, 6)
+NOISE, RUNS, FAMILY, FREE = 0.02, 4, "dry-sand", 3
+SOILS, ROWS = 40, 16  # Soils after the campaign, and torque readings of each
+TRAINING_ROWS = 40_000
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One world: verdicts, and the board's figures with the old and with the adapted file."""
+
+    world: str
+    seed: int
+    status: str
+    gap_status: str
+    effects: list[str]
+    ratio: float | None  # error on the runs kept back, after over before; as `adapt` states it
+    error_before: float  # over prior standard deviations, root mean square over parameters
+    error_after: float  # with the file that `adapt` recommends
+    rmse: dict[str, list[float]]  # by file, SI
+    coverage: dict[str, list[float]]  # of 90 % intervals
+    out_of_range: dict[str, float]
+
+
+def plan_of(tier: str, key: str, seed: int, noise: float = NOISE, runs: int = RUNS) -> Plan:
+    """The plan of a world."""
+    return Plan(tier, key, 1.0, noise, runs, FAMILY, FREE, seed=seed)
+
+
+def board_sets(plan: Plan, soil: dict[str, float], loads: Floats) -> tuple[list[Any], Floats]:
+    """Readings of new soils with the hidden effect, and the true c, phi, K (soils, 3)."""
+    rng = np.random.default_rng([plan.seed, 99])
+    family, noise = FAMILIES[plan.soil_family], sensors(plan.noise)[column("torque")]
+    active = tuple((m, plan.size * m.reference) for m in active_mechanisms(plan.tier, plan.cause))
+    sets, truth = [], []
+    while len(sets) < SOILS:
+        own = soil | {name: float(rng.uniform(*getattr(family, name))) for name in SHEAR}
+        slip = np.sort(rng.uniform(0.06, 0.58, ROWS))
+        load = rng.choice(loads, ROWS)
+        fixed = {"radius": RADIUS, "width": WIDTH, "speed": 0.05, "pass_number": 1.0}
+        state = {k: np.full(ROWS, v) for k, v in (own | fixed | {"slip_angle": 0.0}).items()}
+        found = solve_equilibrium(WheelState(slip=slip, load=load, **state), active)
+        torque = found.torque + noise.std(found.torque) * rng.standard_normal(ROWS)
+        if np.isfinite(torque).all():
+            sets.append({"slip": slip, "load": load, "torque": torque})
+            truth.append([own[name] for name in SHEAR])
+    return sets, np.asarray(truth)
+
+
+def measure(estimator: Estimator, sets: list[Any], truth: Floats) -> tuple[Floats, Floats, float]:
+    """Rmse (3,) in SI, coverage (3,) of 90 % intervals, and share of sets out of range."""
+    found = [estimator.run(**readings) for readings in sets]
+    mean, low, high = (np.stack([getattr(e, k) for e in found]) for k in ("mean", "low", "high"))
+    rmse = np.sqrt(np.mean((mean - truth) ** 2, axis=0))
+    covered = np.mean((truth >= low) & (truth <= high), axis=0)
+    return rmse, covered, float(np.mean([not e.in_range for e in found]))
+
+
+def run_world(tier: str, key: str, seed: int, folder: Path) -> Outcome:
+    """Adapt to one world and measure the board on other soils; kept where it is there already."""
+    plan, place = plan_of(tier, key, seed), folder / f"{key.replace('/', '-')}-{seed}"
+    record = place / "outcome.json"
+    if record.exists():
+        return Outcome(**json.loads(record.read_text()))
+    write_blind_set(plan, place / "data", place / "truth")
+    truth = json.loads((place / "truth/truth.json").read_text())
+    table = read_table(place / "data/runs.csv")
+    report = adapt(
+        read_case(place / "data/model.toml"), table, place / "out",
+        rows=TRAINING_ROWS, seed=seed, workers=1,
+    )  # fmt: skip
+    rmse, coverage, outside, errors = {}, {}, {}, {}
+    if report.judgement is not None:
+        sets, true = board_sets(plan, truth["soil"], np.unique(table["load_N"]))
+        std = np.asarray([np.diff(PRIOR[name])[0] for name in SHEAR]) / np.sqrt(12.0)
+        for name in ("before", "adapted"):
+            estimator = Estimator.load(place / "out" / f"{name}.onnx")
+            own, covered, outside[name] = measure(estimator, sets, true)
+            rmse[name], coverage[name] = own.tolist(), covered.tolist()
+            errors[name] = float(np.sqrt(np.mean((own / std) ** 2)))
+    before = errors.get("before", 1.0)
+    after = errors["adapted"] if report.status == "adapted" else before
+    outcome = Outcome(
+        world=key, seed=seed, status=report.status, gap_status=report.gap_status,
+        effects=list(report.effects),
+        ratio=None if report.judgement is None else report.judgement.ratio,
+        error_before=before, error_after=after, rmse=rmse, coverage=coverage, out_of_range=outside,
+    )  # fmt: skip
+    record.write_text(json.dumps(asdict(outcome), indent=1) + "\n")
+    return outcome
+
+
+def table_of(outcomes: list[Outcome]) -> str:
+    """A line for each world, and the figures over all of them."""
+    rows = []
+    for o in outcomes:
+        cells = [
+            f"{o.rmse[n][0]:.0f} Pa {np.rad2deg(o.rmse[n][1]):.1f} deg {1e3 * o.rmse[n][2]:.1f} mm"
+            + f" {'/'.join(f'{100 * c:.0f}' for c in o.coverage[n])} %"
+            if o.rmse
+            else ""
+            for n in ("before", "adapted")
+        ]
+        rows.append(
+            (
+                o.world, str(o.seed), o.gap_status, "+".join(o.effects), o.status,
+                "" if o.ratio is None else f"{o.ratio:.2f}", *cells,
+                f"{o.error_after / o.error_before:.2f}",
+            )
+        )  # fmt: skip
+    head = (
+        "hidden", "seed", "gap", "added", "verdict", "kept back", "rmse, coverage before",
+        "rmse, coverage after", "error after/before",
+    )  # fmt: skip
+    ratios = np.asarray([o.error_after / o.error_before for o in outcomes])
+    changed = np.asarray([o.status == "adapted" for o in outcomes])
+    own = ratios[changed]
+    summary = (
+        f"worlds {len(outcomes)}, adapted {int(changed.sum())}; error after over before: median "
+        f"{np.median(ratios):.2f} over all"
+        + (f", {np.median(own):.2f} over adapted ones" if own.size else "")
+        + f"; worse than before: {int((ratios > 1.0).sum())}"
+    )
+    return f"{format_table(head, rows, text_columns=5)}\n\n{summary}"
+
+
+def write_campaign(folder: Path) -> None:
+    """Log, model and true soil of a world with hidden slip-sinkage."""
+    plan = plan_of("A", "slip-sinkage", SEEDS[0])
+    write_blind_set(plan, folder, folder / "truth")
+    soil = draw_blind_set(plan).truth["soil"]
+    lines = [f"{name} = {value!r}" for name, value in soil.items()]
+    (folder / "true_soil.toml").write_text("\n".join(["[soil]", *lines]) + "\n")
+
+
+def main() -> None:
+    """Print the table, or write a campaign."""
+    if sys.argv[1:2] == ["campaign"]:
+        write_campaign(Path(sys.argv[2]))
+        return
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="*", help="keys of hidden effects")
+    parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
+    parser.add_argument("--out", type=Path, default=Path("build/adapt"))
+    parser.add_argument("--processes", type=int, default=2)
+    args = parser.parse_args()
+    worlds = [(t, k, s) for s in args.seeds for t, k in WORLDS if not args.only or k in args.only]
+    with ProcessPoolExecutor(args.processes) as pool:
+        futures = [pool.submit(run_world, t, k, s, args.out) for t, k, s in worlds]
+        outcomes = []
+        for future in futures:
+            outcomes.append(future.result())
+            print(table_of(outcomes[-1:]).splitlines()[2], file=sys.stderr, flush=True)
+    print(table_of(outcomes))
+
+
+if __name__ == "__main__":
+    main()

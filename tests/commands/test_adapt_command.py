@@ -1,0 +1,108 @@
+"""`soilml adapt`: errors of one line, a refusal that is a result, and the whole chain."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import THREE_CHANNEL_MODEL
+
+import soilml
+from soilml import SlipSinkage, read_case, simulate
+from soilml.cli import main
+from soilml.io.text_tables import csv_text
+from training.adaptation import board_file
+
+#: The packaged spec with a response that is learned in seconds.
+SMALL_SPEC = """\
+features = ["slip", "torque/load", "load"]
+targets = ["cohesion", "friction_angle", "shear_modulus"]
+[[regressor]]
+type = "linear"
+[set_posterior]
+designs = 600
+hidden = 24
+epochs = 60
+"""
+
+
+def write_log(folder, *effects, loads=(40.0, 60.0, 80.0, 100.0, 120.0, 50.0)):
+    """A model file and runs of a wheel with effects that the model lacks."""
+    (folder / "model.toml").write_text(THREE_CHANNEL_MODEL)
+    case = read_case(folder / "model.toml")
+    world = replace(case, model=replace(case.model, effects=effects))
+    slip = np.tile(np.linspace(0.08, 0.6, 12), len(loads))
+    names = np.repeat([f"r{i}" for i in range(len(loads))], 12)
+    table = simulate(world, slip, np.repeat(loads, 12), run=names, seed=4)
+    columns = {k: v for k, v in table.columns.items() if k not in ("entry_angle_rad", "status")}
+    (folder / "runs.csv").write_text(csv_text(columns))
+    return ["adapt", str(folder / "model.toml"), str(folder / "runs.csv")]
+
+
+def error_of(capsys, words):
+    """The one line of a command that must fail with status 2."""
+    assert main(words) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len([line for line in lines if line.startswith("soilml")]) == 1
+    return lines[-1]
+
+
+def test_errors_are_one_line_and_leave_nothing(tmp_path, capsys):
+    words = [*write_log(tmp_path, loads=(40.0, 60.0, 80.0)), "--out", str(tmp_path / "out")]
+    assert "3 runs; needed are 4 or more" in error_of(capsys, words)
+    write_log(tmp_path)
+    missing = str(tmp_path / "none.onnx")
+    assert "none.onnx" in error_of(capsys, [*words, "--against", missing])
+    (tmp_path / "soil.toml").write_text("[gear]\n")
+    assert "[soil] is missing" in error_of(capsys, [*words, "--soil", str(tmp_path / "soil.toml")])
+    model = tmp_path / "model.toml"
+    model.write_text(model.read_text().replace("[gear]", "[gears.one]"))
+    assert "several gears (one)" in error_of(capsys, words)
+    assert "from 2000" in error_of(capsys, [*words, "--rows", "10"])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_without_a_gap_the_old_file_stays_and_that_is_a_result(tmp_path, capsys):
+    out = tmp_path / "out"
+    words = [*write_log(tmp_path), "--out", str(out)]
+    out.mkdir()
+    (out / "adapted.onnx").write_text("of an earlier call")
+    assert main(words) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("The old file stays: ")
+    content = json.loads((out / "adapt.json").read_text())
+    assert content["status"] == "not-supported" and content["gap"]["status"] == "no-gap"
+    assert [r["code"] for r in content["remarks"]] == ["gap-no-gap"]
+    assert "The old file stays" in (out / "report.html").read_text()
+    assert not (out / "adapted.onnx").exists() and not list(out.glob("*.parquet"))
+
+
+@pytest.mark.slow
+def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monkeypatch):
+    spec = tmp_path / "small.toml"
+    spec.write_text(SMALL_SPEC)
+    monkeypatch.setattr(board_file, "SPEC", str(spec))
+    out = tmp_path / "out"
+    words = [*write_log(tmp_path, SlipSinkage(n1=0.5)), "--out", str(out)]
+    words += ["--rows", "3000", "--soil", str(tmp_path / "model.toml"), "--against", "wheel"]
+    assert main(words) == 0
+    shown = capsys.readouterr().out
+    content = json.loads((out / "adapt.json").read_text())
+    assert content["status"] == "adapted" and content["effects"] == ["slip-sinkage"]
+    assert content["judgement"]["error_ratio"] < 0.6
+    assert shown.splitlines()[0] == content["sentence"]
+    assert set(content["judgement"]["soil_error"]) == {
+        "cohesion", "friction_angle", "shear_modulus",
+    }  # fmt: skip
+    assert all((out / name).is_file() for name in content["files"])
+    assert not (out / "before.onnx").exists()
+    assert "slip-sinkage" in (out / "adapted.toml").read_text()
+    file = soilml.Estimator.load(out / "adapted.onnx")
+    assert file.names == ("cohesion", "friction_angle", "shear_modulus")
+    before = {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")}
+    (out / "adapted.h").unlink()
+    assert main(words) == 0  # a repeated call keeps what is done, and completes what is missing
+    assert capsys.readouterr().out == shown
+    assert {path: path.stat().st_mtime_ns for path in before} == before
+    assert (out / "adapted.h").is_file()

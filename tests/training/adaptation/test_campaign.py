@@ -1,0 +1,116 @@
+"""What a log gives: runs kept back, ranges with a margin, noise, and a recipe that can be read."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import MODEL
+
+from datagen.recipe import read_recipe
+from soilml import SlipSinkage, read_case
+from soilml.errors import InputError
+from soilml.io.table import Table
+from soilml.numerics.prior import Prior
+from soilml.physics.effects import EFFECTS
+from training.adaptation.campaign import (
+    DrivenRange,
+    board_unknowns,
+    recipe_text,
+    split_runs,
+    untrainable_effects,
+    with_fitted_soil,
+    with_noise_of_log,
+)
+from training.set_posterior.families.recipe_family import RecipeFamily
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(MODEL)
+    return read_case(path)
+
+
+def log(runs=8, rows=4, **more):
+    """Rows of several runs, each under one load, without a physical meaning."""
+    count = runs * rows
+    columns = {
+        "run": np.repeat([f"r{i}" for i in range(runs)], rows),
+        "slip": np.tile(np.linspace(0.1, 0.5, rows), runs),
+        "load_N": np.repeat(np.linspace(40.0, 100.0, runs), rows),
+        "torque_Nm": np.linspace(1.0, 4.0, count),
+    }
+    return Table(columns | {name: np.full(count, value) for name, value in more.items()})
+
+
+def test_whole_runs_are_kept_back_by_the_seed():
+    table = log()
+    split = split_runs(table, 3)
+    assert len(split.runs) == 2 and len(split.kept_back) == 8
+    assert not set(split.campaign["run"]) & set(split.kept_back["run"])
+    assert len(split.campaign) + len(split.kept_back) == len(table)
+    assert split_runs(table, 3).runs == split.runs
+    assert len({split_runs(table, seed).runs for seed in range(20)}) > 5
+
+
+def test_too_few_runs_are_refused():
+    with pytest.raises(InputError, match="3 runs; needed are 4 or more"):
+        split_runs(log(runs=3), 0)
+
+
+def test_ranges_have_a_margin_and_leave_braking_out():
+    table = log()
+    driven = DrivenRange.of(table)
+    assert driven.slip == pytest.approx((0.05, 0.55)) and driven.load == (33.3, 120.0)
+    braking = Table(table.columns | {"slip": np.where(table["slip"] < 0.2, -0.2, table["slip"])})
+    assert DrivenRange.of(braking).slip[0] == pytest.approx(0.1833, abs=1e-4)
+    with pytest.raises(InputError, match="no row has a slip above 0"):
+        DrivenRange.of(Table(table.columns | {"slip": -table["slip"]}))
+
+
+def test_noise_of_the_log_fills_what_is_not_declared(case):
+    bare = replace(case, noise={})
+    assert with_noise_of_log(bare, log(torque_Nm_std=0.07)).noise["torque_Nm"].constant == 0.07
+    declared = with_noise_of_log(case, log(torque_Nm_std=0.07)).noise["torque_Nm"]
+    assert declared == case.noise["torque_Nm"]
+    assert with_noise_of_log(case, log(slip_std=0.01)).noise["slip"].constant == 0.01
+    with pytest.raises(InputError, match="noise of torque_Nm is not known"):
+        with_noise_of_log(bare, log())
+
+
+def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
+    model = replace(case.model, effects=(SlipSinkage(n1=0.4),))
+    prior = {**case.prior, "slip-sinkage.n1": Prior(0.3, 0.5)}
+    own = replace(case, model=model, prior=prior)
+    path = tmp_path / "recipe.toml"
+    path.write_text(recipe_text(own, DrivenRange.of(log()), 5000, 7))
+    recipe = read_recipe(path)
+    assert (recipe.rows, recipe.seed) == (5000, 7)
+    assert (recipe.slip.lower, recipe.load.upper) == pytest.approx((0.05, 120.0))
+    assert recipe.case.prior == prior and recipe.case.model == model
+    family = RecipeFamily.of(recipe, ("cohesion", "friction_angle", "shear_modulus"))
+    assert len(family.axes) == 4
+
+
+def test_unknowns_beyond_what_a_file_has_are_fixed_and_said(case):
+    more = {name: Prior(1.0, 2.0) for name in ("kphi", "n")}
+    model = replace(case.model, effects=(SlipSinkage(n1=0.4), EFFECTS["grousers"](height=0.01)))
+    sizes = {"slip-sinkage.n1": Prior(0.1, 0.7), "grousers.height": Prior(0.0099, 0.0101)}
+    own = replace(case, model=model, prior={**sizes, **case.prior, **more})
+    kept, remarks = board_unknowns(own)
+    assert "slip-sinkage.n1" in kept.prior and set(case.prior) | set(more) <= set(kept.prior)
+    assert [r.about for r in remarks] == [("grousers.height",)]
+    assert board_unknowns(case) == (case, [])
+    with pytest.raises(InputError, match="none of cohesion, friction_angle, shear_modulus"):
+        board_unknowns(replace(case, prior=more))
+
+
+def test_effects_that_need_more_than_slip_and_load_cannot_be_trained(case):
+    effects = (SlipSinkage(n1=0.4), EFFECTS["multipass"]())
+    own = replace(case, model=replace(case.model, effects=effects))
+    assert untrainable_effects(own) == {"multipass": ("pass",)}
+
+
+def test_fitted_values_replace_those_that_the_case_has(case):
+    fitted = with_fitted_soil(case, {"kphi": 2e6, "slip-sinkage.n1": 0.3})
+    assert fitted.soil.kphi == 2e6 and fitted.prior == case.prior

@@ -1,0 +1,144 @@
+"""Predictions of later rows by files that know the soil exactly, on a right and a wrong model."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from conftest import THREE_CHANNEL_MODEL
+
+from soilml import SlipSinkage, read_case, simulate
+from soilml.errors import InputError
+from soilml.io.table import Table
+from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.quantities import SHEAR
+from training.adaptation.judgement import BoardCandidate, judge
+from training.adaptation.page import adapt_page, adapt_text, judgement_tables, plot_judgement
+from training.adaptation.result import AdaptReport
+
+
+@dataclass
+class KnownSoil:
+    """Stands for a model file: it answers with one soil, and remembers what it was given."""
+
+    mean: np.ndarray
+    std: np.ndarray
+    inputs = ("slip", "torque", "load")
+    sets = None
+
+    def run(self, **readings):
+        self.given = readings
+        lower, upper = np.zeros(3), np.asarray([3000.0, 0.8, 0.04])
+        prior = PriorSummary(0.5 * (lower + upper), 0.3 * (upper - lower), lower, upper)
+        true = np.bool_(True)
+        covariance = np.diag(self.std**2)
+        units = ("Pa", "rad", "m")
+        return Estimate.gaussian(
+            SHEAR, units, prior, self.mean, covariance, self.std, true, np.full(3, 1.6)
+        )
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "model.toml"
+    path.write_text(THREE_CHANNEL_MODEL)
+    return read_case(path)
+
+
+@pytest.fixture
+def world(case):
+    """The case with slip-sinkage, and two runs of it."""
+    true = replace(case, model=replace(case.model, effects=(SlipSinkage(n1=0.4),)))
+    slip, load = np.tile(np.linspace(0.1, 0.6, 12), 2), np.repeat([50.0, 90.0], 12)
+    return true, simulate(true, slip, load, run=np.repeat(["a", "b"], 12), seed=1)
+
+
+def soil_of(case):
+    return np.asarray([float(getattr(case.soil, name)) for name in SHEAR])
+
+
+def candidate(case, std=1e-9):
+    return BoardCandidate(KnownSoil(soil_of(case), np.full(3, std) * soil_of(case)), case)
+
+
+def test_the_right_model_predicts_to_the_noise_and_the_wrong_one_does_not(case, world):
+    true, table = world
+    found = judge(table, candidate(case), candidate(true))
+    assert found.lengths == (4, 8) and len(found.runs) == 4
+    assert found.channels == ("torque_Nm", "drawbar_pull_N", "sinkage_m")
+    assert found.ratio < 0.2
+    for before, after in found.figures().values():
+        assert after.error < 0.03 and after.error < before.error
+        assert after.log_score > before.log_score
+    reverse = judge(table, candidate(true), candidate(case))
+    assert reverse.ratio == pytest.approx(1.0 / found.ratio)
+
+
+def test_only_torque_of_the_first_rows_is_read(case, world):
+    true, table = world
+    before, after = candidate(case), candidate(true)
+    judge(table, before, after, first_rows=(5,))
+    given = after.estimator.given
+    assert set(given) == {"slip", "torque", "load"} and len(given["slip"]) == 5
+    np.testing.assert_array_equal(given["slip"], table["slip"][12:17])
+
+
+def test_log_scores_are_densities_of_the_readings_over_the_range(case, world):
+    true, table = world
+    found = judge(table, candidate(case), candidate(true), first_rows=(8,))
+    rows = table.rows(np.arange(8, 12))
+    scale = max(table["torque_Nm"].max(), 0.0)
+    exact = simulate(true, rows["slip"], rows["load_N"])["torque_Nm"]
+    std = 0.02 * np.abs(rows["torque_Nm"])
+    off = (rows["torque_Nm"] - exact) / std
+    by_hand = np.mean(-0.5 * off**2 - np.log(std / scale) - 0.5 * np.log(2 * np.pi))
+    assert found.runs[0].scores_after["torque_Nm"].log_score == pytest.approx(by_hand, rel=1e-4)
+
+
+def test_an_uncertain_soil_widens_the_prediction(case, world):
+    true, table = world
+    sure = judge(table, candidate(case), candidate(true)).runs[0].after.std["torque_Nm"]
+    vague = judge(table, candidate(case), candidate(true, 0.1)).runs[0].after.std["torque_Nm"]
+    assert np.all(vague > sure)
+
+
+def test_a_known_soil_is_compared_and_columns_come_first(case, world):
+    true, table = world
+    other = replace(case, soil=replace(case.soil, cohesion=500.0))
+    known = dict(zip(SHEAR, soil_of(true), strict=True))
+    found = judge(table, candidate(other), candidate(true), known)
+    assert found.soil_error["cohesion"] == pytest.approx((540.0, 0.0))
+    columns = table.columns | {"cohesion_Pa": np.full(len(table), 500.0)}
+    found = judge(Table(columns), candidate(other), candidate(true), known)
+    assert found.soil_error["cohesion"] == pytest.approx((0.0, 540.0))
+    assert judge(table, candidate(case), candidate(true)).soil_error == {}
+
+
+def test_runs_that_are_too_short_cannot_be_judged(case, world):
+    true, table = world
+    short = table.rows(np.r_[0:4, 12:16])
+    with pytest.raises(InputError, match="more than 4 rows"):
+        judge(short, candidate(case), candidate(true))
+
+
+@pytest.mark.slow
+def test_the_page_leads_with_the_verdict(case, world):
+    true, table = world
+    judgement = judge(table, candidate(case), candidate(true), dict.fromkeys(SHEAR, 1.0))
+    report = AdaptReport(
+        "adapted", "named", "Slip-sinkage.", ("slip-sinkage",), ("a", "b"), judgement,
+        ("adapted.onnx", "adapted.md", "adapted.c"), (), 2000, 0,
+    )  # fmt: skip
+    assert report.sentence.startswith("The adapted file predicts kept-back runs with 0.")
+    assert adapt_text(report).splitlines()[0] == report.sentence
+    assert adapt_page(report).answer[0] == report.sentence
+    assert [len(t.rows) for t in judgement_tables(judgement)] == [6, 3]
+    content = report.as_json()
+    assert content["judgement"]["error_ratio"] == judgement.ratio
+    assert content["judgement"]["by_first_rows"]["4"]["sinkage_m"]["after"]["error"] < 0.03
+    assert plot_judgement(judgement).shape == (2, 2)
+    worse = replace(report, status="not-better")
+    assert worse.sentence.startswith("The old file stays")
+    refused = replace(report, status="not-supported", judgement=None)
+    assert refused.sentence == "The old file stays: Slip-sinkage."
+    with pytest.raises(InputError, match="nothing can be drawn"):
+        refused.plot()

@@ -1,0 +1,212 @@
+"""What a log gives to an adaptation: runs to analyse, runs to judge on, the recipe of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from datagen.recipe import SENSOR_COLUMNS
+from soilml.config.case import Case
+from soilml.config.measurement_noise import Noise
+from soilml.config.write_case import case_as_toml
+from soilml.errors import InputError
+from soilml.fitting.readings import stack_readings, typical_std
+from soilml.gap.checks import estimate_repeat_noise
+from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT, split_holdout
+from soilml.io.table import Table
+from soilml.physics.effects import Effect
+from soilml.physics.operating_point import COVARIATES
+from soilml.quantities import SHEAR, column
+from soilml.remarks import Remark
+from training.set_posterior.families.recipe_family import MOST_UNKNOWNS
+
+#: A file is trained this far beyond the slips of the log, and this factor beyond its loads.
+SLIP_MARGIN, LOAD_FACTOR = 0.05, 1.2
+#: Slips that a file can be trained on.
+LEAST_SLIP, MOST_SLIP = 0.01, 0.95
+#: Runs of synthetic rows: their length, share and what is steady in them, as in the recipe `wheel`.
+RUNS = """\
+[[runs]]
+rows = 1
+share = 0.52
+
+[[runs]]
+rows = 32
+share = 0.14
+
+[[runs]]
+rows = 8
+share = 0.06
+
+[[runs]]
+rows = 16
+share = 0.10
+steady = ["load_N"]
+
+[[runs]]
+rows = 16
+share = 0.10
+steady = ["slip"]
+
+[[runs]]
+rows = 8
+share = 0.08
+steady = ["slip", "load_N"]
+"""
+
+
+@dataclass(frozen=True)
+class SplitRuns:
+    """The rows of a log: those that are analysed, and those of whole runs that are kept back."""
+
+    campaign: Table
+    kept_back: Table
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs that are kept back, in the order of the table."""
+        return tuple(dict.fromkeys(str(name) for name in self.kept_back["run"]))
+
+
+def split_runs(table: Table, seed: int) -> SplitRuns:
+    """Keep back a quarter of the runs, drawn with this seed; one at least.
+
+    Raises `InputError` for fewer than four runs.
+    """
+    runs = np.unique(table["run"])
+    if runs.size < RUNS_PER_HELD_OUT:
+        raise InputError(
+            f"{table.source}: {runs.size} runs; needed are {RUNS_PER_HELD_OUT} or more, of which a "
+            "quarter is kept back to judge the file on"
+        )
+    parts = split_holdout(table, "run", seed)
+    assert parts.held_out is not None
+    return SplitRuns(parts.analysed, parts.held_out)
+
+
+@dataclass(frozen=True)
+class DrivenRange:
+    """Slips and loads (N) that a file is trained for."""
+
+    slip: tuple[float, float]
+    load: tuple[float, float]
+
+    @staticmethod
+    def of(table: Table) -> DrivenRange:
+        """The range of a log with a margin; rows that brake or roll freely are left out.
+
+        Raises `InputError` where no row drives.
+        """
+        driving = table["slip"] > 0.0
+        if not driving.any():
+            raise InputError(
+                f"{table.source}: no row has a slip above 0; a file for the board is for driving "
+                "wheels"
+            )
+        slip, load = table["slip"][driving], table["load_N"][driving]
+        low = max(LEAST_SLIP, float(slip.min()) - SLIP_MARGIN)
+        high = min(MOST_SLIP, float(slip.max()) + SLIP_MARGIN)
+        return DrivenRange(
+            (round(min(low, high - SLIP_MARGIN), 4), round(high, 4)),
+            (_three_digits(load.min() / LOAD_FACTOR), _three_digits(load.max() * LOAD_FACTOR)),
+        )
+
+    def as_toml(self) -> str:
+        """The table [operating] of a recipe."""
+        return f"[operating]\nslip = {list(self.slip)}\nload_N = {list(self.load)}\n"
+
+
+def _three_digits(x: float) -> float:
+    return float(f"{x:.3g}")
+
+
+def with_noise_of_log(case: Case, table: Table) -> Case:
+    """The case with the noise of the log in those columns for which it declares none.
+
+    It is the median of `<column>_std`, or else that of repeated rows. Raises `InputError` where the
+    noise of torque is known from neither.
+    """
+    readings = stack_readings(case, table)
+    readings = readings.with_default_std(estimate_repeat_noise(readings)[0])
+    noise = dict(case.noise)
+    for i, name in enumerate(readings.channels):
+        std = readings.std[readings.channel == i]
+        if column(name) not in noise and np.isfinite(std).any():
+            noise[column(name)] = Noise(constant=_three_digits(float(np.nanmedian(std))))
+    for key, stds in (("slip", readings.slip_std), ("load_N", readings.load_std)):
+        if key not in noise and (std := typical_std(stds)) > 0.0:
+            noise[key] = Noise(constant=_three_digits(std))
+    if column("torque") not in noise:
+        raise InputError(
+            f"{table.source}: the noise of torque_Nm is not known; declare it in [noise] of the "
+            "model, such as torque_Nm = '2 %'"
+        )
+    return replace(case, noise=noise)
+
+
+def board_unknowns(case: Case) -> tuple[Case, list[Remark]]:
+    """The case with as many priors as a file can have, and a remark on those that were dropped.
+
+    The shear parameters come first, then the rest of the soil, then effects, of which the best
+    known are dropped first: they stay at their values. Raises `InputError` where none of the shear
+    parameters has a prior.
+    """
+    if not any(name in case.prior for name in SHEAR):
+        raise InputError(
+            f"none of {', '.join(SHEAR)} has a prior: give a range in [soil.prior] to what the "
+            "board is to estimate"
+        )
+    parameters = case.parameters()
+
+    def rank(path: str) -> tuple[int, float]:
+        if path in SHEAR:
+            return 0, 0.0
+        if "." not in path:
+            return 1, 0.0
+        value = abs(float(parameters[path][1]))
+        return 2, -case.prior[path].std / max(value, 1e-12)
+
+    order = sorted(case.prior, key=rank)
+    dropped = order[MOST_UNKNOWNS:]
+    if not dropped:
+        return case, []
+    text = (
+        f"{', '.join(dropped)}: fixed at the fitted value, because a file has at most "
+        f"{MOST_UNKNOWNS} unknowns"
+    )
+    kept = {path: prior for path, prior in case.prior.items() if path not in dropped}
+    return replace(case, prior=kept), [Remark("prior-fixed", text, tuple(dropped))]
+
+
+def untrainable_effects(case: Case) -> dict[str, tuple[str, ...]]:
+    """Effects that need what a file for the board is not given, with the columns they need."""
+    return {
+        effect.name: tuple(COVARIATES[field] for field in effect.about.needs)
+        for effect in case.model.effects
+        if effect.about.needs
+    }
+
+
+def sensor_effects(case: Case) -> tuple[Effect, ...]:
+    """Effects whose cause is a sensor or the rig."""
+    return tuple(e for e in case.model.effects if e.about.kind in ("sensor", "rig"))
+
+
+def recipe_text(case: Case, driven: DrivenRange, rows: int, seed: int) -> str:
+    """A recipe: soils of the priors, sensors of the case, slips and loads of the log.
+
+    Errors of the model and tests of the soil are left out: neither is part of a simulation.
+    """
+    bias = {key: noise for key, noise in case.bias.items() if noise.constant or noise.share}
+    noise = {key: one for key, one in case.noise.items() if key in SENSOR_COLUMNS}
+    own = replace(case, noise=noise, bias=bias, discrepancy={}, soil_tests=(), rover=None)
+    top = f"rows = {rows}\nseed = {seed}\n\n"
+    return f"{top}{case_as_toml(own)}\n{driven.as_toml()}\n{RUNS}"
+
+
+def with_fitted_soil(case: Case, fitted: Mapping[str, float]) -> Case:
+    """The case with the values of a fit for the parameters that it has."""
+    known = case.parameters()
+    return case.with_values({path: v for path, v in fitted.items() if path in known})

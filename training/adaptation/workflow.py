@@ -1,0 +1,299 @@
+"""The whole adaptation: a gap, the hybrid model, a file trained on it, and its judgement."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from soilml.config.case import Case, read_case
+from soilml.config.write_case import case_as_toml
+from soilml.errors import InputError
+from soilml.gap import gap
+from soilml.gap.presentation import SUSPECTED_FILE, gap_files
+from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
+from soilml.io.atomic_files import create_folder, write_files
+from soilml.io.read_table import Rows, as_table
+from soilml.io.table import Table
+from soilml.io.text_tables import csv_text
+from soilml.onboard.estimator import Estimator
+from soilml.remarks import Remark
+from soilml.report.page import Provenance, json_text, page
+from training.adaptation.board_file import FileNames, make_file
+from training.adaptation.campaign import (
+    DrivenRange,
+    board_unknowns,
+    recipe_text,
+    sensor_effects,
+    split_runs,
+    untrainable_effects,
+    with_fitted_soil,
+    with_noise_of_log,
+)
+from training.adaptation.judgement import BoardCandidate, Judgement, judge
+from training.adaptation.page import adapt_page
+from training.adaptation.result import AdaptReport
+from training.adaptation.steps import ResumableSteps
+
+#: Statuses of a gap report with effects that the evidence supports.
+CLAIMED = ("named", "partly-named", "class", "form-open")
+#: Files of the folder, beside those of the two model files.
+RESULT_FILES = ("report.html", "adapt.json")
+ADAPTED, BEFORE = FileNames("adapted"), FileNames("before")
+ADAPTED_MODEL = "adapted.toml"
+SPLIT_FILES = ("campaign.csv", "kept_back.csv")
+GAP_FILES = tuple(
+    f"gap/{name}"
+    for name in ("report.html", "gap.json", "model.toml", "next_runs.csv", SUSPECTED_FILE)
+)
+ROWS = 40_000  # Synthetic rows of each file, by default
+
+Progress = Callable[[str, int, int], None]
+
+
+def adapt(
+    case: Case,
+    table: Rows,
+    folder: str | os.PathLike[str],
+    *,
+    suspected: bool = False,
+    against: str | os.PathLike[str] | None = None,
+    truth: Mapping[str, float] | None = None,
+    rows: int = ROWS,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress = lambda text, done, total: None,
+    model_name: str = "the model",
+    origin: Provenance | None = None,
+) -> AdaptReport:
+    """Find what a model lacks, train a file for the board with it, and judge it on runs kept back.
+
+    A quarter of the runs is kept back. The gap analysis of the others decides whether the model
+    changes. Where it does, two files are trained alike, on the model as it was and as it is now,
+    over soils of the priors and the slips and loads of the log. From the torque of the first rows
+    of a run that was kept back, each estimates the soil, and its model predicts torque, drawbar
+    pull and sinkage of the later rows. What a file does not estimate has the value of the fit to
+    the campaign, in both models.
+
+    A call that was interrupted, or is repeated, keeps the steps whose inputs are the same.
+
+    Parameters
+    ----------
+    case : Case
+        Model of one gear, with priors and, where the table has none, noise.
+    table : Table, data frame or mapping of columns
+        Rows of four runs or more, as for `gap`.
+    folder : path
+        Where all files are written; it is created.
+    suspected : bool
+        Whether the first suspect is added where the evidence names no effect.
+    against : path, optional
+        A model file for this wheel, or a released one by name, in the place of one trained on the
+        model as it was.
+    truth : mapping, optional
+        True soil parameters by name, SI, where they are known; estimates are compared with them.
+        Columns of the table such as `cohesion_Pa` count as well.
+    rows : int
+        Synthetic rows that each file is trained on.
+    seed : int
+        Of the runs that are kept back, the rows and the training.
+    workers : int, optional
+        Processes; one for each core by default.
+    progress : callable, optional
+        Called with the name of a stage, the steps done and the total number of steps.
+    model_name, origin
+        Name of the model file, and the command, for the reports.
+
+    Returns
+    -------
+    AdaptReport
+        Its status is `not-supported` where the analysis supports no change.
+
+    Raises
+    ------
+    InputError
+        For fewer than four runs, several gears, no row with slip above 0, noise of torque that is
+        not known, no prior of cohesion, friction angle and shear modulus, or a recipe whose rows
+        have no equilibrium.
+    TableError
+        For columns that contradict the case.
+
+    Examples
+    --------
+    >>> from soilml import adapt, read_case, read_table
+    >>> report = adapt(
+    ...     read_case("model.toml"), read_table("runs.csv"), "adapted"
+    ... )  # doctest: +SKIP
+    >>> print(report.sentence)  # doctest: +SKIP
+    The adapted file predicts kept-back runs with 0.31 of the error of the old one.
+    """
+    table = as_table(table)
+    if case.gears:
+        raise InputError(
+            f"the model has several gears ({', '.join(case.gears)}), and a file for the board is "
+            "for one: give a model with [gear], and the rows of that gear"
+        )
+    table = table.rows(table.answered)
+    split, driven = split_runs(table, seed), DrivenRange.of(table)
+    old = board_unknowns(with_noise_of_log(case, table))[0]
+    earlier = _check_earlier(against, case, model_name)
+    target = Path(folder)
+    with create_folder(target), create_folder(target / "gap"):
+        texts = (csv_text(split.campaign.columns), csv_text(split.kept_back.columns))
+        write_files(dict(zip((target / name for name in SPLIT_FILES), texts, strict=True)))
+        steps = ResumableSteps(target)
+        steps.run(
+            "gap",
+            [case_as_toml(case), texts[0], str(seed)],
+            GAP_FILES,
+            lambda: _analyse(case, split.campaign, target, seed, progress, model_name, origin),
+        )
+        found = _read_gap(target / "gap", case, suspected)
+        if found.refusal is not None:
+            report = found.report(split.runs, None, (), rows, seed)
+            return _finish(report, target, origin)
+        new, remarks = board_unknowns(with_noise_of_log(found.case, table))
+        own = [f"With {' + '.join(found.effects)}. {found.sentence}"]
+        write_files({target / ADAPTED_MODEL: case_as_toml(found.case, own)})
+        make = partial(make_file, steps, seed=seed, workers=workers, progress=progress)
+        file = make(ADAPTED, recipe_text(new, driven, rows, seed), as_c=True)
+        if earlier is None:
+            before = make(BEFORE, recipe_text(old, driven, rows, seed))
+            earlier = with_sensors_of(Estimator.load(before), old)
+        progress("judging", 0, 1)
+        judgement = judge(
+            split.kept_back,
+            BoardCandidate(earlier, with_fitted_soil(old, found.soil_before)),
+            BoardCandidate(with_sensors_of(Estimator.load(file), new), new),
+            truth,
+            seed=seed,
+        )
+        progress("judging", 1, 1)
+        report = found.report(split.runs, judgement, remarks, rows, seed)
+        return _finish(report, target, origin, with_before=against is None)
+
+
+@dataclass(frozen=True)
+class AnalysedCampaign:
+    """What the gap analysis of a campaign found, as its files state it.
+
+    `case` is the model to train on; `refusal` says why there is none. `soil_before` has the soil of
+    the fit without effects.
+    """
+
+    status: str
+    sentence: str
+    effects: tuple[str, ...]
+    case: Case
+    soil_before: dict[str, float]
+    refusal: Remark | None
+
+    def report(
+        self,
+        kept_back: tuple[str, ...],
+        judgement: Judgement | None,
+        remarks: tuple[Remark, ...] | list[Remark],
+        rows: int,
+        seed: int,
+    ) -> AdaptReport:
+        """The result of the adaptation, whose files are not written yet."""
+        notes = list(remarks) + ([self.refusal] if self.refusal else [])
+        if judgement is None:
+            status = "not-supported"
+        else:
+            status = "adapted" if judgement.ratio < 1.0 else "not-better"
+            notes += _sensor_remark(self.case)
+        return AdaptReport(
+            status, self.status, self.sentence, self.effects if judgement else (), kept_back,
+            judgement, (), tuple(notes), rows, seed,
+        )  # fmt: skip
+
+
+def _check_earlier(
+    against: str | os.PathLike[str] | None, case: Case, model_name: str
+) -> Estimator | None:
+    """The file to compare with, for the case; `InputError` where it is of another wheel."""
+    if against is None:
+        return None
+    given, _ = estimators_for_case([Estimator.load(against)], case, model_name, pooled=True)
+    return given[0]
+
+
+def _analyse(
+    case: Case,
+    campaign: Table,
+    folder: Path,
+    seed: int,
+    progress: Progress,
+    model_name: str,
+    origin: Provenance | None,
+) -> None:
+    """Analyse the campaign and write the files of the gap."""
+    stage = "analysing the gap"
+    progress(stage, 0, 100)
+    report = gap(
+        case, campaign, seed=seed, progress=lambda share: progress(stage, round(100 * share), 100)
+    )
+    progress(stage, 100, 100)
+    texts = gap_files(report, model_name, SPLIT_FILES[0], origin)
+    write_files({folder / "gap" / name: text for name, text in texts.items()})
+
+
+def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
+    """The gap of a campaign from its files, and whether it supports a change."""
+    content = json.loads((folder / "gap.json").read_text(encoding="utf-8"))
+    status = content["status"]
+    name = SUSPECTED_FILE if suspected and (folder / SUSPECTED_FILE).exists() else "model.toml"
+    found = read_case(folder / name, with_bias=True)
+    known = {effect.name for effect in case.model.effects}
+    effects = tuple(e.name for e in found.model.effects if e.name not in known)
+    refusal = None
+    if not (status in CLAIMED or (status == "suspected" and suspected)) or not effects:
+        text = f"the gap analysis ends with {status}, which supports no change of the model"
+        refusal = Remark(f"gap-{status}", text, severity="note")
+    elif needed := untrainable_effects(found):
+        parts = [f"{effect} needs {', '.join(columns)}" for effect, columns in needed.items()]
+        text = f"{'; '.join(parts)}, which a file for the board is not given: none can be trained"
+        refusal = Remark("effect-not-trainable", text, tuple(needed))
+    soil = {name: float(entry["value"]) for name, entry in content["soil_before"].items()}
+    return AnalysedCampaign(status, content["sentence"], effects, found, soil, refusal)
+
+
+def _sensor_remark(case: Case) -> list[Remark]:
+    """A remark where what was added is an error of a sensor or of the rig."""
+    names = tuple(effect.name for effect in sensor_effects(case))
+    if not names:
+        return []
+    text = (
+        f"{', '.join(names)}: an error of a sensor or of the rig; the adapted file is for readings "
+        "of the same one alone"
+    )
+    return [Remark("sensor-error-trained", text, names)]
+
+
+def _finish(
+    report: AdaptReport, folder: Path, origin: Provenance | None, with_before: bool = False
+) -> AdaptReport:
+    """Write page and JSON; files that an earlier call left, and this result lacks, are removed."""
+    made: tuple[str, ...] = ()
+    adapted = (*ADAPTED.model, *ADAPTED.code, ADAPTED_MODEL, ADAPTED.recipe, ADAPTED.rows)
+    before = (*BEFORE.model, BEFORE.recipe, BEFORE.rows)
+    if report.judgement is not None:
+        made = (*adapted, *(before if with_before else ()))
+    report = replace(report, files=(*made, *SPLIT_FILES, *GAP_FILES[:4]))
+    if origin is None:
+        origin = Provenance.of(["adapt"], [])
+    shown = adapt_page(report)
+    content = report.as_json() | {"report": shown.as_json(origin)}
+    stale = [name for name in (*adapted, *before) if name not in made]
+    write_files(
+        {
+            folder / RESULT_FILES[0]: page(shown, origin),
+            folder / RESULT_FILES[1]: json_text(content),
+        },
+        remove=[folder / name for name in stale],
+    )
+    return report

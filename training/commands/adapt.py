@@ -1,0 +1,132 @@
+"""`soilml adapt`: from a campaign to a file for the board that knows what the model lacked."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from soilml.cli.options import (
+    InputFile,
+    add_ignore_extra_option,
+    add_model_and_runs,
+    add_seed_option,
+    add_workers_option,
+    folder_outputs,
+    whole_number_from,
+)
+from soilml.errors import InputError
+
+HELP = "find what a model lacks, and train a file for the board with it"
+DESCRIPTION = """\
+Compare MODEL.toml with measured runs, add the effect that it lacks, train a
+file for the board on the model with it, and judge that file on runs that were
+kept back, beside one trained on the model as it was.
+
+  soilml adapt MODEL.toml RUNS.csv --out DIR
+  soilml adapt MODEL.toml RUNS.csv --out DIR --against exported/wheel.onnx
+
+A quarter of the runs is kept back (--seed). From the torque of their first rows
+each file estimates the soil, and its model predicts torque, drawbar pull and
+sinkage of the later rows. The verdict comes first: by how much the error falls,
+or why the old file stays.
+
+DIR receives report.html (start here), adapt.json, adapted.onnx with its card
+adapted.md, adapted.c and adapted.h, adapted.toml (the model with the effect),
+the recipes and rows of both files, before.onnx, campaign.csv and kept_back.csv,
+and the files of `soilml gap` in DIR/gap. The same command continues after an
+interruption: steps whose inputs are the same are kept.
+
+The exit status is 0 also where the analysis supports no change, which is a
+result, and 2 for bad input. --suspected adds the first suspect where the
+evidence names no effect. --soil TRUE.toml, with [soil], compares the estimates
+with a soil that is known; columns such as cohesion_Pa do the same for each run.
+"""
+LEAST_ROWS, MOST_ROWS = 2000, 10**9  # Synthetic rows of a file
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_model_and_runs(parser)
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder for all files")
+    parser.add_argument(
+        "--suspected",
+        action="store_true",
+        help="add the first suspect where the evidence names no effect",
+    )
+    parser.add_argument(
+        "--against",
+        type=InputFile,
+        metavar="FILE.onnx",
+        help="compare with this model file, and train none on the model as it was",
+    )
+    parser.add_argument(
+        "--soil", type=InputFile, metavar="TRUE.toml", help="file with the known soil in [soil]"
+    )
+    parser.add_argument(
+        "--rows",
+        type=whole_number_from(LEAST_ROWS, MOST_ROWS),
+        default=40_000,
+        metavar="N",
+        help="synthetic rows that each file is trained on (default: 40000)",
+    )
+    add_seed_option(parser)
+    add_workers_option(parser)
+    add_ignore_extra_option(parser)
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files of the result that the command writes, where their folder exists already."""
+    names = ("report.html", "adapt.json", "adapted.onnx", "adapted.md", "adapted.c", "adapted.h")
+    return folder_outputs("--out", args.out, (*names, "adapted.toml", "before.onnx", "before.md"))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Adapt, judge, and write all files."""
+    from soilml.optional_imports import need
+
+    for library in ("jinja2", "matplotlib", "training.adaptation"):
+        need(library, "adapt")
+    from soilml.cli.output import origin_of, show, tell
+    from soilml.cli.progress import stage_progress
+    from soilml.cli.tables import print_table_hints, read_long_table
+    from soilml.config.case import read_case
+    from soilml.io.read_table import RUNS
+    from training.adaptation import adapt
+    from training.adaptation.page import adapt_text
+
+    case = read_case(args.model, with_bias=True)
+    truth = None if args.soil is None else _known_soil(args.soil)
+    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    print_table_hints(table, case)
+    with stage_progress() as progress:
+        report = adapt(
+            case,
+            table,
+            args.out,
+            suspected=args.suspected,
+            against=args.against,
+            truth=truth,
+            rows=args.rows,
+            seed=args.seed,
+            workers=args.workers,
+            progress=progress,
+            model_name=str(args.model),
+            origin=origin_of(args),
+        )
+    show(adapt_text(report))
+    folder = Path(args.out)
+    tell(f"\n{', '.join(str(folder / name) for name in ('report.html', *report.files))}")
+    return 0
+
+
+def _known_soil(path: str) -> dict[str, float]:
+    """The soil of a file with [soil]; raises `InputError` where it has none."""
+    from soilml.config.model_settings import take_soil
+    from soilml.io.toml_settings import read_settings
+    from soilml.parameters import declared
+
+    settings = read_settings(path)
+    if "soil" not in settings:
+        raise InputError(f"{path}: [soil] is missing; needed is the known soil")
+    soil, _, _ = take_soil(settings.table("soil"))
+    return {name: float(getattr(soil, name)) for name in declared(type(soil))}
