@@ -13,6 +13,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.levels import is_one_load
+from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
 from soilml.parameters import unit_text
@@ -218,13 +219,6 @@ def with_warnings(
         text = f"{name} is not used: its noise is not declared in [noise]"
         remarks.append(Remark("unused-channel", text, (name,)))
     return replace(fit, warnings=(*fit.warnings, *remarks))
-
-
-def excess_residuals_remark(factor: float, case: Case, consequence: str) -> Remark:
-    """That residuals are `factor` times the declared noise, and what follows."""
-    allowed = f"the declared noise{' and discrepancy' if case.discrepancy else ''}"
-    text = f"residuals are {factor:.1f} times {allowed}: the model lacks an effect or the noise is "
-    return Remark("excess-residuals", f"{text}understated; {consequence}")
 
 
 def _identifiability(name: str, fraction: float, one_load: bool) -> list[Remark]:

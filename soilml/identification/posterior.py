@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import SoilTestTerms, Solution
+from soilml.fitting.misfit import declared_misfit, misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.posterior_density import PosteriorDensity, joint_sample, most_probable
@@ -20,7 +21,6 @@ from soilml.numerics.importance_sampling import (
     ImportanceSample,
     importance_sample,
 )
-from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 from soilml.numerics.surface_sampling import surface_sample
 from soilml.quantities import column
@@ -31,7 +31,6 @@ INTERVAL = np.asarray([0.05, 0.95])
 #: Effective sample size below which mean and spread of the samples are not reported: their errors
 #: then exceed 1 / sqrt(50) = 14 % of the standard deviation.
 LEAST_USABLE_SIZE = 50.0
-Z_999 = 3.09  # Normal quantile of 0.999
 #: Readings from which on polynomials take the place of the model: few readings may leave a region
 #: with edges, and need few evaluations.
 FEWEST_READINGS = 8
@@ -160,6 +159,9 @@ def posterior_samples(
         if misfit <= limit:
             return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
         start = sample if misfit < SIMILAR_NOISE**2 else None
+    # the samples come near the optimum only: what is stated is the misfit there, as everywhere
+    if (at_optimum := declared_misfit(case, readings, free)) and at_optimum.exceeds_noise:
+        misfit = min(misfit, at_optimum.per_freedom)
     noise_scale = float(np.sqrt(misfit))
     sample = _sampled(PosteriorDensity(case, readings, free, noise_scale), start, optimum)
     return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
@@ -248,14 +250,6 @@ def _sampling_warnings(sample: ImportanceSample) -> tuple[Remark, ...]:
         return ()
     text = f"the effective sample size is {size:.0f} only: sampling error of the values is about "
     return (Remark("few-samples", f"{text}{100 / np.sqrt(size):.0f} % of their std"),)
-
-
-def misfit_limit(freedom: int) -> float:
-    """Misfit per degree of freedom that noise alone exceeds with a probability of 0.001.
-
-    The 0.999 quantile of chi-squared over its degrees of freedom; infinite without any.
-    """
-    return chi_squared_quantile(freedom, Z_999) / freedom if freedom >= 1 else np.inf
 
 
 def prior_fractions(

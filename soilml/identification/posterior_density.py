@@ -24,7 +24,7 @@ from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
-from soilml.identification.nonlinear import WeightedRows
+from soilml.fitting.weighted_rows import WeightedRows
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample

@@ -20,11 +20,12 @@ from soilml.config.compatibility import (
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.covariance import ignored_discrepancy
+from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import usual_errors
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.condensing import condensed
-from soilml.identification.fit import excess_residuals_remark, ignored_soil_tests
+from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
 from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table

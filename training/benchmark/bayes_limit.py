@@ -15,10 +15,10 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.misfit import misfit_limit
 from soilml.fitting.predictions import predict_channels
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.posterior import misfit_limit
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.resampling import systematic_resampling

@@ -10,9 +10,10 @@ from soilml import identify, read_case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, rates_at, select_free, values_at
+from soilml.fitting.misfit import misfit_limit
 from soilml.identification.fit import Fit, at_prior_bound, with_warnings
 from soilml.identification.linear import with_fixed_parameter
-from soilml.identification.posterior import _misfit, _sampling_warnings, misfit_limit
+from soilml.identification.posterior import _misfit, _sampling_warnings
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.numerics.prior import Prior
