@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from soilml.io.text_tables import csv_text, format_table
+from soilml.remarks import texts
 from soilml.report.numbers import format_residual
 from soilml.report.page import Provenance, json_text
 from soilml.report.terminal import rounded, shown_unit, significant
@@ -31,7 +32,7 @@ def gap_files(
     if origin is None:
         origin = Provenance.of(["gap", model_name, runs_name], [])
     entry = {"report": summary(report, model_name, runs_name).as_json(origin)}
-    texts = {
+    content = {
         "report.html": page(report, model_name, runs_name, origin),
         "gap.json": json_text(report.as_json() | entry),
         "model.toml": case_as_toml(report.model, [report.sentence]),
@@ -40,8 +41,8 @@ def gap_files(
     if report.suspected_model is not None:
         first = " + ".join(report.best_unclaimed)
         heading = f"With {first}, which is suspected, not named. {report.sentence}"
-        texts[SUSPECTED_FILE] = case_as_toml(report.suspected_model, [heading])
-    return texts
+        content[SUSPECTED_FILE] = case_as_toml(report.suspected_model, [heading])
+    return content
 
 
 def _next_runs(report: GapReport) -> dict[str, list[Any]]:
@@ -63,7 +64,11 @@ def _next_runs(report: GapReport) -> dict[str, list[Any]]:
 def gap_text(report: GapReport) -> str:
     """The verdict and its tables, for the terminal."""
     tables = (_gap_table, _effect_table, _suspect_table, _discrepancy_table)
-    parts = [f"{report.status}: {report.sentence}", *(table(report) for table in tables)]
+    head = "\n".join([f"{report.status}: {report.sentence}", *texts(report.lines)])
+    reasons = "\n".join(
+        f"- {reason}" for reason in report.reasons if reason.text != report.sentence
+    )
+    parts = [head, reasons, *(table(report) for table in tables)]
     if report.next_runs:
         best = report.next_runs[0]
         apart = (

@@ -26,10 +26,17 @@ from soilml.gap.checks import (
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
 from soilml.gap.evidence.holdout_split import HoldoutSplit, split_holdout
-from soilml.gap.report.results import GapReport
-from soilml.gap.report.sentences import unsupported_conclusions, verdict_sentence
+from soilml.gap.evidence.order_trend import order_trends
+from soilml.gap.report.results import GapReport, NoiseAgreement
+from soilml.gap.report.sentences import headline, report_lines, unsupported_conclusions
 from soilml.gap.search.analysis import Analysis, analyse
 from soilml.gap.search.prediction import predictive_gains
+from soilml.gap.verdict.agreement import (
+    hidden_effect,
+    misfit_remarks,
+    noise_agreement,
+    trend_remarks,
+)
 from soilml.gap.verdict.decision import (
     NOTHING_IS_BETTER,
     Decision,
@@ -79,7 +86,7 @@ from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.operating_point import FROM_ORDER
 from soilml.quantities import CHANNELS, column
-from soilml.remarks import Remark, texts
+from soilml.remarks import Remark
 
 #: Readings that an analysis may have. Its matrices are of this size squared, and many are held at
 #: a time: 1.1 GB in all.
@@ -203,12 +210,11 @@ def gap(
         held_out = held_out.subset(np.isfinite(held_out.std))
     gains = predictive_gains(analysis.predictions)
     analysis = replace(analysis, result=with_refused_outside(analysis.result, gains))
-    report = _build_report(case, analysis, checks, split, held_out, seed=seed)
-    report = replace(
-        report,
-        next_runs=tuple(rank_by_cost(report.next_runs, known_costs)),
-        sentence=verdict_sentence(report, effect_names(case)),
-    )
+    agreement = noise_agreement(case, readings, soil, analysis)
+    report = _build_report(case, analysis, checks, split, held_out, agreement, seed=seed)
+    report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
+    lines = report_lines(report, effect_names(case))
+    report = replace(report, sentence=headline(report), lines=lines)
     fixed = fixed_parameters(case, soil)
     conclusions = unsupported_conclusions(report, checks.naming_obstacles, fixed)
     return replace(report, not_claimed=tuple(conclusions))
@@ -218,8 +224,8 @@ def _bad_data_report(
     case: Case, errors: Sequence[Remark], notes: tuple[Remark, ...], seed: int
 ) -> GapReport:
     """The report on data that cannot be analysed."""
-    sentence = "; ".join(texts(errors))
-    return GapReport("bad-data", sentence, case, reasons=tuple(errors), notes=notes, seed=seed)
+    report = GapReport("bad-data", "", case, reasons=tuple(errors), notes=notes, seed=seed)
+    return replace(report, sentence=headline(report), lines=report_lines(report))
 
 
 def _build_report(
@@ -228,6 +234,7 @@ def _build_report(
     checks: DataCheckResult,
     split: HoldoutSplit,
     held_out: Readings | None,
+    agreement: NoiseAgreement | None,
     *,
     seed: int,
 ) -> GapReport:
@@ -237,7 +244,11 @@ def _build_report(
     if analysis.opened is not None:
         obstacles = (analysis.opened, *obstacles)
     smooth_gap = result.has_gap and not is_left_open(result)
-    conflicts = [] if smooth_gap else disagreements(problem, result.soil)
+    trends = order_trends(problem, result.soil, seed)
+    drift, conflicts = trend_remarks(trends), []
+    if not smooth_gap:
+        conflicts = [*drift, *misfit_remarks(agreement, case, analysis)]
+        conflicts += disagreements(problem, result.soil)
     if result.has_gap and not (smooth_gap or conflicts):
         conflicts = [NOTHING_IS_BETTER]
     decision = decide(problem, result, obstacles, conflicts)
@@ -282,8 +293,12 @@ def _build_report(
             *checks.notes,
             *analysis_notes(analysis, written.fit, shown.fit, replicates),
             *not_reduced,
+            *(drift if smooth_gap else ()),
+            *(hidden_effect(problem, result) if decision.status == "no-gap" else ()),
         ),
         variance_components=variance_component_entries(analysis),
+        misfit=agreement,
+        trends=tuple(trends),
         p_gap=result.soil_test.p_value,
         p_residual=result.final_test.p_value,
         seed=seed,

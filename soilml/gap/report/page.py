@@ -67,18 +67,22 @@ def summary(report: GapReport, model_name: str, runs_name: str) -> Report:
             ),
             ("σ, ±", "one standard deviation."),
         ]
-    sentence = report.sentence.replace(" -> ", " → ")
     return Report(
         kind="gap",
         title=f"Gap report: {model_name} against {runs_name}",
         badge=report.status,
         meaning=STATUSES.get(report.status, ""),
-        answer=[f"No analysis: {sentence}" if report.status == "bad-data" else sentence],
+        answer=said(report),
         tone=report.status,
         warnings=report.notes,
         next_steps=[text] if (text := advice(report)) else [],
         notation=notation,
     )
+
+
+def said(report: GapReport) -> list[str]:
+    """The headline and the lines below it, as pages show them."""
+    return [text.replace(" -> ", " → ") for text in (report.sentence, *texts(report.lines))]
 
 
 def _content(report: GapReport) -> dict[str, Any]:
@@ -89,7 +93,7 @@ def _content(report: GapReport) -> dict[str, Any]:
         "report": report,
         "finite": math.isfinite,
         "changed": changed,
-        "reasons": report.reasons or (report.sentence,),
+        "reasons": report.reasons,
         "shown_model": shown_model(report),
         "known": effect_descriptions(report),
         "bars": gap_bars(report, changed),
@@ -197,7 +201,7 @@ def suspect_table(report: GapReport) -> list[dict[str, Any]]:
         {
             "effects": s.effects,
             "log_odds": s.log_odds,
-            "probability": format_probability(1.0 / (1.0 + math.exp(-s.log_odds))),
+            "probability": format_probability(s.probability),
         }
         for s in report.suspects[:_LISTED]
     ]

@@ -33,7 +33,8 @@ _MARKER_PATHS = {
     "v": "M8 14l6 -11h-12z",
     "P": "M6 2h4v4h4v4h-4v4h-4v-4h-4v-4h4z",
 }
-MOST_RUNS = 6  # Most runs in a figure
+#: Most runs in a figure, and the least ratio of the load of one to that of the next.
+MOST_RUNS, LEAST_RATIO = 4, 1.05
 
 
 def prediction_curves(curves: ReadingsAndPredictions, changed: bool) -> dict[str, Any]:
@@ -77,11 +78,16 @@ def runs_at_one_load(curves: ReadingsAndPredictions) -> dict[tuple[str, float], 
 
 
 def select_runs(curves: ReadingsAndPredictions) -> list[ShownRun]:
-    """Runs spread over the measured loads, the lightest first; one per load where loads vary."""
+    """Runs spread over the measured loads, the lightest first.
+
+    Bands of runs at nearly one load would cover each other: the first of them stands for all. The
+    residuals are those of all runs.
+    """
     parts = runs_at_one_load(curves)
-    ordered = sorted((load, run) for run, load in parts)
-    by_load = {f"{load:.3g}": (load, run) for load, run in reversed(ordered)}
-    options = sorted(by_load.values()) if len(by_load) > 1 else ordered
+    options: list[tuple[float, str]] = []
+    for load, run in sorted((load, run) for run, load in parts):
+        if not options or load > LEAST_RATIO * options[-1][0]:
+            options.append((load, run))
     picked = np.unique(np.linspace(0, len(options) - 1, MOST_RUNS).round().astype(int))
     colours = np.linspace(0, len(LOAD_COLOURS) - 1, len(picked)).round().astype(int)
     shown = [options[i] for i in picked]

@@ -59,6 +59,11 @@ class Suspect:
     #: smooth remainder; None where no row was kept back for it
     predictive_gain: float | None = None
 
+    @property
+    def probability(self) -> float:
+        """The probability that belongs to the odds."""
+        return 1.0 / (1.0 + float(np.exp(-self.log_odds)))
+
 
 @dataclass(frozen=True)
 class RemainingDiscrepancy:
@@ -115,6 +120,43 @@ class NextRun:
     #: operating points and predictions of each explanation
     rows: tuple[dict[str, float | str], ...] = field(metadata=ELSEWHERE)
     cost: float | None = None  # where costs are given, in their unit
+
+
+@dataclass(frozen=True)
+class NoiseAgreement:
+    """Mean squared residuals of the soil alone, per degree of freedom, in variances of the noise.
+
+    `declared` is that of all readings under the declared noise, as `identify` states it;
+    `exceeds_noise` whether noise alone would exceed it with a probability below 0.001. `granted` is
+    that under noise, and scatter of the soil from run to run by these standard deviations.
+    """
+
+    declared: float
+    exceeds_noise: bool
+    granted: float
+    friction_angle_std: float  # rad
+    bearing_std: float  # relative
+
+    @property
+    def grants_scatter(self) -> bool:
+        """Whether the soil may differ from run to run."""
+        return self.friction_angle_std > 0.0 or self.bearing_std > 0.0
+
+
+@dataclass(frozen=True)
+class SoilTrend:
+    """A trend of the soil along the order of the runs, or of the rows of each run.
+
+    `z` is its score in standard deviations, positive where the soil becomes stronger, `p` its
+    family-wise p value among all scores of the soil alone, `change` that of the parameter from the
+    first run, or row, to the last: rad, or relative.
+    """
+
+    order: str  # runs or rows
+    parameter: str
+    z: float
+    p: float
+    change: float
 
 
 @dataclass(frozen=True)
@@ -199,7 +241,9 @@ class GapReport:
     status : str
         One of `STATUSES`.
     sentence : str
-        The verdict in one sentence.
+        The verdict in at most 25 words, without names of runs.
+    lines : tuple of Remark
+        At most five sentences below it: what was tried, what is left and where, what to drive next.
     model : Case
         The fitted model; it contains an effect only where one is claimed.
     effects : tuple of NamedEffect
@@ -246,6 +290,10 @@ class GapReport:
         Estimated noise scales, run-to-run standard deviations and autocorrelation.
     residual_trend : dict of float
         Unexplained smooth trend by channel, in sigma.
+    misfit : NoiseAgreement, optional
+        Residuals of the soil alone under the declared noise, and with scatter.
+    trends : tuple of SoilTrend
+        Trends of the soil with the order of runs and rows, the most significant first.
     p_gap, p_residual : float
         Family-wise p values of the soil alone and of the best candidate.
     """
@@ -261,6 +309,7 @@ class GapReport:
     discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
     best_unclaimed: tuple[str, ...] = ()
     suspected_model: Case | None = field(default=None, metadata=ELSEWHERE)
+    lines: tuple[Remark, ...] = ()
     reasons: tuple[Remark, ...] = ()
     where: tuple[RegionScore, ...] = ()
     gap: dict[str, GapReduction] = field(default_factory=dict)
@@ -275,6 +324,8 @@ class GapReport:
     not_claimed: tuple[Remark, ...] = ()
     variance_components: dict[str, float] = field(default_factory=dict)
     residual_trend: dict[str, float] = field(default_factory=dict)
+    misfit: NoiseAgreement | None = None
+    trends: tuple[SoilTrend, ...] = ()
     p_gap: float = 1.0
     p_residual: float = 1.0
     seed: int = 0

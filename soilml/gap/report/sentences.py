@@ -1,4 +1,8 @@
-"""The verdict of a gap report in words, and the conclusions that it does not support."""
+"""The verdict of a gap report in words, and the conclusions that it does not support.
+
+The headline and the lines below it are what all outputs say: terminal, page, JSON and live page.
+They name no runs; those stand in the reasons, the notes and the tables.
+"""
 
 from __future__ import annotations
 
@@ -6,97 +10,191 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from soilml.gap.report.results import GapReduction, GapReport, RemainingDiscrepancy
-from soilml.remarks import Remark, texts
-from soilml.report.numbers import decimal, format_residual
+from soilml.fitting.misfit import excess_residuals
+from soilml.gap.report.results import GapReport, NoiseAgreement, RemainingDiscrepancy
+from soilml.remarks import Remark
+from soilml.report.numbers import decimal, format_probability, format_residual
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
-LISTED_SUSPECTS = 3  # Suspects that the sentence lists
+#: Words of a headline, lines below it, and words of a reason that stands in either, at most.
+HEADLINE_WORDS, MOST_LINES, REASON_WORDS = 25, 5, 12
+LISTED_SUSPECTS = 3  # Suspects that a line lists
 #: Logarithm of odds below which they are called even, and the largest odds that are stated.
 EVEN_ODDS, MOST_ODDS = 0.1, 10_000
-NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which the sentence states it
+NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
+
+#: Reasons in a few words, by their codes; the report lists them in full.
+_IN_SHORT = {
+    "noise-scaled": "readings scatter more than their noise",
+    "runs-differ": "runs differ like different soils",
+    "repeats-disagree": "repeats differ by more than their noise",
+    "region-not-predicted": "one region is not predicted by the other rows",
+    "soil-test": "rows and tests of the soil disagree",
+    "excess-residuals": "residuals exceed the declared noise",
+    "nothing-is-better": "no effect or smooth discrepancy is better",
+    "not-decisive": "the evidence is not decisive",
+    "implausible-fault": "a sensor's fault would be implausibly large",
+    "not-predictive": "the best fit does not predict rows kept back",
+    "other-law": "the law differs from the catalogue's",
+    "not-catalogued": "a large discrepancy is left beside it",
+    "prior-opened": "a fit pressed against its prior",
+    "one-run": "there is one run only",
+    "one-load": "there is one load only",
+    "few-slips": "there are too few slips",
+}
 
 
-def verdict_sentence(report: GapReport, model_effects: Sequence[str]) -> str:
-    """The verdict in words.
+def headline(report: GapReport) -> str:
+    """The verdict in at most `HEADLINE_WORDS` words.
+
+    It says whether there is a gap, the first effect, by how much the gap shrinks, and how sure that
+    is.
+    """
+    match report.status:
+        case "bad-data":
+            return _faults(report)
+        case "no-gap":
+            return _no_gap(report)
+        case "undecided":
+            why = _short(report.reasons[:1])
+            return f"No smooth gap was found, but the measurements disagree: {why}."
+        case "not-testable":
+            why = _short(report.reasons[:1])
+            return f"There is a gap, but these runs cannot identify its cause: {why}."
+        case "unknown":
+            return (
+                "There is a gap, and no effect of the catalogue explains it "
+                f"(mean squared residual {_before(report)}; noise alone gives 1)."
+            )
+        case "suspected":
+            first = report.suspects[0] if report.suspects else None
+            names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
+            sure = f" (probability {format_probability(first.probability)})" if first else ""
+            return f"A gap of uncertain cause: first suspect is {names}{sure}{_shrinks(report)}."
+    names = " + ".join(e.name for e in report.effects)
+    sure = _sure(report)
+    if report.status == "class":
+        rest = f", the likeliest of {len(report.cause_set)} explanations{sure}"
+        return f"The cause may be {names}{rest}{_shrinks(report)}."
+    if report.status == "partly-named":
+        return f"{names} explains a part of the gap{sure}{_shrinks(report)}."
+    law = ", by another law than the catalogue's" if report.status == "form-open" else ""
+    return f"{names} explains the gap{law}{sure}{_shrinks(report)}."
+
+
+def _faults(report: GapReport) -> str:
+    """The first fault, if it can be said shortly, and how many there are."""
+    count = len(report.reasons)
+    text = report.reasons[0].text + (f"; {count - 1} more" if count > 1 else "")
+    if len(text.split()) <= HEADLINE_WORDS:
+        return text
+    return f"{count} fault{'s' if count > 1 else ''} in the data or the model file."
+
+
+def _no_gap(report: GapReport) -> str:
+    declared = " and the declared discrepancy" if report.model.discrepancy else ""
+    beside = " and declared discrepancy" if report.model.discrepancy else ""
+    p = f"p = {decimal(report.p_gap, 2)}."
+    if report.misfit is None or not report.misfit.grants_scatter:
+        residual = format_residual(report.gap["train"].before, 2)
+        return (
+            f"Model and measurements agree within the noise{declared}: mean squared residual "
+            f"{residual}, {p}"
+        )
+    return f"No gap beyond noise{beside}, granting the soil {_scatter(report.misfit)}: {p}"
+
+
+def _scatter(found: NoiseAgreement) -> str:
+    """The scatter that the soil is granted, with its size."""
+    angle = math.degrees(found.friction_angle_std)
+    parts = [f"{decimal(angle, 2)} deg"] if angle > 0.0 else []
+    parts += [f"{100.0 * found.bearing_std:.2g} %"] if found.bearing_std > 0.0 else []
+    return f"a scatter of {' and '.join(parts)} from run to run"
+
+
+def _sure(report: GapReport) -> str:
+    chance = min((e.probability for e in report.effects), default=math.nan)
+    return f" (probability {format_probability(chance)})" if math.isfinite(chance) else ""
+
+
+def _before(report: GapReport) -> str:
+    return format_residual(report.gap["train"].before) if "train" in report.gap else "unknown"
+
+
+def _shrinks(report: GapReport) -> str:
+    """By how much the gap shrinks, as the end of a sentence."""
+    if "train" not in report.gap:
+        return ""
+    before, after = report.gap["train"].before, report.gap["train"].after
+    return f"; the gap shrinks {format_residual(before)} -> {format_residual(after)}"
+
+
+def _short(reasons: Sequence[Remark]) -> str:
+    """Reasons in a few words each."""
+    found = []
+    for reason in reasons:
+        text = _IN_SHORT.get(reason.code, reason.text)
+        found.append(text if len(text.split()) <= REASON_WORDS else "see the reasons")
+    return "; ".join(dict.fromkeys(found))
+
+
+def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[Remark, ...]:
+    """At most `MOST_LINES` lines: what was tried, what is left and where, what to drive next.
 
     model_effects: Names of the effects that the model had before the analysis.
     """
-    names = " + ".join(
-        f"{e.name} (the model has it at another size)" if e.name in model_effects else e.name
-        for e in report.effects
-    )
-    reduction = _reduction(report.gap["train"])
-    match report.status:
-        case "no-gap":
-            declared = " and the declared discrepancy" if report.model.discrepancy else ""
-            return (
-                f"Model and measurements agree within the noise{declared}: mean squared residual "
-                f"{format_residual(report.gap['train'].before, 2)}, p = {decimal(report.p_gap, 2)}."
-            )
-        case "undecided":
-            return (
-                "No smooth disagreement between model and measurements was found, but the "
-                f"measurements are inconsistent: {'; '.join(texts(report.reasons))}."
-            )
-        case "not-testable":
-            why = "; ".join(texts(report.reasons))
-            return f"There is a gap, but these runs cannot identify its cause: {why}."
-        case "suspected":
-            return _suspected(report)
-        case "unknown" if report.reasons:
-            best = " + ".join(report.best_unclaimed)
-            return (
-                f"There is a gap, and no cause is named: {best} fits best, but "
-                f"{'; '.join(texts(report.reasons))}. {_remainder(report)}"
-            ).strip()
-        case "unknown":
-            return (
-                "There is a gap, and no effect of the catalogue explains it better than a smooth "
-                f"discrepancy of unknown cause does. {_remainder(report)}"
-            ).strip()
-        case "class":
-            sets = ", or ".join(" + ".join(names) for names in report.cause_set)
-            return (
-                f"Each of these may explain the gap, the likeliest first: {sets}. With the first, "
-                f"{reduction}. These runs cannot distinguish them. {_remainder(report)}"
-            ).strip()
-        case "partly-named":
-            return f"The evidence supports {names}: {reduction}. {_remainder(report)}".strip()
-        case "form-open":
-            return (
-                f"The gap is explained by {names}, with a law that differs from the catalogue's: "
-                f"{reduction}."
-            )
-    return (
-        f"The gap is explained by {names}: {reduction}. No other effect of the catalogue "
-        "explains it."
-    )
+    if report.status == "bad-data":
+        return ()
+    lines = [_tried(report, model_effects)]
+    if report.status in ("suspected", "unknown", "not-testable", "undecided"):
+        why = report.reasons or ((NOT_DECISIVE,) if report.status == "suspected" else ())
+        lines += [Remark("why", f"Why no cause is named: {_short(why)}.")] if why else []
+    if report.status in ("suspected", "class") and (listed := _listed(report)):
+        lines.append(Remark("suspects", listed))
+    if left := _remainder(report):
+        lines.append(Remark("left", left))
+    lines += [
+        Remark(note.code, f"{note.text[:1].upper()}{note.text[1:]}.", note.about, note.severity)
+        for note in report.notes
+        if note.code in ("hidden-effect", "outliers-matter")
+    ]
+    if report.next_runs:
+        best = report.next_runs[0]
+        sigma = "10 or more" if best.discrimination >= 10.0 else decimal(best.discrimination, 2)
+        lines.append(Remark("next", f"Next: {best.kind}, which separates by {sigma} sigma."))
+    return tuple(lines[: MOST_LINES - 1] + lines[MOST_LINES - 1 :][-1:])
 
 
-def _reduction(figures: GapReduction) -> str:
-    """The gap before and after, and why it grows where it does."""
-    before, after = format_residual(figures.before), format_residual(figures.after)
-    grows = "; it grows because the fit leaves a smooth discrepancy, which is not subtracted"
-    return (
-        f"mean squared residual {before} -> {after} "
-        f"(noise alone gives 1{grows if figures.after > figures.before else ''})"
-    )
+def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
+    """What was tried, and how large the residuals are under the declared noise and with scatter."""
+    parts = []
+    if found := report.misfit:
+        text = f"{excess_residuals(math.sqrt(found.declared), report.model)} by the soil alone"
+        if found.grants_scatter:
+            text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
+        parts.append(text)
+    count = len(report.candidates)
+    if count:
+        parts.append(f"{count} explanation{'s were' if count > 1 else ' was'} fitted")
+    if report.untestable:
+        parts.append(f"{len(report.untestable)} effects cannot be tested by these runs")
+    parts += [
+        f"the model has {e.name} at another size" for e in report.effects if e.name in model_effects
+    ]
+    text = "; ".join(parts) or "the soil alone was fitted"
+    return Remark("tried", f"{text[:1].upper()}{text[1:]}.")
 
 
-def _suspected(report: GapReport) -> str:
-    """The ranked suspects with their odds, and why none of them is named."""
+def _listed(report: GapReport) -> str:
+    """The explanations that remain, the likeliest first; suspects with their odds."""
+    if report.status == "class":
+        sets = ", or ".join(" + ".join(names) for names in report.cause_set)
+        return f"These runs cannot distinguish, the likeliest first: {sets}."
     listed = "; ".join(
         f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in report.suspects[:LISTED_SUSPECTS]
     )
-    why = "; ".join(texts(report.reasons or (NOT_DECISIVE,)))
-    first = " + ".join(report.best_unclaimed or report.suspects[0].effects)
-    return (
-        f"There is a gap, and its cause is not named: {why}. Suspects, the likeliest first, with "
-        f"their odds within the catalogue: {listed}. With {first}, "
-        f"{_reduction(report.gap['train'])}."
-    )
+    return f"Suspects, the likeliest first, within the catalogue: {listed}." if listed else ""
 
 
 def _odds(log_odds: float) -> str:
@@ -111,13 +209,14 @@ def _odds(log_odds: float) -> str:
 
 
 def _remainder(report: GapReport) -> str:
-    """The remaining discrepancy of each channel, in the reading's unit and in sigma."""
-    parts = [
-        f"{_size(name, d)} ({decimal(d.after_sigma, 2)} sigma)"
-        for name, d in report.discrepancy.items()
-        if d.after_sigma >= NOTABLE_DISCREPANCY
-    ]
-    return f"A smooth discrepancy is left, root mean square: {', '.join(parts)}." if parts else ""
+    """The remaining discrepancy of each channel, in the reading's unit and in sigma, and where."""
+    left = {n: d for n, d in report.discrepancy.items() if d.after_sigma >= NOTABLE_DISCREPANCY}
+    if not left:
+        return ""
+    parts = [f"{_size(n, d)} ({decimal(d.after_sigma, 2)} sigma)" for n, d in left.items()]
+    worst = max(left.values(), key=lambda d: d.after_sigma).description
+    where = f"; {worst}" if worst else ""
+    return f"A smooth discrepancy is left, root mean square: {', '.join(parts)}{where}."
 
 
 def _size(name: str, discrepancy: RemainingDiscrepancy) -> str:

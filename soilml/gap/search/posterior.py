@@ -41,9 +41,9 @@ class Posterior:
     refused: Mapping[Names, frozenset[str]] = field(default_factory=dict)
     unlisted: frozenset[Names] = frozenset()
 
-    def probability(self, effect: str) -> float:
-        """Probability that an effect is present, causes outside the catalogue included."""
-        inside = self._log_sum(lambda names: effect in self.refused.get(names, names))
+    def probability(self, *effects: str) -> float:
+        """Probability that these effects are present, causes outside the catalogue included."""
+        inside = self._log_sum(lambda names: set(effects) <= set(self.refused.get(names, names)))
         return IN_CATALOGUE * float(np.exp(inside))
 
     def weight(self, names: Names) -> float:

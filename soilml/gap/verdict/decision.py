@@ -12,7 +12,7 @@ from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.gap.search.explanation import Explanation
-from soilml.gap.search.posterior import Names, not_rejected
+from soilml.gap.search.posterior import Names, Posterior, not_rejected
 from soilml.gap.search.stepwise import SearchResult
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -100,7 +100,8 @@ def decide(
     listed = tuple(c for c in accepted if c.names not in result.posterior.unlisted)
     if _far_from_catalogue(best):
         text = OTHER_LAW.format(" + ".join(best.names))
-        return Decision("suspected", (), best, Remark("other-law", text, best.names))
+        shown = _first_suspect(result) or best
+        return Decision("suspected", (), shown, Remark("other-law", text, best.names))
     if left := _large_remainder(problem, result, best):
         shown = _first_suspect(result) or best
         text = NOT_CATALOGUED.format(" + ".join(best.names), left.replace("_", " "))
@@ -109,9 +110,10 @@ def decide(
         remark = Remark("not-catalogued", text, (*best.names, column(left)))
         return Decision("suspected", (), shown, remark)
     if len(listed) > 1:
-        return Decision("class", listed, best)
+        listed = by_probability(listed, result.posterior)
+        return Decision("class", listed, listed[0])
     if len(accepted) > 1:
-        return Decision("suspected", (), best, NOT_DECISIVE)
+        return Decision("suspected", (), _first_suspect(result) or best, NOT_DECISIVE)
     if not result.adequate:
         return Decision("partly-named", accepted, best)
     if best.shape_supported and law_matters(problem, best):
@@ -145,6 +147,13 @@ def _first_suspect(result: SearchResult) -> Explanation | None:
     fitted = {c.names: c for c in result.candidates}
     listed = (fitted[names] for names, _ in result.posterior.ranked() if names in fitted)
     return next(listed, result.likeliest_suspect)
+
+
+def by_probability(
+    candidates: Sequence[Explanation], posterior: Posterior
+) -> tuple[Explanation, ...]:
+    """Explanations in the order of the probability that their effects are present."""
+    return tuple(sorted(candidates, key=lambda c: -posterior.probability(*c.names)))
 
 
 def is_left_open(result: SearchResult) -> bool:
@@ -228,7 +237,8 @@ def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...]
     if decision.status == "suspected":
         unlisted = result.posterior.unlisted
         kept = [c for c in result.candidates if c.names not in unlisted]
-        return tuple(c.names for c in not_rejected(kept) if c.names)
+        found = by_probability(not_rejected(kept), result.posterior)
+        return tuple(c.names for c in found if c.names)
     return tuple(c.names for c in decision.claimed)
 
 

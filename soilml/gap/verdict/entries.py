@@ -111,10 +111,18 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
 
 
 def suspects(analysis: Analysis) -> list[Suspect]:
-    """Explanations with their odds against all others, the likeliest first."""
+    """Explanations with their odds against all others, the likeliest first.
+
+    None stands before the likeliest one that was fitted in full, whose figures are shown.
+    """
     ranked = analysis.result.posterior.ranked()
+    fitted = {c.names for c in analysis.result.candidates}
+    first = next((i for i, (names, _) in enumerate(ranked) if names in fitted), 0)
     gains = predictive_gains(analysis.predictions)
-    return [Suspect(names, odds, gains.get(names)) for names, odds in ranked[:LISTED_SUSPECTS]]
+    return [
+        Suspect(names, odds, gains.get(names))
+        for names, odds in ranked[first : first + LISTED_SUSPECTS]
+    ]
 
 
 def conditions_of_suspects(

@@ -12,6 +12,7 @@ from soilml.gap.report.page import (
     conditions_text,
     discrepancy_maps,
     effect_descriptions,
+    said,
     suspect_table,
 )
 from soilml.remarks import texts
@@ -44,7 +45,8 @@ def verdict(report: GapReport) -> dict[str, Any]:
     return {
         "status": report.status,
         "meaning": STATUSES.get(report.status, ""),
-        "sentence": report.sentence.replace(" -> ", " → "),
+        "sentence": said(report)[0],
+        "lines": said(report)[1:],
         "advice": advice(report),
         "reasons": texts(report.reasons),
         "causes": [[{"name": n, "text": known.get(n, "")} for n in names]

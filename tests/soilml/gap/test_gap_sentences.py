@@ -3,14 +3,21 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from gap_sets import case_of, remark
 from remarked import remarked
 
 from soilml.config.measurement_noise import Discrepancy
-from soilml.gap.report.results import GapReduction, GapReport, RemainingDiscrepancy, Suspect
-from soilml.gap.report.sentences import _odds, unsupported_conclusions, verdict_sentence
-from soilml.remarks import texts
+from soilml.gap.report.results import (
+    GapReduction,
+    GapReport,
+    NoiseAgreement,
+    RemainingDiscrepancy,
+    Suspect,
+)
+from soilml.gap.report.sentences import _odds, headline, report_lines, unsupported_conclusions
+from soilml.remarks import Remark, texts
 
 FIGURES = {"train": GapReduction(8.8, 1.1, {}, 96, "all rows fitted")}
 LEFT = {
@@ -29,12 +36,19 @@ def report(status, **parts):
     return GapReport(status, "", parts.pop("model", case_of()), **parts)
 
 
-def effect(name):
-    return SimpleNamespace(name=name)
+def effect(name, probability=0.912):
+    return SimpleNamespace(name=name, probability=probability)
 
 
-def said(status, present=(), **parts):
-    return verdict_sentence(report(status, **parts), present)
+def said(status, **parts):
+    return headline(report(status, **parts))
+
+
+def lines(status, present=(), **parts):
+    return {line.code: line.text for line in report_lines(report(status, **parts), present)}
+
+
+SCATTER = NoiseAgreement(2.89, True, 0.81, float(np.radians(0.6)), 0.06)
 
 
 def test_agreement_is_within_the_noise_and_what_was_declared():
@@ -44,33 +58,44 @@ def test_agreement_is_within_the_noise_and_what_was_declared():
     assert "within the noise and the declared discrepancy:" in said("no-gap", model=declared)
 
 
-def test_without_a_cause_the_reasons_are_stated():
-    reasons = (remark("one load only"), remark("runs differ"))
-    assert said("undecided", reasons=reasons).endswith("inconsistent: one load only; runs differ.")
-    assert said("not-testable", reasons=reasons).endswith("its cause: one load only; runs differ.")
-    unknown = said("unknown", reasons=reasons, best_unclaimed=("a", "b"), discrepancy=LEFT)
-    assert unknown == (
-        "There is a gap, and no cause is named: a + b fits best, but one load only; runs differ. "
-        + REMAINDER
+def test_granted_scatter_is_named_with_its_size():
+    granted = "a scatter of 0.60 deg and 6 % from run to run"
+    assert said("no-gap", misfit=SCATTER) == (
+        f"No gap beyond noise, granting the soil {granted}: p = 0.12."
     )
-    plain = said("unknown", discrepancy={"torque_Nm": LEFT["torque_Nm"]})
-    assert plain.endswith("discrepancy of unknown cause does.")
+    assert lines("no-gap", misfit=SCATTER)["tried"] == (
+        f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
+    )
+    none = replace(SCATTER, friction_angle_std=0.0, bearing_std=0.0)
+    assert "scatter" not in said("no-gap", misfit=none)
+    assert "scatter" not in lines("no-gap", misfit=none)["tried"]
+
+
+def test_without_a_cause_the_first_reason_is_stated():
+    reasons = (Remark("one-load", "all rows have the load 40 N in run_a"), remark("runs differ"))
+    assert said("undecided", reasons=reasons).endswith("disagree: there is one load only.")
+    assert said("not-testable", reasons=reasons).endswith("its cause: there is one load only.")
+    unknown = said("unknown", reasons=reasons, best_unclaimed=("a", "b"), discrepancy=LEFT)
+    assert "no effect of the catalogue explains it (mean squared residual 8.80" in unknown
+    found = lines("unknown", reasons=reasons, discrepancy=LEFT)
+    assert found["why"] == "Why no cause is named: there is one load only; runs differ."
+    assert found["left"] == REMAINDER
+    assert "left" not in lines("unknown", discrepancy={"torque_Nm": LEFT["torque_Nm"]})
 
 
 def test_suspects_have_their_odds_and_the_first_three_are_listed():
     odds = {"a": 3.0, "b": 0.0, "c": -1.0, "d": -2.0}
-    suspects = tuple(Suspect((name,), value) for name, value in odds.items())
-    sentence = said("suspected", suspects=suspects)
-    assert sentence == (
-        "There is a gap, and its cause is not named: the evidence is not decisive beside the "
-        "model's usual error. Suspects, the likeliest first, with their odds within the "
-        "catalogue: a (odds 20 to 1); b (even odds); c (odds 1 to 2.7). With a, mean squared "
-        "residual 8.80 -> 1.10 (noise alone gives 1)."
+    suspects = tuple(Suspect((n,), v) for n, v in odds.items())
+    assert said("suspected", suspects=suspects) == (
+        "A gap of uncertain cause: first suspect is a (probability 0.95); the gap shrinks "
+        "8.80 -> 1.10."
     )
-    other = said(
-        "suspected", suspects=suspects, best_unclaimed=("c", "d"), reasons=(remark("why"),)
+    found = lines("suspected", suspects=suspects)
+    assert found["suspects"] == (
+        "Suspects, the likeliest first, within the catalogue: a (odds 20 to 1); b (even odds); "
+        "c (odds 1 to 2.7)."
     )
-    assert "not named: why. " in other and "With c + d, mean" in other
+    assert found["why"].endswith("the evidence is not decisive.")
 
 
 @pytest.mark.parametrize(
@@ -90,23 +115,20 @@ def test_odds_in_words(log_odds, words):
 
 
 def test_explanations_by_what_is_claimed():
-    effects = (effect("dig"), effect("plough"))
-    known = "dig (the model has it at another size) + plough"
-    reduced = "mean squared residual 8.80 -> 1.10 (noise alone gives 1)"
-    parts = {"effects": effects, "discrepancy": LEFT}
-    assert said("named", ["dig"], **parts) == (
-        f"The gap is explained by {known}: {reduced}. No other effect of the catalogue explains it."
-    )
-    assert said("partly-named", ["dig"], **parts) == (
-        f"The evidence supports {known}: {reduced}. {REMAINDER}"
-    )
+    parts = {"effects": (effect("dig"), effect("plough", 0.95)), "discrepancy": LEFT}
+    shrinks = "(probability 0.91); the gap shrinks 8.80 -> 1.10."
+    assert said("named", **parts) == f"dig + plough explains the gap {shrinks}"
+    assert said("partly-named", **parts) == f"dig + plough explains a part of the gap {shrinks}"
     assert said("form-open", **parts) == (
-        "The gap is explained by dig + plough, with a law that differs from the catalogue's: "
-        f"{reduced}."
+        f"dig + plough explains the gap, by another law than the catalogue's {shrinks}"
     )
-    classes = said("class", cause_set=(("dig",), ("plough", "rate")), **parts)
-    assert "the likeliest first: dig, or plough + rate. With the first, " + reduced in classes
-    assert classes.endswith(f"cannot distinguish them. {REMAINDER}")
+    sets = (("dig",), ("plough", "rate"))
+    alone = {"effects": (effect("dig"),), "cause_set": sets}
+    assert said("class", **alone) == (
+        f"The cause may be dig, the likeliest of 2 explanations {shrinks}"
+    )
+    assert lines("class", **alone)["suspects"].endswith("first: dig, or plough + rate.")
+    assert lines("named", ["dig"], **parts)["tried"] == "The model has dig at another size."
 
 
 def concluded(status, obstacles=(), fixed=(), **parts):

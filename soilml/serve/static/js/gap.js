@@ -50,10 +50,11 @@ function show({ id, result }) {
 
 function verdict(result) {
   const causes = result.causes.map((names) => names.map((c) => c.name).join(" + ")).join(", or ");
-  const texts = result.status === "bad-data" ? result.reasons : [];
+  const texts = result.reasons.filter((reason) => reason !== result.sentence);
   return element("article", { class: "verdict" },
     element("p", {}, element("span", { class: "badge" }, result.status), result.meaning),
     element("p", { class: "sentence" }, result.sentence),
+    ...result.lines.map((line) => element("p", {}, line)),
     causes ? element("p", {}, element("b", {}, "Explanations: "), causes) : null,
     wordList(texts), element("p", {}, element("b", {}, "What to do: "), result.advice));
 }

@@ -1,0 +1,130 @@
+"""What speaks for and against agreement: misfit, granted scatter, trends, what may hide."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.misfit import declared_misfit, excess_residuals_remark
+from soilml.fitting.predictions import linearise
+from soilml.fitting.readings import Readings
+from soilml.gap.evidence.directions import effect_signatures
+from soilml.gap.evidence.order_trend import TREND_LEVEL
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.report.results import NoiseAgreement, SoilTrend
+from soilml.gap.search.analysis import Analysis
+from soilml.gap.search.stepwise import GAP_LEVEL, SearchResult
+from soilml.quantities import column
+from soilml.remarks import Remark
+from soilml.report.numbers import channel_name, decimal
+
+#: Sizes of effects, in usual ones, up to which they are plausible, and the normal quantile of the
+#: power with which the test finds them.
+PLAUSIBLE_SIZE, POWER_80 = 3.0, 0.84
+#: Changes of pull (N) and sinkage (m) below which they are not stated.
+NOTABLE_CHANGE = {"drawbar_pull": 0.01, "sinkage": 1e-5}
+
+
+def noise_agreement(
+    case: Case, readings: Readings, soil: Sequence[Coordinate], analysis: Analysis
+) -> NoiseAgreement | None:
+    """The misfit under the declared noise, as `identify` has it, and under noise and scatter.
+
+    readings: All readings, outliers included. None where no fit is possible.
+    """
+    start = None if analysis.opened is not None else analysis.result.soil.x
+    found = declared_misfit(case, readings, soil, start)
+    if found is None:
+        return None
+    problem, components = analysis.problem, analysis.problem.covariance.components
+    left = max(len(problem.readings) - len(problem.soil), 1)
+    return NoiseAgreement(
+        declared=found.per_freedom,
+        exceeds_noise=found.exceeds_noise,
+        granted=analysis.result.soil.cost / left,
+        friction_angle_std=components.friction_angle_std,
+        bearing_std=components.bearing_std,
+    )
+
+
+def misfit_remarks(found: NoiseAgreement | None, case: Case, analysis: Analysis) -> list[Remark]:
+    """Residuals beyond the declared noise that neither scatter nor outliers account for."""
+    if found is None or not found.exceeds_noise or found.grants_scatter or analysis.outliers:
+        return []
+    consequence = "no scatter from run to run accounts for them"
+    return [excess_residuals_remark(float(np.sqrt(found.declared)), case, consequence)]
+
+
+def trend_remarks(trends: Sequence[SoilTrend]) -> list[Remark]:
+    """That the soil may have changed, where residuals have a trend with the order."""
+    where = {"runs": "from run to run", "rows": "along the rows of a run"}
+    found = {}
+    for trend in trends:
+        if trend.p < TREND_LEVEL and trend.order not in found:
+            text = f"the residuals drift {where[trend.order]}: the soil may have changed"
+            found[trend.order] = Remark(f"drift-of-{trend.order}", text, (trend.parameter,))
+    return list(found.values())
+
+
+def hidden_effect(problem: FitProblem, result: SearchResult) -> list[Remark]:
+    """Of one channel: the effect that could hide in it and change the others most.
+
+    At the size that the score test finds with a probability of 80 %, and at most three usual sizes;
+    the soil changes as far as it would to hide the effect.
+    """
+    if len(problem.readings.channels) != 1:
+        return []
+    measured = problem.readings.channels[0]
+    names = tuple(n for n in ("drawbar_pull", "sinkage") if n != measured)
+    sizes = _undetected_sizes(problem, result)
+    tested = {s.name: s.column for s in result.soil_test.signatures}
+    soil = result.soil.whitened_by(problem.covariance.whiten)
+    rows = len(problem.readings.row_slip)
+    others = Readings.of_every_row(problem.readings.at, names, std=np.full(rows * len(names), 1e-9))
+    case = result.soil.fitted()
+    try:
+        found, _ = effect_signatures(case, others, {n: problem.effects[n] for n in sizes})
+    except InputError:
+        return []
+    rates = linearise(result.soil.case, result.soil.coordinates, result.soil.x, others).jacobian
+    worst: tuple[float, str, dict[str, float]] = (0.0, "", {})
+    for s in found:
+        change = s.column
+        if s.name in tested:
+            white = problem.covariance.whiten @ tested[s.name]
+            change = change - rates @ np.linalg.solve(soil.information, soil.jacobian.T @ white)
+        change = np.abs(sizes[s.name] * np.nan_to_num(change))
+        by_channel = {n: float(change[others.channel == i].max()) for i, n in enumerate(names)}
+        share = change[others.channel == 0] / (others.load[others.channel == 0])
+        if float(share.max()) > worst[0]:
+            worst = float(share.max()), s.name, by_channel
+    _, name, by_channel = worst
+    if not name or max(by_channel[n] / NOTABLE_CHANGE[n] for n in names) < 1.0:
+        return []
+    changes = " and ".join(
+        f"{channel_name(column(n))} by {decimal(1e3 * x, 2)} mm"
+        if n == "sinkage"
+        else f"{channel_name(column(n))} by {decimal(x, 2)} N"
+        for n, x in by_channel.items()
+        if x > NOTABLE_CHANGE[n]
+    )
+    text = (
+        f"only {channel_name(column(measured))} was measured: {name} at {decimal(sizes[name], 2)} "
+        f"times its usual size would not show, and would change {changes}"
+    )
+    return [Remark("hidden-effect", text, (name,), "note")]
+
+
+def _undetected_sizes(problem: FitProblem, result: SearchResult) -> dict[str, float]:
+    """Sizes of the effects of soil and gear, in usual ones, that the test finds in 4 of 5 sets."""
+    test = result.soil_test.test
+    needed = float(np.quantile(test.null_maxima, 1.0 - GAP_LEVEL)) + POWER_80
+    sizes = {n: PLAUSIBLE_SIZE for n, r in result.untestable.items() if r.code == "no-change"}
+    for s, norm in zip(result.soil_test.signatures, test.projected_norm, strict=False):
+        sizes[s.name] = min(needed / max(float(norm), 1e-300), PLAUSIBLE_SIZE)
+    kinds = {n: problem.effects[n].about.kind for n in sizes if n in problem.effects}
+    return {n: size for n, size in sizes.items() if kinds.get(n) not in (None, "sensor", "rig")}
