@@ -116,6 +116,23 @@ def test_finite_over_the_whole_box_or_flagged(name, gear):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", [n for n, e in EFFECTS.items() if e.applies_to(TRACK.gear)])
+def test_a_track_is_left_alone_or_answered_or_flagged(name):
+    slip, load = (part.ravel() for part in np.meshgrid([-0.6, -0.1, 0.1, 0.7], [40.0, 400.0, 4e4]))
+    at = Operating(slip=slip, load=load, **known_to(slip.size))
+    before, neutral = TRACK(SAND, at), (TRACK + EFFECTS[name]())(SAND, at)
+    for field in FORCES:
+        assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
+    force = (TRACK + sized(name))(SAND, at)
+    ok = force.status == Status.OK
+    assert ok.sum() >= 4
+    for channel in CHANNELS:
+        np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
+    changed = [np.abs(getattr(force, c) - getattr(before, c))[ok] > 1e-9 for c in CHANNELS]
+    assert np.any(changed)
+
+
+@pytest.mark.slow
 @every
 def test_any_size_within_its_bounds_is_answered_or_flagged(name):
     box, known = input_box(64, seed=6), known_to(64)
