@@ -105,16 +105,17 @@ def declared_misfit(
     return Misfit.of(optimum, readings, len(free))
 
 
-def excess_residuals(factor: float, case: Case) -> str:
+def excess_residuals(factor: float, with_discrepancy: bool) -> str:
     """How many times the declared noise the residuals are, in words."""
-    discrepancy = " and discrepancy" if case.discrepancy else ""
+    discrepancy = " and discrepancy" if with_discrepancy else ""
     return f"residuals are {factor:.1f} times the declared noise{discrepancy}"
 
 
 def excess_residuals_remark(factor: float, case: Case, consequence: str) -> Remark:
     """That residuals are `factor` times the declared noise, and what follows."""
+    found = excess_residuals(factor, bool(case.discrepancy))
     text = (
-        f"{excess_residuals(factor, case)}: the model lacks an effect, the soil changed between "
+        f"{found}: the model lacks an effect, the soil changed between "
         f"rows, or the noise is understated; {consequence}"
     )
     return Remark("excess-residuals", text)

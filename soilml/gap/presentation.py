@@ -69,15 +69,6 @@ def gap_text(report: GapReport) -> str:
         f"- {reason}" for reason in report.reasons if reason.text != report.sentence
     )
     parts = [head, reasons, *(table(report) for table in tables)]
-    if report.next_runs:
-        best = report.next_runs[0]
-        apart = (
-            "10 sigma or more"
-            if best.discrimination >= 10.0
-            else f"{best.discrimination:.2g} sigma"
-        )
-        cost = "" if best.cost is None else f" at a cost of {best.cost:g}"
-        parts.append(f"next: {best.kind} ({best.text}); expected discrimination: {apart}{cost}")
     parts += [f"! {note}" for note in report.notes]
     return "\n\n".join(part for part in parts if part)
 

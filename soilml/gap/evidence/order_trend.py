@@ -21,6 +21,8 @@ PERMUTATIONS = 4000  # Orders of the runs that are drawn
 #: Share of the variance of an order that polynomials of slip and load of this degree may explain:
 #: above it, rows were driven in the order of slip or load, and nothing tells the two apart.
 MOST_EXPLAINED, DEGREE = 0.9, 2
+#: Mean sign of the steps of slip, or load, along runs from which they count as sweeps.
+MOST_ONE_WAY = 0.7
 #: What changes in a trend, and the unit of its column among those of the run-to-run variation.
 PARAMETERS = (
     ("friction angle", float(RUN_EFFECT_UNITS["friction_angle"])),
@@ -124,7 +126,19 @@ def _orders(readings: Readings) -> tuple[Floats | None, Floats | None]:
     longest = np.asarray([readings.order[readings.run == r].max() for r in runs])
     within = readings.order / np.maximum(longest, 1)[readings.run] - 0.5
     known = len(starts) >= FEWEST_RUNS and not _is_explained(readings, among_runs[readings.run])
-    return among_runs if known else None, None if _is_explained(readings, within) else within
+    swept = _is_sweep(readings) or _is_explained(readings, within)
+    return among_runs if known else None, None if swept else within
+
+
+def _is_sweep(readings: Readings) -> bool:
+    """Whether slip or load nearly always rose, or fell, from each row of a run to the next."""
+    key = np.lexsort((readings.order, readings.run))
+    follows = np.diff(readings.run[key]) == 0
+    for values in (readings.row_slip, readings.row_load):
+        steps = np.sign(np.diff(values[key])[follows])
+        if steps.size and abs(float(steps.mean())) > MOST_ONE_WAY:
+            return True
+    return False
 
 
 def _is_explained(readings: Readings, order: Floats) -> bool:

@@ -136,6 +136,7 @@ class NoiseAgreement:
     granted: float
     friction_angle_std: float  # rad
     bearing_std: float  # relative
+    with_discrepancy: bool = False  # Whether a declared discrepancy is part of the noise
 
     @property
     def grants_scatter(self) -> bool:

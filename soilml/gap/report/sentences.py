@@ -162,7 +162,9 @@ def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[
     if report.next_runs:
         best = report.next_runs[0]
         sigma = "10 or more" if best.discrimination >= 10.0 else decimal(best.discrimination, 2)
-        lines.append(Remark("next", f"Next: {best.kind}, which separates by {sigma} sigma."))
+        cost = "" if best.cost is None else f" at a cost of {best.cost:g}"
+        text = f"Next: {best.kind} ({best.text}), which separates the rest by {sigma} sigma{cost}."
+        lines.append(Remark("next", text))
     return tuple(lines[: MOST_LINES - 1] + lines[MOST_LINES - 1 :][-1:])
 
 
@@ -170,7 +172,8 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     """What was tried, and how large the residuals are under the declared noise and with scatter."""
     parts = []
     if found := report.misfit:
-        text = f"{excess_residuals(math.sqrt(found.declared), report.model)} by the soil alone"
+        size = excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
+        text = f"{size} by the soil alone"
         if found.grants_scatter:
             text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
         parts.append(text)

@@ -48,6 +48,7 @@ def noise_agreement(
         granted=analysis.result.soil.cost / left,
         friction_angle_std=components.friction_angle_std,
         bearing_std=components.bearing_std,
+        with_discrepancy=bool(case.discrepancy),
     )
 
 

@@ -48,6 +48,7 @@ def test_the_same_soils_in_another_order_do_not_drift():
 def test_an_order_of_few_runs_or_of_rising_loads_tells_nothing():
     few = LOADS[: FEWEST_RUNS - 1]
     assert trends(changing(np.linspace(0.0, 3.0, len(few)), few)) == {}
+    assert {order for order, _ in trends(changing(np.linspace(0.0, 3.0, 8)))} == {"runs"}
     rising = tuple(np.linspace(40.0, 90.0, 8))
     assert trends(changing(np.linspace(0.0, 3.0, 8), rising)) == {}
 

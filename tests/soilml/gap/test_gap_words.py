@@ -112,10 +112,16 @@ def test_the_longest_names_leave_the_headline_short(status):
 
 def test_many_lines_leave_room_for_the_next_run():
     notes = tuple(Remark("hidden-effect", f"note {i}") for i in range(9))
-    run = type("Run", (), {"kind": "a heavier load", "discrimination": np.float64(3.2)})()
+    run = type(
+        "Run",
+        (),
+        {"kind": "heavier", "text": "210 N", "discrimination": np.float64(3.2), "cost": 2.0},
+    )()
     report = GapReport(
         "suspected", "", case_of(), **(PARTS | {"notes": notes, "next_runs": (run,)})
     )
     found = report_lines(report)
     assert len(found) == MOST_LINES and found[-1].code == "next"
-    assert found[-1].text == "Next: a heavier load, which separates by 3.2 sigma."
+    assert found[-1].text == (
+        "Next: heavier (210 N), which separates the rest by 3.2 sigma at a cost of 2."
+    )
