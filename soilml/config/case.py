@@ -22,6 +22,7 @@ from soilml.config.model_settings import (
     take_gears,
     take_soil,
 )
+from soilml.config.remainder import Remainder, take_remainder
 from soilml.config.wheeled_rover import WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
@@ -60,6 +61,9 @@ class Case:
         The vehicle on such gears, where the file describes it.
     soil_tests
         Plate and shear tests of the soil, which take part like further readings.
+    remainder
+        What a gap analysis learned of the readings that soil and effects do not explain; its mean
+        is a part of every prediction.
     """
 
     model: Model
@@ -71,6 +75,7 @@ class Case:
     bias: dict[str, Noise] = field(default_factory=dict)
     rover: WheeledRover | None = None
     soil_tests: tuple[SoilTest, ...] = ()
+    remainder: Remainder | None = None
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
         """Every parameter by path, with its declaration and its value.
@@ -119,7 +124,9 @@ class Case:
         own = self.gears[name]
         replaced = {effect.name for effect in own.effects}
         shared = [effect for effect in self.model.effects if effect.name not in replaced]
-        case = replace(self, model=Model(own.gear, (*shared, *own.effects)), prior={}, gears={})
+        remainder = None if self.remainder is None else self.remainder.of_gear(name)
+        model = Model(own.gear, (*shared, *own.effects))
+        case = replace(self, model=model, prior={}, gears={}, remainder=remainder)
         paths = self.paths_of_gear(name)
         prior = {paths[path]: prior for path, prior in self.prior.items() if path in paths}
         return replace(case, prior=prior)
@@ -158,7 +165,7 @@ def read_case(
     ----------
     path
         The file: tables [gear] or several [gears.NAME], [soil] with [soil.prior], [[effect]],
-        [noise], [discrepancy] and [rover].
+        [noise], [discrepancy], [remainder] and [rover].
     effects
         Effects that [[effect]] may name; those of the catalogue by default.
     with_bias
@@ -268,6 +275,17 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
     rover = (
         take_rover(settings.table("rover"), gears or {"": model}) if "rover" in settings else None
     )
+    remainder = None
+    if "remainder" in settings:
+        remainder = take_remainder(settings.table("remainder"), gears)
     return Case(
-        model, own_soil, prior, noise, discrepancy, gears, rover=rover, soil_tests=soil_tests
+        model,
+        own_soil,
+        prior,
+        noise,
+        discrepancy,
+        gears,
+        rover=rover,
+        soil_tests=soil_tests,
+        remainder=remainder,
     )

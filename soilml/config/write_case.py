@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from soilml.config.case import Case
 from soilml.config.measurement_noise import discrepancy_as_settings
 from soilml.config.model_settings import UNNAMED_GEAR
+from soilml.config.remainder import remainder_lines
 from soilml.config.wheeled_rover import WheeledRover
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
@@ -47,6 +48,8 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         lines += ["", "[discrepancy]"]
         settings = discrepancy_as_settings(case.discrepancy)
         lines += [f"{key} = {_setting(value)}" for key, value in settings.items()]
+    if case.remainder is not None:
+        lines += ["", *remainder_lines(case.remainder)]
     if case.rover is not None:
         lines += ["", *_rover_lines(case.rover)]
     for effect in case.model.effects:

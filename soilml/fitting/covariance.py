@@ -11,6 +11,7 @@ import numpy as np
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy, range_with_zero
+from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.operating_points import gear_numbers
 from soilml.fitting.predictions import predict
@@ -123,18 +124,26 @@ def discrepancy_process(
     declared: Mapping[str, Discrepancy],
     default: Discrepancy = USUAL,
     least_eigenvalue: float = LEAST_EIGENVALUE,
+    learned: Remainder | None = None,
 ) -> DiscrepancyProcess:
     """The process of these readings.
 
     declared: Model error by column.
     default: That of other columns; a channel whose amplitude is zero has no columns.
     least_eigenvalue: Fraction of the largest eigenvalue below which eigenfunctions are dropped.
+    learned: What takes the place of the declared process in the channels that it has: the remainder
+        about its mean, where soil and effects are fitted anew.
     """
     gear = gear_numbers(readings.at)
     known: dict[tuple[float, float], Floats] = {}
     columns, channel, usual = [np.zeros((len(readings), 0))], [np.zeros(0, np.int64)], []
     for i, name in enumerate(readings.channels):
         own, in_channel = declared.get(column(name), default), readings.channel == i
+        if learned is not None and column(name) in learned.columns:
+            columns.append(_learned_columns(learned, readings, i))
+            channel.append(np.full(columns[-1].shape[1], i))
+            usual.append(1.0)
+            continue
         usual.append(own.amplitude(range_with_zero(readings.measured[in_channel])))
         if usual[-1] == 0.0:
             continue
@@ -152,13 +161,30 @@ def discrepancy_process(
     )
 
 
+def _learned_columns(learned: Remainder, readings: Readings, channel: int) -> Floats:
+    """Columns (m, q) of the remainder of a channel; each gear has its own."""
+    in_channel, parts = readings.channel == channel, [np.zeros((len(readings), 0))]
+    driven = np.broadcast_to(
+        "" if readings.at.gear is None else readings.at.gear, len(readings.run)
+    )
+    for gear in dict.fromkeys(part.gear for part in learned.parts):
+        rows = in_channel & (driven[readings.row] == gear if gear else True)
+        at = readings.slip[rows], readings.load[rows]
+        own = learned.process_columns(readings.channels[channel], *at, gear, fitted_anew=True)
+        parts.append(np.zeros((len(readings), own.shape[1])))
+        parts[-1][rows] = own
+    return np.concatenate(parts, axis=1)
+
+
 def included_discrepancy(case: Case, readings: Readings) -> list[Remark]:
     """A remark with the standard deviation of each channel's discrepancy; none without one."""
-    texts = []
+    texts, learned = [], [] if case.remainder is None else case.remainder.columns
     for i, name in enumerate(readings.channels):
         own = case.discrepancy.get(column(name), Discrepancy())
         amplitude = own.amplitude(range_with_zero(readings.measured[readings.channel == i]))
-        if amplitude > 0.0:
+        if column(name) in learned:
+            texts.append(f"{name} by its [remainder]")
+        elif amplitude > 0.0:
             texts.append(f"{name} {amplitude:.3g} {QUANTITIES[name].unit}")
     text = f"errors of the model are included in std: {', '.join(texts)}"
     return [Remark("discrepancy-included", text, severity="note")] if texts else []
@@ -168,7 +194,12 @@ def ignored_discrepancy(
     case: Case, what: str, consequence: str = "its intervals are too narrow"
 ) -> list[Remark]:
     """A remark that `what` ignores [discrepancy]; none for a case without one."""
-    names = [key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0]
+    learned = [] if case.remainder is None else case.remainder.columns
+    names = [
+        key
+        for key, one in case.discrepancy.items()
+        if one.amplitude(1.0) > 0.0 and key not in learned
+    ]
     if not names:
         return []
     text = f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"

@@ -3,7 +3,8 @@
 A request goes this way: `predict_many` or `linearise_many` divide it by gear (`_by_gear`), gather
 requests whose rows the model can solve together (`_answered`, `joined_cases`), solve them in one
 call of the physics (`_predict_joined`, `_linearise_joined`), and take from its forces the readings
-of each request (`_stacked`). `predict`, `linearise` and `predict_channels` request for one case.
+of each request (`_stacked`), adding the mean of the remainder. `predict`, `linearise` and
+`predict_channels` request for one case.
 """
 
 from __future__ import annotations
@@ -182,19 +183,25 @@ def predict_channels(
 
 
 def forces(case: Case, at: Operating) -> Force:
-    """Forces (n,) of a case at operating points (n,), which several gears may have driven."""
+    """Forces (n,) of a case, with its remainder, at points (n,) that several gears may drive."""
     if not case.gears:
-        return case.model(case.soil, at)
+        return forces_of_one_gear(case, at)
     count = np.broadcast(at.slip, at.load).size
     joined: dict[str, Any] = {
         f.name: np.zeros(count, np.int64 if f.name == "status" else np.float64)
         for f in fields(Force)
     }
     for part in rows_by_gear(case, at):
-        force = part.case.model(part.case.soil, part.at)
+        force = forces_of_one_gear(part.case, part.at)
         for name, values in joined.items():
             values[part.rows] = getattr(force, name)
     return Force(**joined)
+
+
+def forces_of_one_gear(case: Case, at: Operating) -> Force:
+    """Forces of a case of one gear, with the mean of its remainder."""
+    force = case.model(case.soil, at)
+    return force if case.remainder is None else case.remainder.added_to(force, at.slip, at.load)
 
 
 def _linearise_each(requests: Sequence[PredictionRequest]) -> list[Linearisation | InputError]:
@@ -291,7 +298,7 @@ def _predict_joined(requests: Sequence[PredictionRequest]) -> list[Floats]:
     predictions, start = [], 0
     for request, part in zip(requests, parts, strict=True):
         size = part.sets * part.points
-        predictions.append(_stacked(request.readings, force, slice(start, start + size)))
+        predictions.append(_stacked(request, force, slice(start, start + size)))
         start += size
     return predictions
 
@@ -310,7 +317,7 @@ def _linearise_joined(requests: Sequence[PredictionRequest]) -> list[Linearisati
     linearisations, start = [], 0
     for request, part, step in zip(requests, parts, steps, strict=True):
         rows = slice(start, start + part.sets * part.points)
-        y = _stacked(request.readings, response.force, rows)
+        y = _stacked(request, response.force, rows)
         log_sinkage = response.sinkage.log_sinkage[rows].reshape(part.sets, part.points)
         linearisations.append(
             Linearisation(
@@ -357,14 +364,26 @@ def _joined_estimate(requests: Sequence[PredictionRequest]) -> SinkageEstimate |
     )
 
 
-def _stacked(readings: Readings, force: Force, rows: slice) -> Floats:
-    """Readings (sets, m) from the forces of these rows."""
+def _stacked(request: PredictionRequest, force: Force, rows: slice) -> Floats:
+    """Readings (sets, m) from the forces of these rows, with the mean of the remainder."""
+    readings = request.readings
     points = np.size(readings.at.slip)
     channels = {
         name: np.asarray(getattr(force, name))[rows].reshape(-1, points)
         for name in readings.channels
     }
-    return readings.stack(channels)
+    return readings.stack(channels) + remainder_at(request.case, readings)
+
+
+def remainder_at(case: Case, readings: Readings) -> Floats:
+    """Mean (m,) of the remainder of a case of one gear; it does not depend on soil and effects."""
+    mean = np.zeros(len(readings))
+    for i, name in enumerate(readings.channels):
+        if case.remainder is not None and case.remainder.of(name):
+            own = readings.channel == i
+            at = readings.slip[own], readings.load[own]
+            mean[own] = case.remainder.mean_and_std(name, *at)[0]
+    return mean
 
 
 def _answer_one(

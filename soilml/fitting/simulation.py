@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.io.table import Table
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import AFTER_CAMPAIGN, COVARIATES, Operating
@@ -30,6 +31,7 @@ def simulate(
     run: ArrayLike | None = None,
     seed: int | None = None,
     on_rows: Callable[[int], None] | None = None,
+    with_std: bool = False,
 ) -> Table:
     """Rows that a case predicts: torque, drawbar pull, sinkage and entry angle.
 
@@ -49,6 +51,9 @@ def simulate(
         are exact. An error of the model, [discrepancy], is not added.
     on_rows
         Called with the number of rows that are done.
+    with_std
+        Adds a column `<column>_std` for each channel that [remainder] has: the standard deviation
+        of the model's error there. The mean of the remainder is in the readings anyway.
 
     Returns
     -------
@@ -78,7 +83,8 @@ def simulate(
     parts = []
     for first in range(0, slips.size, BLOCK):
         rows = slice(first, first + BLOCK)
-        parts.append(case.model(case.soil, Operating(slip=slips[rows], load=loads[rows], **known)))
+        at = Operating(slip=slips[rows], load=loads[rows], **known)
+        parts.append(forces_of_one_gear(case, at))
         if on_rows is not None:
             on_rows(min(rows.stop, slips.size))
     names = [f.name for f in fields(Force)]
@@ -94,6 +100,8 @@ def simulate(
         if rng is not None and column(name) in case.noise:
             values = values + case.noise[column(name)].std(values) * rng.standard_normal(slips.size)
         columns[column(name)] = values
+        if with_std and case.remainder is not None and case.remainder.of(name):
+            columns[f"{column(name)}_std"] = case.remainder.mean_and_std(name, slips, loads)[1]
     columns["entry_angle_rad"] = np.asarray(force.entry_angle)
     status = np.asarray([Status(int(code)).reason for code in force.status])
     return Table(columns | {"status": status}, source="simulated rows")

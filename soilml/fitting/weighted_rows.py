@@ -63,7 +63,11 @@ class WeightedRows:
     def problem(self) -> LeastSquaresProblem:
         """The problem, weighted by noise, model discrepancy and shared errors."""
         process = discrepancy_process(
-            self.readings, self.case.discrepancy, Discrepancy(), LEAST_EIGENVALUE
+            self.readings,
+            self.case.discrepancy,
+            Discrepancy(),
+            LEAST_EIGENVALUE,
+            self.case.remainder,
         )
         columns = np.hstack([process.columns, self.shared])
         whiten = Whitening.of(self.readings.std, columns)

@@ -67,6 +67,10 @@ from soilml.gap.verdict.estimates import (
     soil_estimates,
     updated_case,
 )
+from soilml.gap.verdict.learned_remainder import (
+    learned_remainder,
+    without_learned_discrepancy,
+)
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
@@ -171,6 +175,7 @@ def gap(
     'no-gap'
     """
     effects = candidate_effects(case, effects)
+    case = without_learned_discrepancy(case)
     known_costs = check_costs(costs or {})
     table = with_rover_columns(case, with_order_columns(case, as_table(table), FROM_ORDER))
     check_wheel_size(case, table)
@@ -270,14 +275,15 @@ def _build_report(
     intervals = with_uncertain_discrepancy(problem, written)
     if smooth_gap:
         left = discrepancy_amplitudes(problem, written)
+        learned = learned_remainder(problem, written)
         spread = among_candidates(intervals, result.candidates, result.posterior)
     else:
-        left = None
+        left, learned = None, None
         spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
     report = GapReport(
         status=decision.status,
         sentence="",
-        model=updated_case(intervals, left),
+        model=updated_case(intervals, left, learned),
         cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
         best_unclaimed=unclaimed_effects(decision, result),
@@ -306,7 +312,9 @@ def _build_report(
     )
     if decision.status == "suspected":
         fit = with_uncertain_discrepancy(problem, shown)
-        suspected = updated_case(fit, discrepancy_amplitudes(problem, shown))
+        suspected = updated_case(
+            fit, discrepancy_amplitudes(problem, shown), learned_remainder(problem, shown)
+        )
         report = replace(report, suspected_model=suspected)
     if decision.claimed:
         claimed = decision.claimed

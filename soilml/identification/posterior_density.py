@@ -170,7 +170,9 @@ class PosteriorDensity:
 
 def _by_channel(case: Case, readings: Readings) -> tuple[Floats, ...]:
     """For each channel, columns (m_c, q_c) of its discrepancy at its m_c readings."""
-    process = discrepancy_process(readings, case.discrepancy, Discrepancy(), LEAST_EIGENVALUE)
+    process = discrepancy_process(
+        readings, case.discrepancy, Discrepancy(), LEAST_EIGENVALUE, case.remainder
+    )
     return tuple(
         process.columns[np.ix_(readings.channel == i, process.channel == i)]
         for i in range(len(readings.channels))

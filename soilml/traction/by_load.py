@@ -10,6 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
@@ -204,7 +205,7 @@ def _check_carried(
         raise InputError(f"load {load:g} N; needed is a load above zero")
     soils = draws.of(case, np.arange(len(draws.values)))
     at = Operating(slip=float(slip[0]), load=load, **dict(covariates or {}))
-    force = soils.model(soils.soil, at)
+    force = forces_of_one_gear(soils, at)
     failed = np.asarray(force.status)[np.asarray(force.status) != 0]
     if failed.size > 0.5 * len(draws.values):
         worst = Status(int(np.bincount(failed).argmax()))

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.measurement_noise import range_with_zero
+from soilml.config.measurement_noise import Discrepancy, range_with_zero
 from soilml.fitting.operating_points import operating_points
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.fitting.readings import declared_std
 from soilml.io.table import Table
 from soilml.numerics.root_finding import rising_root
@@ -145,7 +146,7 @@ def predict_traction(
     def drawbar_pull(index: NDArray[np.int64], normal_load: Floats) -> Floats:
         soils = draws.of(case, rows[index])
         at = Operating(slip=slip[columns[index]], load=normal_load, **dict(covariates or {}))
-        return np.asarray(soils.model(soils.soil, at).drawbar_pull + error[index])
+        return np.asarray(forces_of_one_gear(soils, at).drawbar_pull + error[index])
 
     level = drawbar_pull(np.arange(rows.size), np.full(rows.size, load))
     carried = np.flatnonzero(np.isfinite(level))
@@ -193,6 +194,8 @@ def draw_pull_discrepancy(
 ) -> PullDiscrepancy | None:
     r"""Draws of the error under the loads (N) at the slips (m,); None where none is declared.
 
+    A [remainder] of the pull takes the place of what [discrepancy] declares.
+
     The error is C w with the columns C of the process and standard normal weights w. Given the soil
     of a draw, the k measured pulls leave residuals r with noise D, and the weights are normal with
 
@@ -209,24 +212,28 @@ def draw_pull_discrepancy(
     2.8.
     """
     key = column("drawbar_pull")
-    own = case.discrepancy.get(key)
-    if own is None:
+    own, learned = case.discrepancy.get(key), case.remainder
+    learned = learned if learned is not None and key in learned.columns else None
+    if own is None and learned is None:
         return None
     predicted = _predicted_pull(case, draws, table)
     reading = std = np.full(len(table), np.nan)
     if key in table:
         reading, std = table[key], declared_std(case, table, key)
     typical = reading if np.isfinite(reading).any() else np.median(predicted, axis=0)
-    amplitude = own.amplitude(range_with_zero(typical))
     scale = 1.0 if noise_scale is None else noise_scale
     asked_load, asked_slip = (g.ravel() for g in np.meshgrid(loads, slip, indexing="ij"))
-    points = slip_load_points(
-        np.append(table["slip"], asked_slip),
-        np.append(table["load_N"], asked_load),
-        own.slip_length,
-        own.log_load_length,
-    )
-    at_rows, at_asked = np.split(process_columns(points, scale * amplitude), [len(table)])
+    at = np.append(table["slip"], asked_slip), np.append(table["load_N"], asked_load)
+    if learned is not None:  # about its mean, which is in the predictions
+        amplitude = float(np.max(learned.mean_and_std("drawbar_pull", *at)[1]))
+        columns = learned.process_columns("drawbar_pull", *at, fitted_anew=True)
+    else:
+        own = own or Discrepancy()
+        amplitude = own.amplitude(range_with_zero(typical))
+        columns = process_columns(
+            slip_load_points(*at, own.slip_length, own.log_load_length), amplitude
+        )
+    at_rows, at_asked = np.split(scale * columns, [len(table)])
     used = np.isfinite(reading) & (std > 0.0) & (noise_scale is not None)
     rng = np.random.default_rng(0)
     shape = (len(predicted), at_rows.shape[1])
@@ -245,5 +252,5 @@ def draw_pull_discrepancy(
 def _predicted_pull(case: Case, draws: SoilDraws, table: Table) -> Floats:
     """Pull of each draw at the rows, N (n, k); NaN where the soil does not carry the load."""
     soils = draws.of(case, np.arange(len(draws.values))[:, None])
-    pull = soils.model(soils.soil, operating_points(table)).drawbar_pull
+    pull = forces_of_one_gear(soils, operating_points(table)).drawbar_pull
     return np.broadcast_to(np.asarray(pull), (len(draws.values), len(table)))

@@ -11,6 +11,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.root_finding import rising_root
 from soilml.physics.operating_point import Operating
 from soilml.traction.pull_and_slope import on_a_vehicle
@@ -94,7 +95,7 @@ def _forces(
     at = Operating(
         slip=slip[column], load=load[draw], pass_number=float(number), speed=speed, slip_angle=0.0
     )
-    force = soils.model(soils.soil, at)
+    force = forces_of_one_gear(soils, at)
     shape = (len(load), len(slip))
     return tuple(
         np.reshape(np.asarray(part), shape)

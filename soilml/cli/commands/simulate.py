@@ -19,6 +19,7 @@ the slips and loads.
 Ranges are start:stop:count, or values with commas. With --run, `soilml
 identify` can read the table. A row without equilibrium has blank values and
 the reason in the column `status`; it is an error if no row has an equilibrium.
+The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
 Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
@@ -50,6 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--run", dest="label", metavar="NAME", help="add a first column `run` with this name"
     )
+    parser.add_argument(
+        "--std", action="store_true", help="add the std of the model's error from [remainder]"
+    )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
 
 
@@ -70,6 +74,8 @@ def run(args: argparse.Namespace) -> int:
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
+    if args.std and case.remainder is None:
+        raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
     if slips.size * loads.size > MAX_ROWS:
         raise InputError(
@@ -79,7 +85,7 @@ def run(args: argparse.Namespace) -> int:
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        rows = simulate(case, slip, load, **known, run=args.label, on_rows=done)
+        rows = simulate(case, slip, load, **known, run=args.label, on_rows=done, with_std=args.std)
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))

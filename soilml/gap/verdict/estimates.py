@@ -10,6 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy, unestimated_bias
+from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature
@@ -141,7 +142,11 @@ def equivalent_std(offset: Floats, std: Floats, weight: Floats) -> float:
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
 
 
-def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> Case:
+def updated_case(
+    fit: Solution,
+    discrepancy: dict[str, float] | None = None,
+    remainder: Remainder | None = None,
+) -> Case:
     """The fitted case: soil and effects at their optimum, with the priors and noise of the input.
 
     Values are rounded to significant digits.
@@ -149,7 +154,8 @@ def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> 
     The size of each effect gets a uniform prior of three standard deviations to either side, so
     that its uncertainty is propagated where the model is used. `discrepancy` has the standard
     deviations of the smooth discrepancy by column, in the column's unit; None keeps what the case
-    declares. An error of a sensor that is fitted as an effect is no longer a bias.
+    declares. An error of a sensor that is fitted as an effect is no longer a bias. `remainder` is
+    what the fit leaves and was learned; None keeps that of the case.
     """
     values, stds = {path: significant(v) for path, v in fit.values().items()}, fit.stds()
     case = fit.case.with_values(values)
@@ -171,8 +177,14 @@ def updated_case(fit: Solution, discrepancy: dict[str, float] | None = None) -> 
             for name, std in discrepancy.items()
         }
     bias = unestimated_bias(fit.case.bias, {c.effect for c in fit.coordinates})
-    noise = dict(fit.case.noise)
-    return replace(case, prior=prior, noise=noise, discrepancy=remaining, bias=bias)
+    return replace(
+        case,
+        prior=prior,
+        noise=dict(fit.case.noise),
+        discrepancy=remaining,
+        bias=bias,
+        remainder=case.remainder if remainder is None else remainder,
+    )
 
 
 def soil_estimates(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.case import Case
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.parameters import Parameter, declared
 from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears.linear_wheel import LinearWheel
@@ -152,7 +153,7 @@ def forward(request: dict[str, Any]) -> dict[str, Any]:
     slip, load = at.get("slip", 0.3), at.get("load", 60.0)
     grid = np.concatenate([BRAKING, DRIVING]) if slip < 0.0 else DRIVING
     slips = np.append(grid, slip)
-    force = case.model(case.soil, Operating(slip=slips, load=load))
+    force = forces_of_one_gear(case, Operating(slip=slips, load=load))
     curves = {
         "torque": _digits(force.torque),
         "pull": _digits(force.drawbar_pull),

@@ -1,0 +1,313 @@
+"""The smooth remainder that a gap analysis learned beside soil and effects: [remainder].
+
+What no parameter and no effect of a model explains, as a Gaussian process of slip and load for each
+channel and gear, given the readings of the analysis.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.io.toml_settings import Settings
+from soilml.physics.contact import Force
+from soilml.quantities import CHANNELS, column
+
+FORMAT = 1  # Version of the table [remainder]
+#: Most points of one part, and most columns of its factors: a file stays readable, and no analysis
+#: needs more.
+MOST_POINTS, MOST_PARTS = 60, 100
+#: Squared distances of points from each other, as a fraction of the process's variance that is left
+#: given the others, below which their factor cannot be computed.
+LEAST_PIVOT = 1e-9
+#: Rounding error that the length of a written factor may have.
+TOLERANCE = 1e-6
+KEYS = ("column", "gear", "amplitude", "usual", "slip_length", "log_load_length", "slip", "load")
+
+
+@dataclass(frozen=True)
+class RemainderPart:
+    r"""The remainder of one channel of one gear, as one analysis learned it.
+
+    .. math::
+        \delta(x) = a \psi(x)^T w, \quad \psi(x) = L^{-1} k(Z, x), \quad L L^T = k(Z, Z), \quad
+        w \sim N(\mu, I - F F^T)
+
+    with points Z in slip and the logarithm of the load, over their correlation lengths, and
+    :math:`k(x, x') = e^{-|x - x'|^2 / 2}`. Mean and variance at any slip and load, given soil and
+    effects of the model:
+
+    .. math:: E[\delta] = a \psi^T \mu, \quad
+        \operatorname{var}[\delta] = a^2 (1 - |F^T \psi|^2) + (b^2 - a^2)(1 - e^{-d^2 / 2})
+
+    d is the distance from the range of the analysis, in correlation lengths, and b the larger of a
+    and a model's usual error: far outside, the mean is zero and the standard deviation b.
+
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.25 and
+    2.26; Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2. Valid for smooth
+    errors of slip and load alone: what changes with time, speed or pass is not in it.
+
+    Attributes
+    ----------
+    column, gear
+        Column of the channel, and name of the gear; "" where the model has one gear.
+    amplitude, usual
+        Standard deviation a of the process, and that of a model's usual error, in the column's
+        unit.
+    slip_length, log_load_length
+        Correlation lengths in slip and in the natural logarithm of the load.
+    slip, load
+        Smallest and largest slip, and load (N), of the analysis.
+    points
+        Slip and load (N) of each of k points, (k, 2).
+    mean
+        Mean of the weights, (k,).
+    known
+        F, (k, r): what the readings told of the weights, given soil and effects.
+    shared
+        G, (k, p): shifts of the weights with soil and effects, by one standard deviation of p
+        independent combinations of them. Where these are fitted anew, the covariance of the weights
+        is I - F F^T + G G^T.
+    """
+
+    column: str
+    gear: str
+    amplitude: float
+    usual: float
+    slip_length: float
+    log_load_length: float
+    slip: tuple[float, float]
+    load: tuple[float, float]
+    points: tuple[tuple[float, ...], ...]
+    mean: tuple[float, ...]
+    known: tuple[tuple[float, ...], ...]
+    shared: tuple[tuple[float, ...], ...]
+
+    def scaled(self, slip: Floats, load: Floats) -> Floats:
+        """Slips and loads (n,) as points (n, 2) over the correlation lengths."""
+        return np.column_stack([slip / self.slip_length, np.log(load) / self.log_load_length])
+
+    @cached_property
+    def factor(self) -> Floats:
+        """Cholesky factor L (k, k) of the correlations of the points."""
+        z = self.scaled(*np.asarray(self.points).T)
+        return np.asarray(np.linalg.cholesky(_correlation(z, z)))
+
+    def functions(self, slip: Floats, load: Floats) -> Floats:
+        """The functions psi (n, k) at slips and loads (n,)."""
+        z = self.scaled(*np.asarray(self.points).T)
+        between = _correlation(z, self.scaled(slip, load))
+        return np.asarray(np.linalg.solve(self.factor, between).T)
+
+    def mean_and_std(self, slip: Floats, load: Floats) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (n,) at slips and loads (n,), in the column's unit."""
+        psi = self.functions(slip, load)
+        told = ((psi @ self._matrix("known")) ** 2).sum(axis=1)
+        variance = self.amplitude**2 * np.maximum(1.0 - told, 0.0)
+        return self.amplitude * psi @ np.asarray(self.mean), np.sqrt(
+            variance + self._beyond(slip, load)
+        )
+
+    def columns(self, slip: Floats, load: Floats, *, fitted_anew: bool) -> Floats:
+        r"""Columns C (n, q), with C C^T the covariance (n, n) of the remainder at these rows.
+
+        fitted_anew: Whether soil and effects are fitted anew, and the remainder is uncertain with
+            them. The variance outside the range beyond the process's own is left out.
+        """
+        psi = self.functions(slip, load)
+        inner = np.eye(len(self.mean)) - self._matrix("known") @ self._matrix("known").T
+        if fitted_anew:
+            inner += self._matrix("shared") @ self._matrix("shared").T
+        value, vector = np.linalg.eigh(inner)
+        within = psi @ (vector * np.sqrt(np.maximum(value, 0.0)))
+        # what the points do not represent: independent of the weights, zero at the points
+        left = np.maximum(1.0 - (psi**2).sum(axis=1), 0.0)
+        beyond = np.sqrt(self.amplitude**2 * left + self._beyond(slip, load))
+        smooth = _smooth_columns(self.scaled(slip, load), beyond)
+        return np.column_stack([self.amplitude * within, smooth])
+
+    def _matrix(self, name: str) -> Floats:
+        return np.asarray(getattr(self, name), dtype=np.float64).reshape(len(self.mean), -1)
+
+    def _beyond(self, slip: Floats, load: Floats) -> Floats:
+        """Variance (n,) beyond the process's own, which grows outside the range."""
+        more = max(self.usual**2 - self.amplitude**2, 0.0)
+        low, high = (self.scaled(*(np.asarray([v]) for v in end)) for end in self._corners)
+        at = self.scaled(slip, load)
+        distance = np.maximum(np.maximum(low - at, at - high), 0.0)
+        return np.asarray(more * -np.expm1(-0.5 * (distance**2).sum(axis=1)))
+
+    @property
+    def _corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        return (self.slip[0], self.load[0]), (self.slip[1], self.load[1])
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """The remainders of all channels and gears; parts of one channel and gear add up.
+
+    A further analysis of a model with a remainder adds what it finds beside it.
+    """
+
+    parts: tuple[RemainderPart, ...]
+
+    def of(self, channel: str, gear: str = "") -> list[RemainderPart]:
+        """The parts of a channel (`torque`) of one gear."""
+        return [p for p in self.parts if p.column == column(channel) and p.gear == gear]
+
+    def of_gear(self, gear: str) -> Remainder | None:
+        """The remainder of one of several gears, as of a model with this gear alone."""
+        own = tuple(replace(part, gear="") for part in self.parts if part.gear == gear)
+        return Remainder(own) if own else None
+
+    @property
+    def columns(self) -> list[str]:
+        """Columns that have a remainder, each once."""
+        return list(dict.fromkeys(part.column for part in self.parts))
+
+    def mean_and_std(
+        self, channel: str, slip: Any, load: Any, gear: str = ""
+    ) -> tuple[Floats, Floats]:
+        """Mean and standard deviation (n,), in the channel's unit, at slips and loads (n,), N.
+
+        Zero for a channel without a remainder. Parts are taken as independent.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> part = RemainderPart(
+        ...     "torque_Nm", "", 0.2, 0.1, 0.3, 0.6, (0.2, 0.2), (60.0, 60.0),
+        ...     ((0.2, 60.0),), (1.5,), ((0.8,),), ((0.0,),))
+        >>> mean, std = Remainder((part,)).mean_and_std("torque", [0.2, 5.0], 60.0)
+        >>> print(mean.round(3), std.round(3))
+        [0.3 0. ] [0.12 0.2 ]
+        """
+        slip, load = np.broadcast_arrays(np.asarray(slip, float), np.asarray(load, float))
+        mean, variance = np.zeros(slip.shape), np.zeros(slip.shape)
+        for part in self.of(channel, gear):
+            own = part.mean_and_std(slip.ravel(), load.ravel())
+            mean = mean + own[0].reshape(slip.shape)
+            variance = variance + own[1].reshape(slip.shape) ** 2
+        return mean, np.sqrt(variance)
+
+    def process_columns(
+        self, channel: str, slip: Floats, load: Floats, gear: str = "", *, fitted_anew: bool
+    ) -> Floats:
+        """Columns (n, q) whose products are the covariance at slips and loads (n,)."""
+        own = [p.columns(slip, load, fitted_anew=fitted_anew) for p in self.of(channel, gear)]
+        return np.concatenate([np.zeros((len(slip), 0)), *own], axis=1)
+
+    def added_to(self, force: Force, slip: Any, load: Any) -> Force:
+        """Forces with the mean added to torque, drawbar pull and sinkage, of one gear."""
+        slip, load = np.asarray(slip, dtype=np.float64), np.asarray(load, dtype=np.float64)
+        mean = {n: self.mean_and_std(n, slip, load)[0] for n in CHANNELS if self.of(n)}
+        return replace(force, **{n: getattr(force, n) + own for n, own in mean.items()})
+
+
+def take_remainder(settings: Settings, gears: Iterable[str]) -> Remainder:
+    """Read the table [remainder] of a model with these gears; none where there is one gear.
+
+    Raises `InputError` for another version, an unknown column or gear, a number that is not finite,
+    and for sizes that do not fit together.
+    """
+    version = settings.count("format")
+    if version != FORMAT:
+        settings.fail(f"format is {version}; this version of soilml reads {FORMAT}")
+    parts = settings.tables("part")
+    if not 1 <= len(parts) <= MOST_PARTS:
+        settings.fail(f"{len(parts)} parts [[remainder.part]]; needed are 1 to {MOST_PARTS}")
+    found = tuple(_take_part(part, tuple(gears)) for part in parts)
+    settings.finish()
+    return Remainder(found)
+
+
+def _take_part(settings: Settings, gears: Sequence[str]) -> RemainderPart:
+    known = [column(name) for name in CHANNELS]
+    name, gear = settings.text("column"), settings.text("gear", "")
+    if name not in known:
+        settings.fail(f"column is {name!r}; a remainder has one of: {', '.join(known)}")
+    if gear not in (gears or ("",)):
+        of = f"there are: {', '.join(gears)}" if gears else "this file has one, without a name"
+        settings.fail(f"gear is {gear!r}; {of}")
+    numbers = {key: settings.number(key) for key in KEYS[2:6]}
+    for key, value in numbers.items():
+        if not (math.isfinite(value) and value > 0.0):
+            settings.fail(f"{key} is {value:g}; needed is a finite number above zero")
+    ranges = {key: tuple(_rows(settings, key, 1)[0]) for key in ("slip", "load")}
+    for key, ends in ranges.items():
+        if len(ends) != 2 or ends[0] > ends[1] or (key == "load" and ends[0] <= 0.0):
+            settings.fail(f"{key} must be [smallest, largest]")
+    points = _rows(settings, "points", 2)
+    count = len(points)
+    if not 1 <= count <= MOST_POINTS or any(len(p) != 2 or p[1] <= 0.0 for p in points):
+        settings.fail(f"points must be 1 to {MOST_POINTS} pairs [slip, load_N]")
+    (mean,) = _rows(settings, "mean", 1)
+    factors = {key: _rows(settings, key, 2) for key in ("known", "shared")}
+    for key, rows in {"mean": mean, **factors}.items():
+        if len(rows) != count:
+            settings.fail(f"{key} has {len(rows)} rows; needed is one for each of {count} points")
+    for key, rows in factors.items():
+        if len({len(row) for row in rows}) > 1:
+            settings.fail(f"the rows of {key} differ in length")
+    settings.finish()
+    part = RemainderPart(name, gear, **numbers, **ranges, points=points, mean=mean, **factors)  # type: ignore[arg-type]
+    if part._matrix("known").size and np.linalg.norm(part._matrix("known"), 2) > 1.0 + TOLERANCE:
+        settings.fail("known is larger than 1: the variance would be negative")
+    z = part.scaled(*np.asarray(points).T)
+    if np.linalg.eigvalsh(_correlation(z, z))[0] < LEAST_PIVOT:
+        settings.fail("points contains points that are too near each other")
+    return part
+
+
+def _rows(settings: Settings, key: str, depth: int) -> tuple[Any, ...]:
+    """A list of finite numbers (depth 1, as its only row), or of such lists."""
+    needed = "a list of finite numbers" if depth == 1 else "a list of lists of finite numbers"
+    value = settings.take(key, list, needed)
+    rows = [value] if depth == 1 else value
+    for row in rows:
+        if not isinstance(row, list) or not all(_is_finite(v) for v in row):
+            settings.fail(f"{key} must be {needed}")
+    return tuple(tuple(float(v) for v in row) for row in rows)
+
+
+def _is_finite(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def remainder_lines(remainder: Remainder) -> list[str]:
+    """The table [remainder] as lines of TOML; `take_remainder` reads the same back."""
+    lines = ["[remainder]", f"format = {FORMAT}"]
+    for part in remainder.parts:
+        lines += ["", "[[remainder.part]]"]
+        values: Mapping[str, Any] = {f.name: getattr(part, f.name) for f in fields(part)}
+        lines += [f"{k} = {_written(v)}" for k, v in values.items() if k != "gear" or v]
+    return lines
+
+
+def _written(value: Any) -> str:
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, tuple):
+        inner = ", ".join(_written(v) for v in value)
+        return f"[{inner}]"
+    return repr(float(value))
+
+
+def _correlation(a: Floats, b: Floats) -> Floats:
+    """Correlations (n, m) of points (n, 2) with points (m, 2)."""
+    return np.asarray(np.exp(-0.5 * ((a[:, None, :] - b) ** 2).sum(axis=-1)))
+
+
+def _smooth_columns(points: Floats, std: Floats) -> Floats:
+    """Columns of a process of these standard deviations (n,); none where all are negligible."""
+    from soilml.numerics.smooth_process import process_columns
+
+    if not np.any(std > TOLERANCE * max(float(std.max(initial=0.0)), 1e-300)):
+        return np.zeros((len(points), 0))
+    return process_columns(points, std)

@@ -1,0 +1,172 @@
+"""[remainder] of a model file: read, written, refused; its mean and variance; where it is used."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import MODEL
+
+from soilml import Operating, read_case, simulate
+from soilml.cli import main
+from soilml.config.remainder import Remainder, RemainderPart
+from soilml.config.write_case import case_as_toml
+from soilml.errors import InputError
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.predictions import linearise, predict
+from soilml.fitting.readings import Readings
+
+POINTS = ((0.1, 40.0), (0.5, 40.0), (0.3, 100.0))
+
+
+def part(column="torque_Nm", gear="", **changed):
+    own = RemainderPart(
+        column=column,
+        gear=gear,
+        amplitude=0.2,
+        usual=0.3,
+        slip_length=0.3,
+        log_load_length=0.6,
+        slip=(0.1, 0.5),
+        load=(40.0, 100.0),
+        points=POINTS,
+        mean=(1.0, -0.5, 0.25),
+        known=((0.9, 0.0), (0.1, 0.7), (0.0, 0.3)),
+        shared=((0.1,), (0.2,), (0.0,)),
+    )
+    return replace(own, **changed)
+
+
+@pytest.fixture
+def case(tmp_path):
+    (tmp_path / "plain.toml").write_text(MODEL)
+    return replace(read_case(tmp_path / "plain.toml"), remainder=Remainder((part(),)))
+
+
+def test_it_is_written_and_read_to_the_last_digit(case, tmp_path):
+    again = tmp_path / "model.toml"
+    again.write_text(case_as_toml(case))
+    assert read_case(again) == case
+    assert read_case(again).remainder == case.remainder
+
+
+def test_mean_and_variance_are_those_of_the_conditional_process():
+    """Rasmussen and Williams, eqs. 2.25 and 2.26, for three readings without a model."""
+    own = part(usual=0.1)
+    z, noise = own.scaled(*np.asarray(POINTS).T), 0.05
+    correlation = np.exp(-0.5 * ((z[:, None] - z) ** 2).sum(axis=-1))
+    reading = np.asarray([0.3, -0.1, 0.2])
+    white = 0.2 * np.linalg.cholesky(correlation) / noise
+    spread = np.linalg.inv(np.eye(3) + white.T @ white)
+    value, vector = np.linalg.eigh(np.eye(3) - spread)
+    own = replace(
+        own,
+        mean=tuple(spread @ white.T @ (reading / noise)),
+        known=tuple(map(tuple, vector * np.sqrt(value))),
+    )
+    slip, load = np.asarray([0.2, 0.45, 0.9]), np.asarray([50.0, 90.0, 300.0])
+    at = own.scaled(slip, load)
+    between = 0.04 * np.exp(-0.5 * ((at[:, None] - z) ** 2).sum(axis=-1))
+    gain = between @ np.linalg.inv(0.04 * correlation + noise**2 * np.eye(3))
+    mean, std = own.mean_and_std(slip, load)
+    np.testing.assert_allclose(mean, gain @ reading, atol=1e-12)
+    np.testing.assert_allclose(std**2, 0.04 - (gain * between).sum(axis=1), atol=1e-12)
+    columns = own.columns(slip, load, fitted_anew=False)
+    np.testing.assert_allclose((columns**2).sum(axis=1), std**2, atol=1e-9)
+
+
+def test_outside_the_range_the_mean_fades_and_the_error_becomes_a_usual_one():
+    own = part()
+    for far in ((0.9, 5000.0), (-0.9, 0.5)):
+        mean, std = own.mean_and_std(*(np.asarray([v]) for v in far))
+        assert abs(mean[0]) < 1e-6
+        assert std[0] == pytest.approx(0.3, rel=1e-6)
+    small = replace(own, usual=0.1)  # an error that was larger than a usual one stays so
+    assert small.mean_and_std(np.asarray([0.9]), np.asarray([5000.0]))[1][0] == pytest.approx(0.2)
+
+
+def test_mean_and_error_are_continuous_at_the_edge():
+    edge = np.asarray([0.5 - 1e-9, 0.5 + 1e-9])
+    for values in part().mean_and_std(edge, np.asarray([60.0, 60.0])):
+        assert values[1] == pytest.approx(values[0], abs=1e-7)
+    load = np.asarray([100.0 - 1e-7, 100.0 + 1e-7])
+    for values in part().mean_and_std(np.asarray([0.3, 0.3]), load):
+        assert values[1] == pytest.approx(values[0], abs=1e-7)
+
+
+def test_parts_of_a_channel_add_up():
+    both = Remainder((part(), part(mean=(0.0, 1.0, 0.0))))
+    one, other = (p.mean_and_std(np.asarray([0.2]), np.asarray([60.0])) for p in both.parts)
+    mean, std = both.mean_and_std("torque", 0.2, 60.0)
+    assert mean == pytest.approx(one[0][0] + other[0][0])
+    assert std == pytest.approx(np.hypot(one[1][0], other[1][0]))
+    assert both.mean_and_std("sinkage", 0.2, 60.0) == (0.0, 0.0)
+
+
+def test_predictions_and_simulated_rows_have_the_mean(case):
+    slip, load = np.asarray([0.1, 0.3, 0.5]), np.full(3, 60.0)
+    bare = case.model(case.soil, Operating(slip=slip, load=load))
+    mean, std = case.remainder.mean_and_std("torque", slip, load)
+    rows = simulate(case, slip, load, with_std=True)
+    np.testing.assert_allclose(rows["torque_Nm"], bare.torque + mean, rtol=1e-9)
+    np.testing.assert_allclose(rows["drawbar_pull_N"], bare.drawbar_pull, rtol=1e-9)
+    np.testing.assert_array_equal(rows["torque_Nm_std"], std)
+    readings = Readings.of_every_row(Operating(slip=slip, load=load))
+    y = predict(case, [], np.zeros((1, 0)), readings)[0]
+    np.testing.assert_allclose(y[:3], bare.torque + mean, rtol=1e-6)
+    free = select_free(case, None)
+    x = np.full(len(free), 0.5)
+    plain = linearise(replace(case, remainder=None), free, x, readings)
+    found = linearise(case, free, x, readings)
+    np.testing.assert_allclose(found.prediction[:3] - plain.prediction[:3], mean, atol=1e-9)
+    np.testing.assert_allclose(found.jacobian, plain.jacobian, rtol=1e-6, atol=1e-6)
+
+
+MISTAKES = {
+    "another version": ("format = 1", "format = 2", "reads 1"),
+    "no version": ("format = 1", "", "format is missing"),
+    "another channel": ('"torque_Nm"', '"torque"', "column is 'torque'"),
+    "another gear": ("amplitude = ", 'gear = "lugged"\namplitude = ', "gear is 'lugged'"),
+    "no number": ("mean = [1.0", "mean = [nan", "finite"),
+    "infinite": ("amplitude = 0.2", "amplitude = inf", "above zero"),
+    "negative": ("usual = 0.3", "usual = -0.3", "above zero"),
+    "too few weights": ("mean = [1.0, ", "mean = [", "mean has 2 rows"),
+    "rows that differ": ("[0.1, 0.7]", "[0.1]", "differ in length"),
+    "more than is known": ("[0.9, 0.0]", "[1.9, 0.0]", "negative"),
+    "a point twice": ("[0.5, 40.0]", "[0.1, 40.0]", "too near"),
+    "a load of zero": ("[0.5, 40.0]", "[0.5, 0.0]", "pairs"),
+    "a range upside down": ("slip = [0.1, 0.5]", "slip = [0.5, 0.1]", "[smallest, largest]"),
+    "an unknown key": ("usual = ", "usuel = 1.0\nusual = ", "unknown key 'usuel'"),
+    "a word for a list": ("mean = [1.0, -0.5, 0.25]", 'mean = "x"', "needed is a list"),
+}
+
+
+@pytest.mark.parametrize("what", MISTAKES)
+def test_a_damaged_section_is_refused_in_one_line(case, tmp_path, what, capsys):
+    right, wrong, said = MISTAKES[what]
+    text = case_as_toml(case)
+    assert right in text
+    (tmp_path / "wrong.toml").write_text(text.replace(right, wrong, 1))
+    with pytest.raises(InputError) as refused:
+        read_case(tmp_path / "wrong.toml")
+    assert said in str(refused.value)
+    command = ["simulate", str(tmp_path / "wrong.toml"), "--slip", "0.1", "--load", "60"]
+    assert main(command) == 2
+    assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_an_empty_section_is_refused(tmp_path):
+    (tmp_path / "wrong.toml").write_text(MODEL + "[remainder]\nformat = 1\n")
+    with pytest.raises(InputError, match="needed are 1 to"):
+        read_case(tmp_path / "wrong.toml")
+
+
+def test_the_command_writes_the_error_where_it_is_asked_for(case, tmp_path, capsys):
+    (tmp_path / "model.toml").write_text(case_as_toml(case))
+    command = ["simulate", str(tmp_path / "model.toml"), "--slip", "0.1,0.3", "--load", "60"]
+    assert main(command) == 0
+    assert "torque_Nm_std" not in capsys.readouterr().out
+    assert main([*command, "--std"]) == 0
+    assert "torque_Nm_std" in capsys.readouterr().out
+    plain = [command[0], str(tmp_path / "plain.toml"), *command[2:], "--std"]
+    assert main(plain) == 2
+    assert "has no [remainder]" in capsys.readouterr().err
