@@ -18,6 +18,8 @@ from soilml.gap.evidence.marginal_likelihood import WEAK_PRECISION
 from soilml.gap.evidence.problem import FitProblem
 from soilml.numerics.prior import UNIFORM_PRECISION
 
+#: The parts that are held out, by their keys in a report.
+RUNS, REGION, SLIPS = "held_out_runs", "held_out_region", "held_out_slips"
 FOLDS = 4
 #: Fraction of the readings, those of highest load or of highest slip, in the held-out region.
 REGION_FRACTION = 0.3
@@ -51,16 +53,16 @@ def held_out_folds(readings: Readings, seed: int) -> dict[str, Folds]:
     """
     parts = {}
     if (runs := _run_folds(readings, seed)) is not None:
-        parts["held_out_runs"] = runs
+        parts[RUNS] = runs
     if (region := held_out_region(readings)) is not None:
         name, out = region
         description = f"{name}, predicted from the rest"
-        parts["held_out_region"] = Folds(description, out.astype(np.int64), np.asarray([1]))
+        parts[REGION] = Folds(description, out.astype(np.int64), np.asarray([1]))
     slips = readings.slip_levels
     if runs is None and readings.load_levels.count < 3 and slips.count >= 3:
         fold = slips.index * min(slips.count, MOST_SLIP_LEVELS) // slips.count
         text = "every slip predicted by fits to the others"
-        parts["held_out_slips"] = Folds(text, fold, np.unique(fold))
+        parts[SLIPS] = Folds(text, fold, np.unique(fold))
     return parts
 
 

@@ -32,7 +32,7 @@ from soilml.gap.evidence.outliers import (
 )
 from soilml.gap.evidence.problem import FitProblem, covariance_at
 from soilml.gap.evidence.score_test import ScoreTest
-from soilml.gap.search.explanation import EFFECT_PENALTY
+from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.gap.search.opened_priors import open_priors
 from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
 from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, without_search
@@ -53,6 +53,9 @@ SCALE_TOLERANCE, RUN_EFFECT_TOLERANCE = 0.2, 0.3
 #: Decrease of the objective from which an analysis with opened priors replaces the one with those
 #: of the case: tempered odds of 1 to 9. It then names suspects only.
 OPENED_MARGIN = 9.0
+#: The same where less than half the remainder is left. Its evidence may then be a little smaller:
+#: wider priors cost evidence, and what a large remainder takes up is not explained.
+NO_MARGIN = -6.0
 #: Singular values below this fraction of the largest are ignored in the generalised least squares
 #: fit that smooths the noise: its columns are nearly collinear, and only their span matters.
 GLS_TOLERANCE = 1e-6
@@ -122,13 +125,21 @@ def explains_better(found: Analysis, other: Analysis) -> bool:
     Its evidence counts beside the noise, scatter and discrepancy of the other one, and it predicts
     rows kept back better than the soil alone does.
     """
-    gains = predictive_gains(other.predictions)
-    likeliest = next((c for c in other.result.candidates if gains.get(c.names, 0.0) > 0.0), None)
+    likeliest = _predictive(other)
     if likeliest is None or len(other.problem.readings) != len(found.problem.readings):
         return False
-    lowest = min((c.objective for c in found.result.candidates), default=np.inf)
+    rivals = [c for c in (_predictive(found), found.result.soil_alone) if c is not None]
+    rival = min(rivals, key=lambda c: c.objective)
     value = found.problem.discrepancy.evidence(likeliest.fit, likeliest.amplitude).value
-    return value + EFFECT_PENALTY * len(likeliest.names) < lowest - OPENED_MARGIN
+    value += EFFECT_PENALTY * len(likeliest.names)
+    explains_more = likeliest.amplitude.max() < 0.5 * rival.amplitude.max()
+    return value < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
+
+
+def _predictive(found: Analysis) -> Explanation | None:
+    """The likeliest explanation that predicts rows kept back better than the soil alone does."""
+    gains = predictive_gains(found.predictions)
+    return next((c for c in found.result.candidates if gains.get(c.names, 0.0) > 0.0), None)
 
 
 def _without_outliers(

@@ -16,6 +16,8 @@ from soilml.report.numbers import format_quantity
 
 #: Distance from a bound, as a fraction of the prior, at which a fit presses against it.
 PRESSED = 0.02
+#: Amplitude of a remainder, in usual ones, from which it is large.
+LARGE_LEFT = 4.0
 #: Parameters of the soil whose priors are opened together: with the bearing fixed, those of shear
 #: press for what the bearing lacks, and the other way round.
 OPENED = (*SHEAR, "kphi", "n")
@@ -31,24 +33,26 @@ class OpenedPriors:
 
 
 def open_priors(problem: FitProblem, result: SearchResult) -> OpenedPriors | None:
-    """The priors opened, where the best explanation of a gap presses the soil against one of them.
+    """The priors opened, where the best explanation of a gap does not explain it within them.
 
-    Each prior is opened to the range of natural soils, and a parameter that the case fixes gets
-    that range.
+    It then presses the soil against one of them, or leaves a large remainder. Each prior is opened
+    to the range of natural soils, and a parameter that the case fixes gets that range.
     """
     if not result.has_gap:
         return None
     best = next((c for c in result.accepted if c.names), result.likeliest)
     pressed = _pressed(result.soil if best is None else best.fit)
+    left = best is None or float(best.amplitude.max()) >= LARGE_LEFT
     wide = {c.path: c.prior for c in select_free(replace(problem.case, prior={}), OPENED)}
     known = problem.case.prior
     opened = {
         path: _both(prior, known[path]) if path in known else prior for path, prior in wide.items()
     }
-    if not pressed or all(known.get(path) == prior for path, prior in opened.items()):
+    if not (pressed or left) or all(known.get(path) == prior for path, prior in opened.items()):
         return None
     case = replace(problem.case, prior=known | opened)
-    text = "the priors of the soil were opened: " + "; ".join(pressed.values())
+    why = "; ".join(pressed.values()) or "within them, a large remainder is left"
+    text = f"the priors of the soil were opened: {why}"
     remark = Remark("prior-opened", text, tuple(pressed))
     return OpenedPriors(case, tuple(free_soil_parameters(case, None)), remark)
 

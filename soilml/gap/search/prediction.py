@@ -6,7 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from soilml.gap.evidence.held_out import HeldOutPrediction, held_out_folds, predict_parts
+from soilml.gap.evidence.held_out import (
+    REGION,
+    SLIPS,
+    HeldOutPrediction,
+    held_out_folds,
+    predict_parts,
+)
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.search.posterior import Names
 from soilml.gap.search.stepwise import SearchResult
@@ -45,12 +51,15 @@ def predict_with(problem: FitProblem, result: SearchResult, seed: int) -> Predic
 def predictive_gains(predictions: Predictions) -> dict[Names, float]:
     """Log density of the rows kept back, above that of the soil alone, mean over the parts.
 
-    By the effects of each explanation that was scored. References: Vehtari and Ojanen, Statistics
-    Surveys 6, 2012, section 2 (the log score of predictions).
+    By the effects of each explanation that was scored. Where each slip is predicted, its ends are
+    among them, and the region of high slips does not count again.
+
+    References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
     """
     alone = predictions.get((), {})
+    counted = {part for part in alone if part != REGION or SLIPS not in alone}
     return {
-        names: float(np.mean([p.log_density - alone[part].log_density for part, p in own.items()]))
+        names: float(np.mean([own[p].log_density - alone[p].log_density for p in counted]))
         for names, own in predictions.items()
         if names
     }
