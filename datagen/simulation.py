@@ -18,6 +18,7 @@ from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import COLUMNS, QUANTITIES
@@ -107,7 +108,7 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
     rows = sample_rows(recipe, block, piece.first, piece.last)
     case = recipe.case.with_values(rows.soil)
     at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
-    force = case.model(case.soil, at)
+    force = forces_of_one_gear(case, at)
     truth = true_values(rows.slip, rows.load, force)
     sensor_columns = _add_gear_sensors(recipe, case, block, rows, truth)
     row = np.arange(piece.first, piece.last)

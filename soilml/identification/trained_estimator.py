@@ -23,6 +23,7 @@ from soilml.config.compatibility import (
 )
 from soilml.config.measurement_noise import Discrepancy, common_errors, range_with_zero
 from soilml.errors import InputError, TableError
+from soilml.fitting.covariance import ignored_remainder
 from soilml.identification.fit import ignored_soil_tests
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -251,6 +252,8 @@ def estimators_for_case(
         remarks.append(_discrepancy_remark(given[0], case, pooled))
     if case is not None:
         remarks += ignored_soil_tests(case)
+        consequence = "the file was trained without it, and it is not taken from the readings"
+        remarks += ignored_remainder(case, "estimate", consequence)
     return given, remarks
 
 

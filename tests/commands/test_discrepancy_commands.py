@@ -80,3 +80,41 @@ def test_bands_of_pull_are_wider_and_say_what_they_include(folder, capsys):
 def test_advice_says_how_the_error_of_a_next_row_is_counted(folder, capsys):
     said = spoken(capsys, "advise", "model.toml", "runs.csv", "--slips", "0.1,0.5", "--loads", "60")
     assert "the [discrepancy] of a next row counts as independent" in said.err
+
+
+REMAINDER = """
+[remainder]
+format = 1
+[[remainder.part]]
+column = "torque_Nm"
+amplitude = 0.2
+usual = 0.1
+slip_length = 0.3
+log_load_length = 0.6
+slip = [0.1, 0.5]
+load = [40.0, 110.0]
+points = [[0.3, 70.0]]
+mean = [1.5]
+known = [[0.9]]
+shared = [[0.1]]
+"""
+
+
+def test_a_remainder_is_said_to_be_left_out_by_an_estimate(folder, capsys):
+    (folder / "learned.toml").write_text(MODEL + REMAINDER)
+    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
+    assert "[remainder] of torque_Nm in estimate" in spoken(capsys, *command, "learned.toml").err
+    assert "[remainder]" not in spoken(capsys, *command, "plain.toml").err
+
+
+def test_generated_rows_have_the_mean_of_a_remainder(folder, capsys):
+    import pyarrow.parquet as pq
+
+    recipe = RECIPE.format(rows=8, seed=1)
+    (folder / "plain_recipe.toml").write_text(recipe)
+    (folder / "recipe.toml").write_text(recipe + REMAINDER)
+    spoken(capsys, "generate", "plain_recipe.toml", "plain.parquet")
+    said = spoken(capsys, "generate", "recipe.toml", "rows.parquet").err
+    assert "[remainder] of torque_Nm in generate" in said
+    plain, rows = (pq.read_table(name).to_pydict() for name in ("plain.parquet", "rows.parquet"))
+    assert max(abs(a - b) for a, b in zip(plain["torque_Nm"], rows["torque_Nm"], strict=True)) > 0
