@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
@@ -83,7 +83,7 @@ class DampedSteps:
             = J^T r - P_0 x - T^T z
 
         with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
-        and P = P_0 + T^T T.
+        and P = P_0 + T^T T. Where a step meets a bound, the others are those that belong to it.
 
         x (b, p): The points.
         residual (b, m): Whitened residuals at each point.
@@ -99,8 +99,7 @@ class DampedSteps:
             descent = self._descent(point, residual[i], jacobian)
             free = self._free(point, descent)
             damped = normal + damping[i] * np.diag(scale)
-            step = np.zeros(len(point))
-            step[free] = np.linalg.solve(damped[np.ix_(free, free)], descent[free])
+            step = bounded_step(damped, descent, free, *self._ends(point))
             moved[i] = self._moved(point, step)
         return self.within(moved)
 
@@ -120,6 +119,49 @@ class DampedSteps:
         with np.errstate(invalid="ignore"):
             growth = np.expm1(np.minimum(step / multiple, MOST_LOG_STEP))
             return np.where(np.isfinite(multiple), x + multiple * growth, x + step)
+
+    def _ends(self, x: Floats) -> tuple[Floats, Floats]:
+        """The steps (p,) from coordinates within the bounds to the lower and to the upper ones."""
+        low, high, multiple = self.lower - x, self.upper - x, x + self.offset
+        by_ratio = np.isfinite(multiple)
+        of = multiple[by_ratio]
+        low[by_ratio] = of * np.log1p(low[by_ratio] / of)
+        high[by_ratio] = of * np.minimum(np.log1p(high[by_ratio] / of), MOST_LOG_STEP)
+        return low, high
+
+
+def bounded_step(
+    normal: Floats, descent: Floats, free: NDArray[np.bool_], low: Floats, high: Floats
+) -> Floats:
+    r"""Step of the free coordinates that lowers a quadratic function between bounds, (p,).
+
+    .. math:: \tfrac{1}{2}\, \Delta u^T N\, \Delta u - d^T \Delta u
+
+    Whenever a coordinate meets a bound on the way to the minimum, it stays there, and the others
+    go on to the minimum that belongs to it. To leave coordinates outside their bounds and move them
+    back afterwards would leave the valley of a function whose minimum lies far outside.
+
+    normal (p, p), descent (p,): N and d.
+    low, high (p,): Bounds of the step, around zero.
+
+    References: Nocedal and Wright, Numerical Optimization, 2006, section 16.5 (active sets).
+    """
+    step, free = np.zeros(len(descent)), free.copy()
+    while free.any():
+        index = np.flatnonzero(free)
+        left = descent[index] - normal[index] @ np.where(free, 0.0, step)
+        change = np.linalg.solve(normal[np.ix_(index, index)], left) - step[index]
+        room = np.where(change < 0.0, low[index], high[index]) - step[index]
+        beyond = np.abs(change) > np.abs(room)
+        if not beyond.any():
+            step[index] += change
+            break
+        share = np.where(beyond, room / np.where(beyond, change, 1.0), 1.0)
+        first = int(np.argmin(share))
+        step[index] += share[first] * change
+        step[index[first]] = (low if change[first] < 0.0 else high)[index[first]]
+        free[index[first]] = False
+    return step
 
 
 def _offset(coordinate: Coordinate) -> float:
@@ -183,13 +225,15 @@ _Descent: TypeAlias = Generator[_Question, Any, Solution]
 
 
 def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation | InputError]:
-    """The answers to the questions of all descents."""
-    answers: dict[int, Floats | Linearisation | InputError] = {}
-    for linearised, answer in ((False, predict_many), (True, linearise_many)):
-        these = [i for i, question in asked.items() if question.linearise == linearised]
-        found = answer([asked[i].request for i in these])
-        answers |= dict(zip(these, found, strict=True))
-    return answers
+    """The answers to the questions of one kind, predictions first.
+
+    Descents that ask for a linearisation wait until all do, so that one call serves them.
+    """
+    these = [i for i, question in asked.items() if not question.linearise]
+    answer: Callable[..., Sequence[Floats | Linearisation | InputError]] = predict_many
+    if not these:
+        these, answer = list(asked), linearise_many
+    return dict(zip(these, answer([asked[i].request for i in these]), strict=True))
 
 
 def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
