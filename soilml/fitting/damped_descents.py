@@ -184,7 +184,9 @@ def levenberg_marquardt(problem: LeastSquaresProblem, start: Floats) -> Solution
 
 
 def descend_together(
-    problems: Sequence[LeastSquaresProblem], starts: Sequence[Floats]
+    problems: Sequence[LeastSquaresProblem],
+    starts: Sequence[Floats],
+    known: Sequence[Linearisation | None] | None = None,
 ) -> list[Solution | InputError]:
     """Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
 
@@ -193,22 +195,27 @@ def descend_together(
     equilibrium. Where the model refuses the coordinates of a trial, its `InputError` takes the
     place of the solution.
 
+    known: Linearisations of the problems that may be at their starts; one that is spares the first
+        call of the model.
+
     References: Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
     results: dict[int, Solution | InputError] = {}
-    descents = [_descent(problem, x) for problem, x in zip(problems, starts, strict=True)]
-    asked = {i: next(descent) for i, descent in enumerate(descents)}
-    while asked:
-        for i, answer in _answers(asked).items():
+    near = known or [None] * len(problems)
+    descents = [_descent(*own) for own in zip(problems, starts, near, strict=True)]
+    asked: dict[int, _Question] = {}
+    answers: dict[int, Any] = dict.fromkeys(range(len(problems)))
+    while answers:
+        for i, answer in answers.items():
+            asked.pop(i, None)
             if isinstance(answer, InputError):
                 results[i] = answer
-                del asked[i]
                 continue
             try:
                 asked[i] = descents[i].send(answer)
             except StopIteration as end:
                 results[i] = end.value
-                del asked[i]
+        answers = _answers(asked) if asked else {}
     return [results[i] for i in range(len(problems))]
 
 
@@ -236,7 +243,7 @@ def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation
     return dict(zip(these, answer([asked[i].request for i in these]), strict=True))
 
 
-def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
+def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation | None) -> _Descent:
     """One descent; see `descend_together`.
 
     Each damping is tried by a step and by a second step with the same Jacobian, which follows a
@@ -251,7 +258,9 @@ def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
         return _Question(problem.request(x, sinkage), linearise=False)
 
     x = steps.within(start)
-    last = problem.at(x, (yield _Question(problem.request(x[None, :]), linearise=True)))
+    if known is None or not np.array_equal(known.x, x):
+        known = yield _Question(problem.request(x[None, :]), linearise=True)
+    last = problem.at(x, known)
     damping, converged = FIRST_DAMPING, False
     for _ in range(MAX_ITERATIONS):
         if steps.are_held(last.x, last.residual, last.jacobian):
@@ -283,7 +292,7 @@ def _descent(problem: LeastSquaresProblem, start: Floats) -> _Descent:
             continue
         last = new
         damping = max(float(dampings[best % len(dampings)]), MIN_DAMPING)
-        if improvement < max(ENOUGH, SHARE * (last.objective - len(problem.readings))):
+        if improvement < max(ENOUGH, SHARE * (last.objective - len(last.residual))):
             converged = True
             break
     return replace(last, converged=converged)

@@ -38,15 +38,19 @@ class CaseSets:
 def join_key(part: CaseSets) -> Hashable:
     """Equal for parts that `joined_load_case` may join at little cost.
 
-    They share gear and known covariates. Effects on stresses act at all points of every contact,
-    and some multiply these points, so that rows without such an effect are kept apart from those
-    that have it.
+    They share gear, known covariates and the effects that multiply the points of a contact.
     """
     known = tuple(name for name in COVARIATES if getattr(part.at, name) is not None)
-    apart = frozenset(
-        e.name for e in part.case.model.effects if e.overrides("on_stress") or e.more_points
-    )
-    return part.case.model.gear, known, apart
+    multiplied = frozenset(e.name for e in part.case.model.effects if e.more_points)
+    return part.case.model.gear, known, multiplied
+
+
+def effects_on_stress(part: CaseSets) -> Hashable:
+    """The effects of a case on stresses: they act at all points of every contact.
+
+    Many rows without such an effect are solved faster apart from those that have it.
+    """
+    return frozenset(e.name for e in part.case.model.effects if e.overrides("on_stress"))
 
 
 def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:

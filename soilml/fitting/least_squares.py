@@ -73,7 +73,7 @@ class LeastSquaresProblem:
     case: Case
     coordinates: Sequence[Coordinate]
     readings: Readings
-    whiten: Whitening | Floats  # (m, m) in either form
+    whiten: Whitening | Floats  # (m, m) in either form, or (k, m) of some of the readings
 
     @cached_property
     def gears(self) -> list[GearReadings]:
@@ -125,7 +125,8 @@ class LeastSquaresProblem:
         if residual.ndim == 1:
             return np.asarray(self.whiten @ residual)
         flat = residual.reshape(-1, residual.shape[-1])
-        return np.asarray((self.whiten @ flat.T).T.reshape(residual.shape))
+        white = np.asarray((self.whiten @ flat.T).T)
+        return white.reshape(*residual.shape[:-1], white.shape[-1])
 
     @cached_property
     def normal_std(self) -> Floats:

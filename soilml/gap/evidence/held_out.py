@@ -12,7 +12,6 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
-from soilml.fitting.predictions import Linearisation, PredictionRequest, linearise_many
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.marginal_likelihood import WEAK_PRECISION
 from soilml.gap.evidence.problem import FitProblem
@@ -127,35 +126,28 @@ def predict_parts(
     """
     readings = problem.readings
     problems, starts, where = [], [], []
-    for i, (fit, amplitude) in enumerate(models):
-        for name, folds in parts.items():
-            for number in folds.predicted:
-                rest = folds.fold != number
-                known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
-                kept, whiten = readings.subset(rest), known.whiten(amplitude)
-                problems.append(LeastSquaresProblem(fit.case, fit.coordinates, kept, whiten))
-                starts.append(fit.x)
+    for name, folds in parts.items():
+        for number in folds.predicted:
+            rest = folds.fold != number
+            known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
+            for i, (fit, amplitude) in enumerate(models):
+                whiten = known.whiten(amplitude).among(rest)
+                problems.append(LeastSquaresProblem(fit.case, fit.coordinates, readings, whiten))
+                starts.append(fit)
                 where.append((i, name, rest))
-    fits = descend_together(problems, starts)
-    covariance = [problem.discrepancy.matrix(amplitude) for _, amplitude in models]
-    at = linearise_many(
-        [
-            PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
-            for fit in fits
-            if isinstance(fit, Solution)
-        ]
+    fits = descend_together(
+        problems, [fit.x for fit in starts], [fit.linearisation for fit in starts]
     )
-    linearised = iter(at)
+    covariance = [problem.discrepancy.matrix(amplitude) for _, amplitude in models]
     found = [{name: _nothing_yet(len(readings)) for name in parts} for _ in models]
     for (i, name, rest), solved in zip(where, fits, strict=True):
         part = found[i][name]
-        near = next(linearised) if isinstance(solved, Solution) else solved
-        if isinstance(solved, InputError) or isinstance(near, InputError):
+        if isinstance(solved, InputError):
             std = problem.covariance.std[~rest]
             part.std[~rest], log_density = std, _density_of_nothing(std)
         else:
             part.mean[~rest], part.std[~rest], log_density = _conditional(
-                solved, near, readings.measured, covariance[i], rest
+                solved, readings.measured, covariance[i], rest
             )
         found[i][name] = replace(part, log_density=part.log_density + log_density)
     return found
@@ -166,14 +158,13 @@ def _nothing_yet(count: int) -> HeldOutPrediction:
 
 
 def _conditional(
-    fit: Solution, at: Linearisation, reading: Floats, matrix: Floats, rest: NDArray[np.bool_]
+    fit: Solution, reading: Floats, matrix: Floats, rest: NDArray[np.bool_]
 ) -> tuple[Floats, Floats, float]:
     """Mean and standard deviation of readings that are not in the rest, and their log density."""
-    out = ~rest
-    jacobian = np.nan_to_num(at.jacobian)
+    out, prediction, jacobian = ~rest, fit.prediction, fit.derivatives
     gain = np.linalg.solve(matrix[np.ix_(rest, rest)], matrix[np.ix_(rest, out)]).T
-    left = np.nan_to_num(reading[rest] - at.prediction[rest])
-    mean = at.prediction[out] + gain @ left
+    left = np.nan_to_num(reading[rest] - prediction[rest])
+    mean = prediction[out] + gain @ left
     change = jacobian[out] - gain @ jacobian[rest]
     covariance = matrix[np.ix_(out, out)] - gain @ matrix[np.ix_(rest, out)]
     covariance = covariance + change @ _coordinate_covariance(fit) @ change.T

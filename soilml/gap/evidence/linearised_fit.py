@@ -92,7 +92,7 @@ class LinearisedFit:
         square = AMPLITUDES[:, None] ** 2
         shrink = square / (1.0 + square * part.value)  # (b, functions)
         plain = self.plain - beside.T @ beside
-        explained = np.einsum("bq,qi,qj->bij", shrink, rotated, rotated, optimize=True)
+        explained = (shrink[:, None, :] * rotated.T) @ rotated  # (b, p + 1, p + 1)
         growth = np.log1p(square * part.value).sum(axis=1)
         value = self._solve(plain - explained)[0] + part.log_determinant + growth
         return np.asarray(value + amplitude_penalty(trials))

@@ -15,6 +15,7 @@ from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coord
 from soilml.fitting.covariance import Whitening, discrepancy_process
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.predictions import Linearisation
 from soilml.fitting.readings import Readings
 from soilml.gap.candidate_effects import with_effect
 from soilml.gap.evidence.covariance import (
@@ -22,7 +23,7 @@ from soilml.gap.evidence.covariance import (
     assemble_covariance,
     run_effect_columns,
 )
-from soilml.gap.evidence.directions import current_size
+from soilml.gap.evidence.directions import Signature, current_size, effect_signatures
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
@@ -79,6 +80,17 @@ class FitProblem:
             if not any(exclude_each_other(effect, other) for other in fitted)
         }
 
+    def signatures_beside(self, fit: Solution) -> list[Signature]:
+        """Signatures of the effects that a fit lacks, at the fit; they are kept for each fit."""
+        if id(fit) not in self._signatures:
+            found, _ = effect_signatures(fit.fitted(), self.readings, self.effects_not_in(fit))
+            self._signatures[id(fit)] = fit, found
+        return self._signatures[id(fit)][1]
+
+    @cached_property
+    def _signatures(self) -> dict[int, tuple[Solution, list[Signature]]]:
+        return {}
+
     def with_effects(self, names: Sequence[str]) -> Case:
         """The case with these effects added."""
         case = self.case
@@ -107,11 +119,11 @@ class FitProblem:
         shapes = [c for name in names for c in shape_coordinates(self.effects[name])]
         return [c for c in shapes if varies[c.name]]
 
-    def fit_soil(self, starts: Sequence[Floats]) -> Solution:
-        """The best of the fits of the soil alone, one from each start."""
+    def fit_soil(self, starts: Sequence[Floats], near: Linearisation | None = None) -> Solution:
+        """The best of the fits of the soil alone, one from each start; `near` may be at one."""
         whiten = self.covariance.whiten
         problem = LeastSquaresProblem(self.case, self.soil, self.readings, whiten)
-        fits = descend_together([problem] * len(starts), starts)
+        fits = descend_together([problem] * len(starts), starts, [near] * len(starts))
         return min((raised(fit) for fit in fits), key=lambda fit: fit.objective)
 
     def fit(
@@ -139,13 +151,15 @@ class FitProblem:
 class StartedFit:
     """A fit to be made to a problem's readings, and the coordinates, by path, that it starts at.
 
-    `whiten`, (m, m), replaces the inverse Cholesky factor of the problem's covariance.
+    `whiten`, (m, m), replaces the inverse Cholesky factor of the problem's covariance. `near` is
+    the linearisation of an earlier fit to the same readings, at its optimum.
     """
 
     case: Case
     coordinates: Sequence[Coordinate]
     start: Mapping[str, float]
     whiten: Whitening | None = None
+    near: Linearisation | None = None
 
 
 def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution | InputError]:
@@ -166,7 +180,9 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
         for fit in fits
     ]
     found = descend_together(
-        problems, [problem.first_coordinates(fit.coordinates, fit.start) for fit in fits]
+        problems,
+        [problem.first_coordinates(fit.coordinates, fit.start) for fit in fits],
+        [fit.near for fit in fits],
     )
     refused = [i for i, result in enumerate(found) if isinstance(result, InputError)]
     again = descend_together(
@@ -259,7 +275,8 @@ def fit_marginal(
             found[i] = MarginalFit(fit, evidence, earlier.first if earlier else fit)
             lowest = min(lowest, evidence.value)
             if _changed(amplitude, evidence.amplitude):
-                again[i] = (replace(request, start=fit.start_values()), evidence.amplitude)
+                request = replace(request, start=fit.start_values(), near=fit.linearisation)
+                again[i] = request, evidence.amplitude
         waiting = {}
         for i, repeated in again.items():
             marginal = found[i]

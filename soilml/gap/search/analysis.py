@@ -23,7 +23,7 @@ from soilml.gap.evidence.covariance import (
     estimate_covariance,
     run_effect_columns,
 )
-from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_basis
+from soilml.gap.evidence.directions import Signature, smooth_basis
 from soilml.gap.evidence.outliers import (
     MAX_OUTLIER_FRACTION,
     OUTLIER_SIGMA,
@@ -204,7 +204,7 @@ def _search_in_passes(
         problem = _with_estimated_covariance(problem, best, result.final_test.signatures)
         if result.accepted and _have_converged(last, problem.covariance.components):
             break
-        soil = problem.fit_soil([soil.x])
+        soil = problem.fit_soil([soil.x], soil.linearisation)
         starts = {c.names: c for c in result.candidates}
         result = search(problem, soil, seed, starts, _in_pass(number, progress))
         best = result.accepted[0].fit if result.accepted else soil
@@ -252,8 +252,7 @@ def _explained_space(problem: FitProblem, fit: Solution, signatures: Sequence[Si
     """All that soil, effects and smooth functions could explain, (m, q)."""
     readings = problem.readings
     if not signatures or len(signatures[0].column) != len(readings):
-        others = problem.effects_not_in(fit)
-        signatures, _ = effect_signatures(fit.fitted(), readings, others)
+        signatures = problem.signatures_beside(fit)
     declared = problem.declared_amplitude[problem.discrepancy.process.channel] > 0.0
     return np.column_stack(
         [

@@ -10,6 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.fitting.coordinates import shape_coordinates
 from soilml.fitting.least_squares import Solution
+from soilml.fitting.predictions import Linearisation
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
@@ -70,13 +71,15 @@ class CandidateRequest:
     """A set of effects to be fitted.
 
     `start` has the coordinates to start with by path, and `amplitude` those of the discrepancy by
-    channel. `noise_start` are those to start with under noise alone, if that is asked for.
+    channel. `noise_start` are those to start with under noise alone, if that is asked for. `near`
+    is a linearisation where `start` was taken from.
     """
 
     names: tuple[str, ...]
     start: Mapping[str, float]
     amplitude: Floats
     noise_start: Mapping[str, float] | None = None
+    near: Linearisation | None = None
 
 
 def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[Explanation]:
@@ -87,7 +90,9 @@ def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) ->
     model refuses are left out.
     """
     no_discrepancy = np.zeros(len(problem.readings.channels))
-    beside = [(_started(problem, r.names, r.start), r.amplitude) for r in requests]
+    beside = [
+        (replace(_started(problem, r.names, r.start), near=r.near), r.amplitude) for r in requests
+    ]
     alone = [
         (_started(problem, r.names, r.noise_start), no_discrepancy)
         for r in requests

@@ -169,10 +169,11 @@ def search(
 
 def _fit_soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Explanation:
     """The empty set of effects: the soil alone with a smooth discrepancy."""
-    start, amplitude = soil.start_values(), np.ones(len(problem.readings.channels))
+    first, amplitude = soil, np.ones(len(problem.readings.channels))
     if () in starts:
-        start, amplitude = starts[()].fit.start_values(), starts[()].amplitude
-    started = StartedFit(soil.case, soil.coordinates, start)
+        first, amplitude = starts[()].fit, starts[()].amplitude
+    near = first.linearisation
+    started = StartedFit(soil.case, soil.coordinates, first.start_values(), near=near)
     marginal = fit_marginal(problem, [(started, amplitude)])[0]
     if marginal is None:  # it is feasible under noise alone
         marginal = MarginalFit(soil, problem.discrepancy.evidence(soil))
@@ -202,8 +203,12 @@ def _fit_level(
             noise_start = {path: off_bounds(x) for path, x in soil.start_values().items()}
             if alone is not None:
                 noise_start = alone.start_values()
-        start = base.catalogue_law.fit.start_values()
-        requests.append(CandidateRequest(names, start, smaller, noise_start))
+        fit = base.catalogue_law.fit
+        requests.append(
+            CandidateRequest(
+                names, fit.start_values(), smaller, noise_start, near=fit.linearisation
+            )
+        )
     fitted = fit_candidates(problem, requests)
     if not fitted:
         return []
@@ -237,8 +242,7 @@ def _is_complete(problem: FitProblem, best: Explanation, seed: int) -> bool:
 
 def _test_residuals(problem: FitProblem, candidate: Explanation, seed: int) -> ResidualTest:
     fit = candidate.fit
-    signatures, _ = effect_signatures(fit.fitted(), problem.readings, problem.effects_not_in(fit))
-    return residual_test(problem, fit, signatures, seed)
+    return residual_test(problem, fit, problem.signatures_beside(fit), seed)
 
 
 def _extensions(
@@ -251,9 +255,7 @@ def _extensions(
     extended: dict[tuple[str, ...], Explanation] = {}
     in_reach = [c for c in level if c.objective < lowest + WITHIN_REACH]
     for candidate in sorted(in_reach, key=lambda c: c.objective)[:EXTENDED_SETS]:
-        fit = candidate.fit
-        others = problem.effects_not_in(fit)
-        signatures, _ = effect_signatures(fit.fitted(), problem.readings, others)
+        signatures = problem.signatures_beside(candidate.fit)
         gains = predicted_gains(problem, candidate, candidate.objective, signatures)
         promising = [n for n in gains if gains[n] > MIN_NET_GAIN]
         promising = sorted(promising, key=lambda n: -gains[n])[:EXTENSIONS]

@@ -196,7 +196,7 @@ def test_a_refused_fit_starts_again_without_effects_and_is_refused_once_more(cle
     refusals = [InputError("first"), InputError("second")]
     asked = []
 
-    def descend_together(problems, starts):
+    def descend_together(problems, starts, known=None):
         asked.append(starts)
         assert all(p.coordinates is coordinates for p in problems) and len(problems) == len(starts)
         return ["a fit", refusals[0], refusals[0]] if len(asked) == 1 else ["later", refusals[1]]
