@@ -7,7 +7,13 @@ import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.damped_descents import MOST_LOG_STEP, DampedSteps
+from soilml.fitting.covariance import Whitening
+from soilml.fitting.damped_descents import (
+    MOST_LOG_STEP,
+    DampedSteps,
+    bounded_step,
+    descend_together,
+)
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
@@ -111,3 +117,36 @@ def test_a_fit_follows_the_valley_of_bearing_modulus_and_exponent():
         found = problem.fit_soil([start])
         assert found.converged
         assert found.objective == pytest.approx(best.objective, abs=0.2)
+
+
+def test_a_step_that_meets_a_bound_goes_on_in_the_valley():
+    """Along the valley u = v the minimum lies at 5; where u ends at 1, v ends nearby."""
+    normal = np.asarray([[1.0, -0.99], [-0.99, 1.0]])
+    descent = normal @ np.asarray([5.0, 5.0])
+    free, low = np.ones(2, dtype=np.bool_), np.full(2, -1.0)
+    step = bounded_step(normal, descent, free, low, np.asarray([1.0, 3.0]))
+    assert step == pytest.approx([1.0, 5.0 - 0.99 * 4.0])
+    held = bounded_step(normal, descent, np.asarray([False, True]), low, np.ones(2))
+    assert held == pytest.approx([0.0, descent[1]])
+
+
+def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
+    problem = fit_problem(case_of(), driven(case_of(), seed=2))
+    own = LeastSquaresProblem(
+        problem.case, problem.soil, problem.readings, problem.covariance.whiten
+    )
+    start = np.full(3, 0.3)
+    known = own.linearised(start).linearisation
+    alone, beside, elsewhere = descend_together(
+        [own] * 3, [start, start, np.full(3, 0.6)], [None, known, known]
+    )
+    assert np.array_equal(alone.x, beside.x) and alone.objective == beside.objective
+    assert elsewhere.x == pytest.approx(alone.x, abs=2e-3)
+
+
+def test_readings_that_are_ignored_do_not_count_in_what_whitens_the_others():
+    rng = np.random.default_rng(0)
+    std, columns, y = rng.uniform(1.0, 2.0, 5), rng.normal(size=(5, 2)), rng.normal(size=7)
+    selected = np.asarray([True, False, True, True, True, False, True])
+    whiten = Whitening.of(std, columns)
+    assert whiten.among(selected) @ y == pytest.approx(whiten @ y[selected])
