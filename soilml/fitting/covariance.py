@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
@@ -58,14 +57,6 @@ class Whitening:
         """
         basis, size, _ = np.linalg.svd(columns / std[:, None], full_matrices=False)
         return Whitening(1.0 / std, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
-
-    def among(self, selected: NDArray[np.bool_]) -> Whitening:
-        """The same, of selected readings out of m, for arrays (m,) and (m, k) of all."""
-        from scipy.sparse import csr_array, diags_array, eye_array
-
-        taken = csr_array(eye_array(len(selected)))[np.flatnonzero(selected)]
-        noise = diags_array(self.noise) if np.ndim(self.noise) == 1 else csr_array(self.noise)
-        return replace(self, noise=noise @ taken)
 
     def __matmul__(self, values: Floats) -> Floats:
         independent = np.ndim(self.noise) == 1

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.fitting.covariance import Whitening
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
@@ -131,7 +132,7 @@ def predict_parts(
             rest = folds.fold != number
             known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
             for i, (fit, amplitude) in enumerate(models):
-                whiten = known.whiten(amplitude).among(rest)
+                whiten = of_selected(known.whiten(amplitude), rest)
                 problems.append(LeastSquaresProblem(fit.case, fit.coordinates, readings, whiten))
                 starts.append(fit)
                 where.append((i, name, rest))
@@ -151,6 +152,14 @@ def predict_parts(
             )
         found[i][name] = replace(part, log_density=part.log_density + log_density)
     return found
+
+
+def of_selected(whiten: Whitening, selected: NDArray[np.bool_]) -> Whitening:
+    """What whitens selected readings out of m, for arrays (m,) and (m, k) of all of them."""
+    from scipy.sparse import csr_array, eye_array
+
+    taken = csr_array(eye_array(len(selected)))[np.flatnonzero(selected)]
+    return replace(whiten, noise=whiten.noise @ taken)
 
 
 def _nothing_yet(count: int) -> HeldOutPrediction:

@@ -7,7 +7,6 @@ import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.covariance import Whitening
 from soilml.fitting.damped_descents import (
     MOST_LOG_STEP,
     DampedSteps,
@@ -142,11 +141,3 @@ def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
     )
     assert np.array_equal(alone.x, beside.x) and alone.objective == beside.objective
     assert elsewhere.x == pytest.approx(alone.x, abs=2e-3)
-
-
-def test_readings_that_are_ignored_do_not_count_in_what_whitens_the_others():
-    rng = np.random.default_rng(0)
-    std, columns, y = rng.uniform(1.0, 2.0, 5), rng.normal(size=(5, 2)), rng.normal(size=7)
-    selected = np.asarray([True, False, True, True, True, False, True])
-    whiten = Whitening.of(std, columns)
-    assert whiten.among(selected) @ y == pytest.approx(whiten @ y[selected])
