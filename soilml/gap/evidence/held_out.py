@@ -156,10 +156,9 @@ def predict_parts(
 
 def of_selected(whiten: Whitening, selected: NDArray[np.bool_]) -> Whitening:
     """What whitens selected readings out of m, for arrays (m,) and (m, k) of all of them."""
-    from scipy.sparse import csr_array, eye_array
-
-    taken = csr_array(eye_array(len(selected)))[np.flatnonzero(selected)]
-    return replace(whiten, noise=whiten.noise @ taken)
+    noise = whiten.noise  # sparse: its columns become those of the selected readings
+    parts = noise.data, np.flatnonzero(selected)[noise.indices], noise.indptr
+    return replace(whiten, noise=type(noise)(parts, shape=(noise.shape[0], len(selected))))
 
 
 def _nothing_yet(count: int) -> HeldOutPrediction:
