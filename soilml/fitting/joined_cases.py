@@ -35,22 +35,26 @@ class CaseSets:
         return int(np.size(self.at.slip))
 
 
-def join_key(part: CaseSets) -> Hashable:
-    """Equal for parts that `joined_load_case` may join at little cost.
+#: So few rows are solved in one call whatever the stresses: a call costs more than the rows.
+FEW_ROWS = 500
 
-    They share gear, known covariates and the effects that multiply the points of a contact.
+
+def join_keys(parts: Sequence[CaseSets]) -> list[Hashable]:
+    """A key of each part, equal for those that `joined_load_case` may join at little cost.
+
+    They share gear, known covariates and the effects that multiply the points of a contact. Effects
+    on stresses act at all points of every contact, so that rows without such an effect are kept
+    apart from those that have it, unless there are few.
     """
-    known = tuple(name for name in COVARIATES if getattr(part.at, name) is not None)
-    multiplied = frozenset(e.name for e in part.case.model.effects if e.more_points)
-    return part.case.model.gear, known, multiplied
-
-
-def effects_on_stress(part: CaseSets) -> Hashable:
-    """The effects of a case on stresses: they act at all points of every contact.
-
-    Many rows without such an effect are solved faster apart from those that have it.
-    """
-    return frozenset(e.name for e in part.case.model.effects if e.overrides("on_stress"))
+    few = sum(part.sets * part.points for part in parts) < FEW_ROWS
+    keys: list[Hashable] = []
+    for part in parts:
+        known = tuple(name for name in COVARIATES if getattr(part.at, name) is not None)
+        effects = part.case.model.effects
+        multiplied = frozenset(e.name for e in effects if e.more_points)
+        on_stress = frozenset(e.name for e in effects if e.overrides("on_stress") and not few)
+        keys.append((part.case.model.gear, known, multiplied, on_stress))
+    return keys
 
 
 def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:

@@ -20,12 +20,7 @@ from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
 from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.joined_cases import (
-    CaseSets,
-    effects_on_stress,
-    join_key,
-    joined_load_case,
-)
+from soilml.fitting.joined_cases import CaseSets, join_keys, joined_load_case
 from soilml.fitting.operating_points import rows_by_gear
 from soilml.fitting.readings import Readings
 from soilml.physics.contact import Force
@@ -41,8 +36,6 @@ T = TypeVar("T")
 #: Step of the difference quotients, in units of the coordinate: rounding errors of a reading at
 #: given sinkage (1e-14 of it) and curvature then both stay below 1e-5 of a derivative.
 DIFFERENCE_STEP = 1e-6
-#: So few rows are solved in one call whatever their effects: a call costs more than the rows.
-FEW_ROWS = 500
 
 
 @dataclass(frozen=True)
@@ -280,12 +273,10 @@ def _answered(
     requests: Sequence[PredictionRequest], answer: Callable[[Sequence[PredictionRequest]], list[T]]
 ) -> list[T | InputError]:
     """Answers to all requests, those that can be joined together; else one by one."""
-    parts = [request.case_sets(request.x) for request in requests]
-    few = sum(part.sets * part.points for part in parts) < FEW_ROWS
+    keys = join_keys([request.case_sets(request.x) for request in requests])
     groups: dict[object, list[int]] = {}
-    for i, (request, part) in enumerate(zip(requests, parts, strict=True)):
-        nearest = None if request.estimate is None else request.estimate.nearest
-        key = join_key(part), nearest, None if few else effects_on_stress(part)
+    for i, (request, own) in enumerate(zip(requests, keys, strict=True)):
+        key = own, None if request.estimate is None else request.estimate.nearest
         groups.setdefault(key, []).append(i)
     answers: dict[int, T | InputError] = {}
     for group in groups.values():
