@@ -16,6 +16,9 @@ DRAWS = 4000
 MIN_PROJECTED_FRACTION = 1e-4
 
 
+TINY = 1e-300  # Smallest probability of a score, so that its normal score is finite
+
+
 @dataclass(frozen=True)
 class ScoreTest:
     """Score of each of k columns, and the null distribution of the largest score."""
@@ -43,6 +46,7 @@ def score_test(
     signs: Floats,
     degrees_of_freedom: float,
     seed: int,
+    own_degrees: Floats | None = None,
 ) -> ScoreTest:
     r"""Score test of whitened residuals against each of many whitened columns.
 
@@ -63,7 +67,10 @@ def score_test(
     projected_norm = np.linalg.norm(projected, axis=0)
     testable = projected_norm > MIN_PROJECTED_FRACTION * np.maximum(norm, 1e-300)
     unit = np.where(testable, projected / np.where(testable, projected_norm, 1.0), 0.0)
-    z = _with_sign(unit.T @ residual, signs)
+    z = unit.T @ residual
+    if own_degrees is not None:
+        z = _as_normal(z, own_degrees)
+    z = _with_sign(z, signs)
     null = _with_sign(_null_scores(unit, degrees_of_freedom, seed), signs)
     null[:, ~testable] = 0.0
     return ScoreTest(
@@ -72,6 +79,15 @@ def score_test(
         projected_norm=np.where(testable, projected_norm, 0.0),
         absorbed=1.0 - (projected_norm / np.maximum(norm, 1e-300)) ** 2,
     )
+
+
+def _as_normal(z: Floats, degrees_of_freedom: Floats) -> Floats:
+    """Normal scores of the same probability as scores (k,) of Student's t distribution."""
+    from scipy.special import ndtri, stdtr
+
+    few = np.isfinite(degrees_of_freedom)
+    tail = stdtr(np.where(few, degrees_of_freedom, 1.0), -np.abs(z))
+    return np.where(few, -np.sign(z) * ndtri(np.maximum(tail, TINY)), z)
 
 
 def _null_scores(unit: Floats, degrees_of_freedom: float, seed: int) -> Floats:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_basis
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
@@ -266,6 +267,17 @@ def _extensions(
     return extended
 
 
+def _degrees_by_runs(problem: FitProblem, signatures: Sequence[Signature], others: int) -> Floats:
+    """Degrees of freedom by which each signature is judged; infinite but for drifts of the soil.
+
+    A drift differs from the scatter of the runs only by its order: a line through them leaves two
+    fewer than there are runs.
+    """
+    left = max(len(problem.readings.runs) - 2, 1)
+    drifts = ["progress" in problem.effects[s.name].about.uses for s in signatures]
+    return np.asarray([left if drift else np.inf for drift in drifts] + [np.inf] * others)
+
+
 @dataclass(frozen=True)
 class ResidualTest:
     """Score test of a fit's residuals, and the signatures against which they were tested."""
@@ -308,5 +320,6 @@ def residual_test(
         signs=signs,
         degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
         seed=seed,
+        own_degrees=_degrees_by_runs(problem, signatures, smooth.shape[1]),
     )
     return ResidualTest(tuple(signatures), test)

@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
+from scipy.stats import norm, t
 
 from soilml.gap import gap
 from soilml.gap.evidence.outliers import ends_of_monotone_series
+from soilml.gap.evidence.score_test import score_test
 from soilml.gap.report.results import GapReduction
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.verdict.reductions import without_grown
@@ -85,3 +87,18 @@ def test_a_deep_last_sinkage_is_evidence_and_no_outlier():
     report = gap(case, table)
     assert not [n for n in report.notes if n.code == "outliers"]
     assert report.status != "bad-data"
+
+
+def test_scores_that_few_runs_determine_need_more():
+    found = score_test(
+        residual=np.asarray([4.0, 0.0, 0.0]),
+        columns=np.eye(3)[:, :2] @ np.asarray([[1.0, 1.0], [0.0, 0.0]]),
+        space=np.zeros((3, 0)),
+        signs=np.zeros(2),
+        degrees_of_freedom=1e6,
+        seed=0,
+        own_degrees=np.asarray([3.0, np.inf]),
+    )
+    few, many = found.z
+    assert many == pytest.approx(4.0)
+    assert few == pytest.approx(norm.isf(t.sf(4.0, 3.0)))
