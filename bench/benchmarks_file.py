@@ -27,6 +27,7 @@ TITLES = {
     "systems": "Wheel-legs",
     "software": "Paths through the code and wall time",
     "gap": "Gap workflow: hidden effects",
+    "gap-measured": "Gap workflow: published tests",
 }
 SUMMARY = "At a glance"
 
@@ -74,8 +75,9 @@ def write_first_page(names: Sequence[str], summary: str, root: Path = ROOT) -> N
         "the estimators relative to the Bayes limit, detection of faults, latency on board, and "
         "the workflow that finds missing effects. Goals are targets; a goal that is not reached is "
         "marked as missed.\n\n"
-        "**Command.** `make bench` writes this page and all others but that of the gap workflow, "
-        "which `make bench-gap` writes. `python bench/run.py NAME ...` replaces single sections: "
+        "**Command.** `make bench` writes this page and all others but those of the gap workflow, "
+        "which `make bench-gap` and `make gap-real` write. `python bench/run.py NAME ...` replaces "
+        "single sections: "
         f"{', '.join(names)}. No figure is typed by hand.\n\n"
         f"**Machine.** {environment}\n\n"
         f"| page | sections |\n|---|---|\n{rows}\n\n"

@@ -1,124 +1,176 @@
-"""Published single-wheel tests through the gap workflow: `make gap-real SOILML_DATA=...`."""
+"""Published single-wheel tests through the gap workflow: `make gap-real SOILML_DATA=...`.
+
+Every set is analysed with three sets of priors; the reports are in
+`demo/gap/real/SET/PRIORS/report`, and `--write` writes docs/benchmarks/gap-measured.md.
+"""
 
 from __future__ import annotations
 
-import csv
+import argparse
+import contextlib
+import io
 import json
+import math
 import os
-import runpy
 import sys
-from dataclasses import replace
+import tomllib
 from pathlib import Path
+from typing import Any
 
+sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
+
+from benchmarks_file import TITLES, machine, page_file
+from measured_sets import PRIORS, SETS, MeasuredSet, model_text, table_text
+
+from datagen.processes import process_map
 from soilml.cli import main
-from soilml.config.case import read_case
-from soilml.config.measurement_noise import Noise
-from soilml.config.write_case import case_as_toml
+from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
 
 HERE = Path(__file__).parent
-KLS1 = HERE.parent / "kls1" / "model.toml"
 OUT = Path("demo/gap/real")
+PAGE = page_file("gap-measured")
+#: Held-out parts, the first of which a report has is shown.
+PARTS = {"held_out_runs": "runs", "held_out_slips": "slips", "held_out_region": "region"}
+
+Found = dict[str, dict[str, dict[str, Any]]]
 
 
-def run() -> None:
-    """KLS-1: a smooth and a lugged wheel, singly and together. CMU: a smooth wheel, straight."""
+def run(arguments: list[str] | None = None) -> None:
+    """Analyse all sets, print the tables, and write the page where that is asked for."""
+    args = _arguments(arguments)
     data = Path(os.environ.get("SOILML_DATA", ""))
-    kls1 = data / "kls1_rashid1" / "single_wheel_tests.csv"
-    cmu = data / "cmu_smooth_wheel" / "smooth_wheel_trials.csv"
-    if not (kls1.is_file() and cmu.is_file()):
-        sys.exit("set SOILML_DATA to the folder that contains kls1_rashid1 and cmu_smooth_wheel")
-    OUT.mkdir(parents=True, exist_ok=True)
-    smooth(kls1)
-    lugged(kls1)
-    together(kls1)
-    straight(cmu, "driving", 0.0, 1.0)
-    straight(cmu, "braking", -1.0, 0.0)
-    straight(cmu, "all", -1.0, 1.0)
-    with_plate_tests(cmu.parent)
+    sets = [s for s in SETS if not args.only or s.name in args.only]
+    if missing := sorted({s.file for s in sets if not (data / s.file).is_file()}):
+        sys.exit(f"set SOILML_DATA to the folder that contains {', '.join(missing)}")
+    for one in sets:
+        for priors in PRIORS:
+            save_text(_folder(one, priors) / "runs.csv", table_text(one, data))
+            save_text(_folder(one, priors) / "model.toml", model_text(one, priors))
+    jobs = [str(_folder(one, priors)) for one in sets for priors in PRIORS]
+    with process_map(analyse, jobs, args.jobs) as results, progress_bar("sets", len(jobs)) as done:
+        reports = []
+        for count, report in enumerate(results, 1):
+            reports.append(report)
+            done(count)
+    found: Found = {}
+    for job, report in zip(jobs, reports, strict=True):
+        found.setdefault(Path(job).parent.name, {})[Path(job).name] = report
+    text = page(sets, found)
+    print(text)
+    if args.write:
+        save_text(PAGE, text)
 
 
-def smooth(table: Path) -> None:
-    """The smooth wheel alone, with the priors of its model file."""
-    rows = _rows(table, lambda row: row["run"] == "kls1_smooth_w59")
-    runs = OUT / "kls1_smooth.csv"
-    _written(runs, rows)
-    case = read_case(KLS1)
-    case = replace(case, noise={**case.noise, "drawbar_pull_N": Noise(constant=0.5)})
-    model = OUT / "kls1_prior.toml"
-    save_text(model, case_as_toml(case, ["the model file of the wheel, with noise of the pull"]))
-    _ran(["gap", str(model), str(runs), "--out", str(OUT / "kls1_smooth")])
+def _arguments(arguments: list[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", nargs="+", metavar="SET", choices=[s.name for s in SETS])
+    parser.add_argument("--jobs", type=int, help="analyses at a time (default: cores)")
+    parser.add_argument("--write", action="store_true", help=f"write {PAGE.name}")
+    return parser.parse_args(arguments)
 
 
-def lugged(table: Path) -> None:
-    """Identify the smooth wheel's soil, and look for what the lugs change."""
-    smooth, found = OUT / "kls1_smooth.toml", OUT / "kls1_smooth.json"
-    where = ["--where", "run=kls1_smooth_w59", "--out", str(found)]
-    _ran(["identify", str(KLS1), str(table), *where])
-    soil = json.loads(found.read_text())["parameters"]
-    case = read_case(KLS1).with_values({name: entry["value"] for name, entry in soil.items()})
-    case = replace(case, noise={**case.noise, "drawbar_pull_N": Noise(constant=0.5)})
-    save_text(smooth, case_as_toml(case, ["soil identified from the smooth wheel"]))
-    rows = _rows(table, lambda row: row["run"] == "kls1_lug10_w59")
-    runs = OUT / "kls1_lugged.csv"
-    _written(runs, rows)
-    free = ["--free", "shear_modulus"]  # the soil is the smooth wheel's
-    _ran(["gap", str(smooth), str(runs), *free, "--out", str(OUT / "kls1_lugged")])
+def _folder(one: MeasuredSet, priors: str) -> Path:
+    folder = OUT / one.name / priors
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
 
-def together(table: Path) -> None:
-    """The smooth and the lugged wheel on one soil, distinguished by the column gear."""
-    rows = _rows(table, lambda row: row["run"].startswith("kls1"))
-    for row in rows:
-        row["gear"] = "lugged" if float(row["grouser_height_m"]) > 0.0 else "smooth"
-    runs = OUT / "kls1_together.csv"
-    _written(runs, rows)
-    model = str(KLS1.with_name("two_wheels.toml"))
-    _ran(["gap", model, str(runs), "--out", str(OUT / "kls1_together")])
+def analyse(folder: str) -> dict[str, Any]:
+    """The content of gap.json of the model and the runs in a folder; a crash is a finding too."""
+    place = Path(folder)
+    words = [
+        "gap",
+        str(place / "model.toml"),
+        str(place / "runs.csv"),
+        "--out",
+        str(place / "report"),
+    ]
+    try:
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            code = main(words)
+        if code == 0:
+            found: dict[str, Any] = json.loads((place / "report" / "gap.json").read_text())
+            return found
+        return {"status": f"exit status {code}"}
+    except Exception as error:  # a crash is a finding of the page, not its end
+        return {"status": f"crash: {type(error).__name__}"}
 
 
-def straight(table: Path, name: str, lowest: float, highest: float) -> None:
-    """The trials without slip angle between two slips, repeats of a slip in different runs."""
-    rows = _rows(
-        table,
-        lambda row: float(row["slip_angle_rad"]) == 0.0 and lowest < float(row["slip"]) < highest,
+def first_of(report: dict[str, Any]) -> str:
+    """The likeliest explanation that a report states or suspects, '' without one."""
+    for names in report.get("cause_set") or ():
+        return " + ".join(names)
+    for suspect in report.get("suspects") or ():
+        return " + ".join(suspect["effects"])
+    return ""
+
+
+def page(sets: list[MeasuredSet], found: Found) -> str:
+    """The page: tables as measured, text from its template."""
+    import jinja2
+
+    template = jinja2.Environment(autoescape=False, keep_trailing_newline=True).from_string(
+        (HERE / "measured_page.md.j2").read_text()
     )
-    seen: dict[str, int] = {}
-    for row in rows:
-        place = f"{float(row['slip']):.1f}"
-        seen[place] = seen.get(place, 0) + 1
-        row["run"] = f"repeat_{seen[place]}"
-        row["torque_Nm"] = ""
-        del row["side_force_N"], row["slip_angle_rad"], row["drawbar_pull_N_std"]
-    runs = OUT / f"cmu_{name}.csv"
-    _written(runs, rows)
-    _ran(["gap", str(HERE / "cmu.toml"), str(runs), "--out", str(OUT / f"cmu_{name}")])
+    firsts = {s.name: [first_of(found[s.name][p]) for p in PRIORS] for s in sets}
+    rows = []
+    for one in sets:
+        cells = [
+            f"{first or '-'} (`{found[one.name][p]['status']}`)"
+            for p, first in zip(PRIORS, firsts[one.name], strict=True)
+        ]
+        rows.append([one.title, *cells, _survives(firsts[one.name])])
+    agree = sum(row[-1] == "yes" for row in rows)
+    return template.render(
+        title=TITLES[PAGE.stem],
+        machine=machine(),
+        sets=[{"name": s.name, "title": s.title, "table": _set_table(found[s.name])} for s in sets],
+        beliefs=tomllib.loads((HERE / "beliefs.toml").read_text()),
+        summary=_table(["set", *PRIORS, "survives"], rows),
+        count=f"The first explanation is the same with all three in {agree} of {len(rows)} sets.",
+    )
 
 
-def with_plate_tests(folder: Path) -> None:
-    """The trials again, with plate tests of the same sand as tests of the soil."""
-    tests = runpy.run_path(str(HERE.parent / "bevameter" / "real.py"))
-    tests["OUT"].mkdir(parents=True, exist_ok=True)
-    tests["cmu"](folder)
-    for name in ("driving", "braking"):
-        runs, out = OUT / f"cmu_{name}.csv", OUT / f"cmu_{name}_plates"
-        _ran(["gap", "demo/bevameter/cmu.toml", str(runs), "--out", str(out)])
+def _survives(firsts: list[str]) -> str:
+    """Whether all sets of priors give the same first explanation."""
+    if not any(firsts):
+        return "no cause"
+    return "yes" if len(set(firsts)) == 1 else "**no**"
 
 
-def _ran(command: list[str]) -> None:
-    print(f"\n$ soilml {' '.join(command)}", flush=True)
-    if main(command) != 0:
-        raise SystemExit(1)
+def _set_table(reports: dict[str, dict[str, Any]]) -> str:
+    rows = []
+    for priors in PRIORS:
+        report = reports[priors]
+        suspects = [
+            f"{' + '.join(s['effects'])} ({_odds(s['log_odds'])})"
+            for s in (report.get("suspects") or ())[:3]
+        ]
+        causes = " or ".join(" + ".join(names) for names in report.get("cause_set") or ())
+        shown = report.get("gap") or {}
+        part = next((p for p in PARTS if p in shown), "")
+        held = f"{PARTS[part]}: {_change(shown[part])}" if part else "-"
+        train = _change(shown["train"]) if "train" in shown else "-"
+        rows.append(
+            [priors, f"`{report['status']}`", causes or "; ".join(suspects) or "-", train, held]
+        )
+    return _table(["priors", "status", "explanations, with odds", "fitted rows", "held out"], rows)
 
 
-def _rows(table: Path, wanted) -> list[dict[str, str]]:  # type: ignore[no-untyped-def]
-    with table.open() as lines:
-        return [dict(row) for row in csv.DictReader(lines) if wanted(row)]
+def _change(part: dict[str, Any]) -> str:
+    return f"{part['before']:.3g} -> {part['after']:.3g}"
 
 
-def _written(path: Path, rows: list[dict[str, str]]) -> None:
-    lines = [",".join(rows[0]), *[",".join(row.values()) for row in rows]]
-    save_text(path, "\n".join(lines) + "\n")
+def _odds(log_odds: float) -> str:
+    ratio = math.exp(min(abs(log_odds), 50.0))
+    return f"{ratio:.2g} to 1" if log_odds > 0.0 else f"1 to {ratio:.2g}"
+
+
+def _table(header: list[str], rows: list[list[str]]) -> str:
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines) + "\n"
 
 
 if __name__ == "__main__":
