@@ -32,6 +32,8 @@ from soilml.io.atomic_files import save_text
 #: Seeds of the published sets, on which nothing was tuned; the method was tuned on sets of others
 #: (0, 1, 2, 3, 4, 5, 7).
 SEEDS = (10, 11)
+#: Of each so many plans, `make bench-gap` takes one.
+USUAL_EVERY = 4
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 
@@ -43,7 +45,7 @@ def run() -> None:
         sets = [s for file in args.table for s in from_json(json.loads(Path(file).read_text()))]
     else:
         sets = _judge(_plans(args), args.jobs, args.keep)
-    text = gap_pages.text(sets, from_json(_read(args.before)))
+    text = gap_pages.text(sets, from_json(_read(args.before)), _command(args))
     print(text)
     if args.write:
         gap_reliability.save_picture(sets, ROOT / gap_pages.PICTURE)
@@ -80,6 +82,18 @@ def _arguments() -> argparse.Namespace:
         "--write", action="store_true", help="write docs/benchmarks/gap.md and its picture"
     )
     return parser.parse_args()
+
+
+def _command(args: argparse.Namespace) -> str:
+    """The command that made the records."""
+    if args.table:
+        return "kept records"
+    words = [f"--every {args.every}"]
+    words += [f"--seed {' '.join(map(str, args.seed))}"] if tuple(args.seed) != SEEDS else []
+    words += [f"--{n} {v}" for n in ("tier", "design") if (v := getattr(args, n)) is not None]
+    words += ["--factorial"] if args.factorial else []
+    usual = words == [f"--every {USUAL_EVERY}"]
+    return "`make bench-gap`" if usual else f"`python bench/gap.py {' '.join(words)} --write`"
 
 
 def _plans(args: argparse.Namespace) -> list[Plan]:

@@ -139,3 +139,14 @@ def test_a_plan_is_told_from_every_other():
     assert gap._key(gap.asdict(plan)) != gap._key(gap.asdict(other))
     with pytest.raises(KeyError):
         gap._key({"tier": "A"})
+
+
+def test_a_page_names_the_command_that_made_its_records(monkeypatch):
+    def said(*words):
+        monkeypatch.setattr(sys, "argv", ["bench/gap.py", *words])
+        return gap._command(gap._arguments())
+
+    assert said("--every", "4", "--write", "--keep", "a.json") == "`make bench-gap`"
+    other = said("--every", "30", "--tier", "L", "--seed", "1", "2")
+    assert other == "`python bench/gap.py --every 30 --seed 1 2 --tier L --write`"
+    assert "Written by another: 1 sets" in gap_pages.text([record()], (), "another")
