@@ -6,6 +6,7 @@ import os
 import platform
 import re
 from collections.abc import Mapping, Sequence
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 
@@ -93,6 +94,15 @@ def _link(name: str) -> str:
 def _contents(name: str, root: Path) -> str:
     """Titles of the sections of a page."""
     return "; ".join(sections(name, root))
+
+
+def source_state(root: Path = ROOT) -> str:
+    """A digest of all source on which an analysis of the gap workflow depends."""
+    digest = sha256()
+    for folder in ("soilml", "datagen/blind_sets"):
+        for file in sorted((root / folder).rglob("*.py")):
+            digest.update(file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def machine() -> str:

@@ -13,14 +13,13 @@ import argparse
 import json
 import sys
 from dataclasses import asdict, fields
-from hashlib import sha256
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 import gap_pages
 import gap_reliability
-from benchmarks_file import ROOT, TITLES, machine, page_file
+from benchmarks_file import ROOT, TITLES, machine, page_file, source_state
 from gap_case import judged
 from gap_records import Judged, from_json
 
@@ -110,7 +109,7 @@ def _plans(args: argparse.Namespace) -> list[Plan]:
 
 def _judge(plans: list[Plan], processes: int | None, keep: str | None) -> list[Judged]:
     """The records of all plans, in their order; those that were kept are not made again."""
-    state = _state()
+    state = source_state()
     kept = {_key(s): s for s in _read(keep) if s.get("state") == state}
     jobs = [job for job in enumerate(plans) if _key(asdict(job[1])) not in kept]
     with (
@@ -133,15 +132,6 @@ def _read(file: str | None) -> list[Judged]:
 def _key(record: Judged) -> tuple[object, ...]:
     """What tells the plan of a record from those of others."""
     return tuple(record[f.name] for f in fields(Plan))
-
-
-def _state() -> str:
-    """A digest of all source that a record depends on."""
-    digest = sha256()
-    for folder in ("soilml", "datagen/blind_sets"):
-        for file in sorted((ROOT / folder).rglob("*.py")):
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:16]
 
 
 if __name__ == "__main__":

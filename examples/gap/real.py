@@ -14,13 +14,14 @@ import math
 import os
 import sys
 import tomllib
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
-from benchmarks_file import TITLES, machine, page_file
+from benchmarks_file import TITLES, machine, page_file, source_state
 from measured_sets import PRIORS, SETS, MeasuredSet, model_text, table_text
 
 from datagen.processes import process_map
@@ -78,8 +79,16 @@ def _folder(one: MeasuredSet, priors: str) -> Path:
 
 
 def analyse(folder: str) -> dict[str, Any]:
-    """The content of gap.json of the model and the runs in a folder; a crash is a finding too."""
+    """The content of gap.json of the model and the runs in a folder; a crash is a finding too.
+
+    A report that the same state of the package made of the same files is not made again.
+    """
     place = Path(folder)
+    state = _state(place)
+    kept, mark = place / "report" / "gap.json", place / "state"
+    if kept.is_file() and mark.is_file() and mark.read_text() == state:
+        return dict(json.loads(kept.read_text()))
+    mark.unlink(missing_ok=True)
     words = [
         "gap",
         str(place / "model.toml"),
@@ -91,11 +100,19 @@ def analyse(folder: str) -> dict[str, Any]:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             code = main(words)
         if code == 0:
-            found: dict[str, Any] = json.loads((place / "report" / "gap.json").read_text())
-            return found
+            save_text(mark, state)
+            return dict(json.loads(kept.read_text()))
         return {"status": f"exit status {code}"}
     except Exception as error:  # a crash is a finding of the page, not its end
         return {"status": f"crash: {type(error).__name__}"}
+
+
+def _state(place: Path) -> str:
+    """A digest of the package, of the model and of the runs."""
+    digest = sha256(source_state().encode())
+    for name in ("model.toml", "runs.csv"):
+        digest.update((place / name).read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def first_of(report: dict[str, Any]) -> str:

@@ -127,7 +127,7 @@ def test_records_of_the_same_state_are_not_made_again(tmp_path, monkeypatch):
     assert made == [0, 1, 2] and [s["seed"] for s in again] == [p.seed for p in plans]
     assert gap._key(again[0]) == gap._key(first[0])
     assert again[0]["truth"] == ("slip-sinkage",)
-    monkeypatch.setattr(gap, "_state", lambda: "another")
+    monkeypatch.setattr(gap, "source_state", lambda: "another")
     gap._judge(plans[:1], 1, file)
     assert made == [0, 1, 2, 0]
     assert {s["state"] for s in json.loads(Path(file).read_text())} >= {"another"}
