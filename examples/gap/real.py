@@ -32,6 +32,7 @@ from soilml.io.atomic_files import save_text
 HERE = Path(__file__).parent
 OUT = Path("demo/gap/real")
 PAGE = page_file("gap-measured")
+SUSPECTED = "suspected"  # The status of a report that ranks suspects and states no cause
 #: Held-out parts, the first of which a report has is shown.
 PARTS = {"held_out_runs": "runs", "held_out_slips": "slips", "held_out_region": "region"}
 
@@ -117,10 +118,11 @@ def _state(place: Path) -> str:
 
 def first_of(report: dict[str, Any]) -> str:
     """The likeliest explanation that a report states or suspects, '' without one."""
+    if report["status"] == SUSPECTED:
+        for suspect in report.get("suspects") or ():
+            return " + ".join(suspect["effects"])
     for names in report.get("cause_set") or ():
         return " + ".join(names)
-    for suspect in report.get("suspects") or ():
-        return " + ".join(suspect["effects"])
     return ""
 
 
@@ -165,7 +167,8 @@ def _set_table(reports: dict[str, dict[str, Any]]) -> str:
             f"{' + '.join(s['effects'])} ({_odds(s['log_odds'])})"
             for s in (report.get("suspects") or ())[:3]
         ]
-        causes = " or ".join(" + ".join(names) for names in report.get("cause_set") or ())
+        stated = () if report["status"] == SUSPECTED else report.get("cause_set") or ()
+        causes = " or ".join(" + ".join(names) for names in stated)
         shown = report.get("gap") or {}
         part = next((p for p in PARTS if p in shown), "")
         held = f"{PARTS[part]}: {_change(shown[part])}" if part else "-"
