@@ -172,6 +172,18 @@ def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
     return replace(sample, u=sample.u[:, :p])
 
 
+def sample_posterior(
+    case: Case, readings: Readings, free: Sequence[Coordinate]
+) -> tuple[ImportanceSample, float]:
+    """Weighted fractions of the priors under the noise as declared, and the misfit.
+
+    Those of shared errors stand behind. Raises `FitError` as `posterior` does.
+    """
+    density = PosteriorDensity(case, readings, free)
+    optimum = most_probable(case, readings, free) if density.errors else None
+    return _with_misfit(density, optimum, len(free))
+
+
 def _with_misfit(
     density: PosteriorDensity, optimum: Solution | None, parameters: int
 ) -> tuple[ImportanceSample, float]:

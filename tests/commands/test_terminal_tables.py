@@ -56,6 +56,7 @@ ELSEWHERE = {
     "train",
     "export-c",
     "export-step",
+    "adapt",
     "compare",
     "climb",
     "serve",

@@ -28,6 +28,7 @@ class Started:
     name: str
     start: dict = field(default_factory=dict)
     whiten: object = None
+    near: object = None
 
 
 @pytest.fixture
@@ -41,7 +42,9 @@ def fitting(monkeypatch):
             listed[s.name]
             if isinstance(listed[s.name], InputError)
             else SimpleNamespace(
-                name=s.name, start_values=lambda name=s.name: {"from": name, "round": len(asked)}
+                name=s.name,
+                start_values=lambda name=s.name: {"from": name, "round": len(asked)},
+                linearisation=None,
             )
             for s in started
         ]

@@ -16,7 +16,10 @@ def fit_of(objective=0.0, x=None):
     """What the decisions see of a fit."""
     start = x or {}
     return SimpleNamespace(
-        objective=objective, fitted=lambda: None, start_values=lambda: dict(start)
+        objective=objective,
+        fitted=lambda: None,
+        start_values=lambda: dict(start),
+        linearisation=None,
     )
 
 
@@ -161,7 +164,6 @@ def test_single_effects_beside_a_large_discrepancy_are_fitted_under_noise_first(
 def extending(monkeypatch):
     """Gains by one more effect, by the names of the set."""
     gains = {}
-    monkeypatch.setattr(stepwise, "effect_signatures", lambda *_: ((), ()))
     monkeypatch.setattr(
         stepwise, "predicted_gains", lambda problem, c, objective, s: gains.get(c.names, {})
     )
@@ -170,7 +172,7 @@ def extending(monkeypatch):
 
 def extensions(level, fitted=(), lowest=0.0):
     problem = SimpleNamespace(
-        readings=None, effects_not_in=lambda fit: {}, discrepancy=None, covariance=None
+        readings=None, signatures_beside=lambda fit: [], discrepancy=None, covariance=None
     )
     found = stepwise._extensions(problem, level, dict.fromkeys(fitted), lowest)
     return {names: base.names for names, base in found.items()}
