@@ -31,6 +31,7 @@ from datagen.blind_sets.soil_families import FAMILIES, PRIOR, RADIUS, WIDTH
 from soilml import Estimator, adapt, read_case, read_table
 from soilml.io.text_tables import format_table
 from soilml.quantities import SHEAR, column
+from training.set_posterior import validation
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -51,6 +52,8 @@ SEEDS = (5, 6)
 NOISE, RUNS, FAMILY, FREE = 0.02, 4, "dry-sand", 3
 SOILS, ROWS = 40, 16  # Soils after the campaign, and torque readings of each
 TRAINING_ROWS = 40_000
+#: Sets of each size for the limits of misfit and for the figures of the cards, with --quick.
+QUICK_SETS = 400, 40
 
 
 @dataclass(frozen=True)
@@ -191,7 +194,14 @@ def main() -> None:
     parser.add_argument("--seeds", nargs="*", type=int, default=SEEDS)
     parser.add_argument("--out", type=Path, default=Path("build/adapt"))
     parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="fewer simulated sets for the limits of misfit and for the figures of the cards",
+    )
     args = parser.parse_args()
+    if args.quick:
+        validation.LIMIT_SETS, validation.FIGURE_SETS = QUICK_SETS
     worlds = [(t, k, s) for s in args.seeds for t, k in WORLDS if not args.only or k in args.only]
     with ProcessPoolExecutor(args.processes) as pool:
         futures = [pool.submit(run_world, t, k, s, args.out) for t, k, s in worlds]
