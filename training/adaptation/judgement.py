@@ -102,8 +102,13 @@ class Judgement:
     def figures(
         self, first_rows: int | None = None
     ) -> dict[str, tuple[ChannelScore, ChannelScore]]:
-        """By column the scores before and after, the mean over runs; `first_rows` selects some."""
-        runs = [r for r in self.runs if first_rows in (None, r.first_rows)]
+        """By column the scores before and after, the mean over runs.
+
+        Each run counts with the most first rows that it was judged from, or with `first_rows`.
+        """
+        most = {run.run: run.first_rows for run in self.runs}  # in ascending order
+        wanted = most if first_rows is None else dict.fromkeys(most, first_rows)
+        runs = [run for run in self.runs if run.first_rows == wanted[run.run]]
         return {
             key: (
                 _mean([r.scores_before[key] for r in runs if key in r.scores_before]),
@@ -114,7 +119,7 @@ class Judgement:
         }
 
     def error(self, first_rows: int | None = None) -> tuple[float, float]:
-        """Root mean square over channels of the errors before and after."""
+        """Root mean square over channels of the errors of `figures` before and after."""
         pairs = list(self.figures(first_rows).values())
         before, after = (
             float(np.sqrt(np.mean([pair[i].error ** 2 for pair in pairs]))) for i in (0, 1)
@@ -123,7 +128,10 @@ class Judgement:
 
     @property
     def ratio(self) -> float:
-        """Error after over error before; below 1 the adapted file is better."""
+        """Error after over error before, from the most first rows; below 1 the adapted is better.
+
+        From few rows of one load the soil is uncertain, and so is the error of either file.
+        """
         before, after = self.error()
         return after / before if before > 0.0 else np.inf
 
@@ -163,7 +171,7 @@ def judge(
     errors: dict[str, list[tuple[float, float]]] = {}
     for name, rows in kept_back.groups("run"):
         rows = _drivable(rows)
-        for k in (k for k in first_rows if k < len(rows)):
+        for k in (k for k in sorted(first_rows) if k < len(rows)):
             first, later = rows.rows(np.arange(k)), rows.rows(np.arange(k, len(rows)))
             pair = [predict_run(c, first, later, scale, seed) for c in (before, after)]
             judged.append(_judged(name, k, later, pair, scale))

@@ -144,8 +144,8 @@ def panel_rows(judgement: Judgement) -> int:
 
 
 def _shown_rows(judgement: Judgement) -> int:
-    """The number of first rows for which predictions are drawn: the middle one."""
-    return judgement.lengths[len(judgement.lengths) // 2]
+    """The number of first rows for which predictions are drawn: the largest."""
+    return judgement.lengths[-1]
 
 
 def plot_judgement(judgement: Judgement, ax: Any = None) -> NDArray[Any]:
