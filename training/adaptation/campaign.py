@@ -197,11 +197,14 @@ def sensor_effects(case: Case) -> tuple[Effect, ...]:
 def recipe_text(case: Case, driven: DrivenRange, rows: int, seed: int) -> str:
     """A recipe: soils of the priors, sensors of the case, slips and loads of the log.
 
-    Errors of the model and tests of the soil are left out: neither is part of a simulation.
+    Errors of the model, with a remainder that was learned, and tests of the soil are left out:
+    they are of one soil, and no part of a simulation of others.
     """
     bias = {key: noise for key, noise in case.bias.items() if noise.constant or noise.share}
     noise = {key: one for key, one in case.noise.items() if key in SENSOR_COLUMNS}
-    own = replace(case, noise=noise, bias=bias, discrepancy={}, soil_tests=(), rover=None)
+    own = replace(
+        case, noise=noise, bias=bias, discrepancy={}, remainder=None, soil_tests=(), rover=None
+    )
     top = f"rows = {rows}\nseed = {seed}\n\n"
     return f"{top}{case_as_toml(own)}\n{driven.as_toml()}\n{RUNS}"
 

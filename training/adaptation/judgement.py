@@ -13,6 +13,7 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import range_with_zero
 from soilml.errors import InputError
 from soilml.fitting.operating_points import operating_points
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.fitting.readings import positive_std
 from soilml.io.table import Table
 from soilml.onboard.estimate import Estimate
@@ -222,7 +223,7 @@ def predict_run(
     case = candidate.case.with_values(
         {name: soils[:, i, None] for i, name in enumerate(estimate.names)}
     )
-    force = case.model(case.soil, operating_points(later))
+    force = forces_of_one_gear(case, operating_points(later))
     mean, std = {}, {}
     for name in CHANNELS:
         key = column(name)
@@ -231,10 +232,17 @@ def predict_run(
         values = np.broadcast_to(np.asarray(getattr(force, name)), (DRAWS, len(later)))
         mean[key], spread = _moments(values)
         noise = np.nan_to_num(positive_std(candidate.case, later, key))
-        declared = case.discrepancy.get(key)
-        error = declared.amplitude(scale[key]) if declared else 0.0
+        error = _model_error(case, name, later, scale[key])
         std[key] = np.sqrt(spread**2 + noise**2 + error**2)
     return RunPrediction(mean, std, estimate)
+
+
+def _model_error(case: Case, channel: str, rows: Table, size: float) -> Floats:
+    """Standard deviation (rows,) of the model's error: of its remainder, else as declared."""
+    if case.remainder is not None and case.remainder.of(channel):
+        return case.remainder.mean_and_std(channel, rows["slip"], rows["load_N"])[1]
+    declared = case.discrepancy.get(column(channel))
+    return np.full(len(rows), declared.amplitude(size) if declared else 0.0)
 
 
 def _draw_soils(estimate: Estimate, seed: int) -> Floats:
