@@ -12,6 +12,8 @@ from soilml import SlipSinkage, read_case, simulate
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
 from training.adaptation import board_file
+from training.adaptation.workflow import GAP_FILES
+from training.commands.adapt import FILES
 
 #: The packaged spec with a response that is learned in seconds.
 SMALL_SPEC = """\
@@ -91,6 +93,8 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monke
     content = json.loads((out / "adapt.json").read_text())
     assert content["status"] == "adapted" and content["effects"] == ["slip-sinkage"]
     assert content["judgement"]["error_ratio"] < 0.6
+    written = {p.relative_to(out).as_posix() for p in out.rglob("*") if p.is_file()}
+    assert written <= {*FILES, *GAP_FILES}
     assert shown.splitlines()[0] == content["sentence"]
     assert set(content["judgement"]["soil_error"]) == {
         "cohesion", "friction_angle", "shear_modulus",

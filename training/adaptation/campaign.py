@@ -78,8 +78,9 @@ def split_runs(table: Table, seed: int) -> SplitRuns:
     runs = np.unique(table["run"])
     if runs.size < RUNS_PER_HELD_OUT:
         raise InputError(
-            f"{table.source}: {runs.size} runs; needed are {RUNS_PER_HELD_OUT} or more, of which a "
-            "quarter is kept back to judge the file on"
+            f"{table.source}: {runs.size} run{'s' * (runs.size != 1)}; needed are "
+            f"{RUNS_PER_HELD_OUT} or more, of which a quarter is kept back to judge the file on; "
+            "soilml gap takes fewer"
         )
     parts = split_holdout(table, "run", seed)
     assert parts.held_out is not None
@@ -126,9 +127,13 @@ def with_noise_of_log(case: Case, table: Table) -> Case:
     """The case with the noise of the log in those columns for which it declares none.
 
     It is the median of `<column>_std`, or else that of repeated rows. Raises `InputError` where the
-    noise of torque is known from neither.
+    noise of torque is known from neither, and where no torque was measured.
     """
     readings = stack_readings(case, table)
+    if "torque" not in readings.channels:
+        raise InputError(
+            f"{table.source}: no row has torque_Nm, from which a file for the board estimates"
+        )
     readings = readings.with_default_std(estimate_repeat_noise(readings)[0])
     noise = dict(case.noise)
     for i, name in enumerate(readings.channels):

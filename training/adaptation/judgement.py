@@ -161,8 +161,10 @@ def judge(
     truth: Soil parameters by name, where they are known; columns of the table come first.
     seed: Of the soils that are drawn from an estimate.
 
-    Raises `InputError` where no run has more rows than the fewest first ones.
+    Raises `InputError` where no run has more rows than the fewest first ones, and where no later
+    row can be predicted.
     """
+    check_lengths(kept_back, first_rows)
     scale = {
         key: size
         for key in map(column, CHANNELS)
@@ -184,11 +186,21 @@ def judge(
     judged = [run for run in judged if run.scores_before]
     if not judged:
         raise InputError(
-            f"{kept_back.source}: no run that is kept back has more than {min(first_rows)} rows "
-            "with slip above 0 and torque: a file cannot be judged"
+            f"{kept_back.source}: no later row of a run that is kept back can be predicted by both "
+            "files: a file cannot be judged"
         )
     rms = {name: tuple(np.sqrt(np.mean(np.square(own), axis=0))) for name, own in errors.items()}
     return Judgement(tuple(judged), {name: (float(b), float(a)) for name, (b, a) in rms.items()})
+
+
+def check_lengths(kept_back: Table, first_rows: Sequence[int] = FIRST_ROWS) -> None:
+    """Raise `InputError` where no run has more rows than the fewest first ones."""
+    most = max(len(_drivable(rows)) for _, rows in kept_back.groups("run"))
+    if most <= min(first_rows):
+        raise InputError(
+            f"{kept_back.source}: a run that is kept back has {most} rows with slip above 0 and "
+            f"torque; needed are more than {min(first_rows)}, from which the others are predicted"
+        )
 
 
 def known_soil(rows: Table, names: Sequence[str]) -> dict[str, float]:

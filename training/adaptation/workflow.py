@@ -33,7 +33,7 @@ from training.adaptation.campaign import (
     with_fitted_soil,
     with_noise_of_log,
 )
-from training.adaptation.judgement import BoardCandidate, Judgement, judge
+from training.adaptation.judgement import BoardCandidate, Judgement, check_lengths, judge
 from training.adaptation.page import adapt_page
 from training.adaptation.result import AdaptReport
 from training.adaptation.steps import ResumableSteps
@@ -155,6 +155,7 @@ def adapt(
         if found.refusal is not None:
             report = found.report(split.runs, None, (), rows, seed)
             return _finish(report, target, origin)
+        check_lengths(split.kept_back)
         new, remarks = board_unknowns(with_noise_of_log(found.case, table))
         own = [f"With {' + '.join(found.effects)}. {found.sentence}"]
         write_files({target / ADAPTED_MODEL: case_as_toml(found.case, own)})

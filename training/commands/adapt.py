@@ -41,6 +41,12 @@ result, and 2 for bad input. --suspected adds the first suspect where the
 evidence names no effect. --soil TRUE.toml, with [soil], compares the estimates
 with a soil that is known; columns such as cohesion_Pa do the same for each run.
 """
+#: Files of the folder, beside those of the folder `gap` in it.
+FILES = (
+    *("report.html", "adapt.json", "steps.json", "campaign.csv", "kept_back.csv", "adapted.toml"),
+    *(f"adapted{end}" for end in (".onnx", ".md", ".c", ".h", "_recipe.toml", "_rows.parquet")),
+    *(f"before{end}" for end in (".onnx", ".md", "_recipe.toml", "_rows.parquet")),
+)
 LEAST_ROWS, MOST_ROWS = 2000, 10**9  # Synthetic rows of a file
 
 
@@ -75,9 +81,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
-    """The files of the result that the command writes, where their folder exists already."""
-    names = ("report.html", "adapt.json", "adapted.onnx", "adapted.md", "adapted.c", "adapted.h")
-    return folder_outputs("--out", args.out, (*names, "adapted.toml", "before.onnx", "before.md"))
+    """The files that the command writes, where their folder exists already."""
+    return folder_outputs("--out", args.out, FILES)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from conftest import MODEL
 
 from datagen.recipe import read_recipe
 from soilml import SlipSinkage, read_case
+from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -76,6 +77,8 @@ def test_noise_of_the_log_fills_what_is_not_declared(case):
     assert with_noise_of_log(case, log(slip_std=0.01)).noise["slip"].constant == 0.01
     with pytest.raises(InputError, match="noise of torque_Nm is not known"):
         with_noise_of_log(bare, log())
+    with pytest.raises(InputError, match="no row has torque_Nm"):
+        with_noise_of_log(case, Table(log().columns | {"torque_Nm": np.full(32, np.nan)}))
 
 
 def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
@@ -90,6 +93,17 @@ def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     assert recipe.case.prior == prior and recipe.case.model == model
     family = RecipeFamily.of(recipe, ("cohesion", "friction_angle", "shear_modulus"))
     assert len(family.axes) == 4
+
+
+def test_bias_is_written_where_there_is_some(case, tmp_path):
+    bias = {
+        "torque_Nm": Noise(share=0.02),
+        "slip": Noise(constant=0.0),
+        "load_N": Noise(share=0.01),
+    }
+    path = tmp_path / "recipe.toml"
+    path.write_text(recipe_text(replace(case, bias=bias), DrivenRange.of(log()), 500, 1))
+    assert set(read_recipe(path).bias) == {"torque_Nm", "load_N"}
 
 
 def test_unknowns_beyond_what_a_file_has_are_fixed_and_said(case):
