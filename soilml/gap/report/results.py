@@ -90,7 +90,11 @@ class RegionScore:
 
 @dataclass(frozen=True)
 class GapReduction:
-    """Mean squared standardised residual before and after, in all and by channel; noise gives 1."""
+    """Mean squared standardised residual before and after, in all and by channel; noise gives 1.
+
+    The total of the fitted rows is of residuals that are whitened by noise and scatter, and is not
+    the mean of its channels, whose residuals are divided by their standard deviations.
+    """
 
     before: float
     after: float

@@ -10,8 +10,8 @@ from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.remarks import Remark
 
-#: Factors on the declared noise that are tried: published figures are read to about half or twice
-#: what is declared for them.
+#: Factors on the estimated noise and scatter that are tried: published figures are read to about
+#: half or twice what is declared for them.
 FACTORS = (0.5, 0.7, 1.4, 2.0)
 
 
