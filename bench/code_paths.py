@@ -49,6 +49,13 @@ class CountedCall:
     name: str
     call: Callable[[], object]
     goal: int | None = None
+    left_out: str = ""  # files of this folder are not counted
+
+    def found(self) -> CodePath:
+        """What the call passes, without the files that are not counted."""
+        path = warm(self.call)
+        kept = frozenset(f for f in path.files if not self.left_out or self.left_out not in f)
+        return CodePath(kept, path.functions, path.arrows)
 
 
 def count(call: Callable[[], object], packages: tuple[str, ...] = PACKAGES) -> CodePath:
@@ -104,7 +111,12 @@ def counted_calls(folder: Path) -> list[CountedCall]:
         CountedCall("`Estimator.__call__`", lambda: estimator(slip=0.3, torque=4.2, load=60.0)),
         CountedCall("`soilml identify`", command("identify"), 55),
         CountedCall("`soilml identify --method posterior`", command("identify", *POSTERIOR)),
-        CountedCall("`soilml gap`", command("gap", "--out", str(folder / "gap")), 130),
+        CountedCall(
+            "`soilml gap`, without the files of effects",
+            command("gap", "--out", str(folder / "gap")),
+            130,
+            "soilml/physics/effects/",
+        ),
     ]
 
 
@@ -141,7 +153,7 @@ def section(folder: Path) -> str:
     """The table of all calls."""
     lines = ["| call | files | goal | functions | arrows |", "|---|---:|---:|---:|---:|"]
     for counted in counted_calls(folder):
-        found = warm(counted.call)
+        found = counted.found()
         goal = "" if counted.goal is None else f"{counted.goal}"
         cells = (len(found.files), goal, len(found.functions), len(found.arrows))
         lines.append(f"| {counted.name} | {' | '.join(map(str, cells))} |")

@@ -21,7 +21,7 @@ PLANS = {
     "slip-sinkage": Plan("B", "slip-sinkage/lyasko", 1.0, 0.01, 8, "dry-sand", 3, seed=2),
     "torque-sensor": Plan("S", "torque-gain", 1.0, 0.01, 8, "dry-sand", 3, seed=3),
     "nothing": Plan("N0", "", 0.0, 0.01, 8, "dry-sand", 3, seed=4),
-    "unknown": Plan("C", "stiff-layer", 1.0, 0.01, 8, "dry-sand", 3, seed=5),
+    "unknown": Plan("C", "ripple", 1.0, 0.01, 8, "dry-sand", 3, seed=5),
 }
 #: Hidden in the story of the slope: a little bulldozing, in times the formula.
 SHARE = 0.05

@@ -1,25 +1,148 @@
-"""The test of misfit that all commands share: residuals of the best soil under declared noise."""
+"""Fits under the declared noise, and the test of their misfit that all commands share."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.least_squares import Solution
+from soilml.fitting.covariance import (
+    Whitening,
+    discrepancy_process,
+    noise_of_operation,
+    sensor_columns,
+)
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
-from soilml.fitting.shared_errors import errors_at
-from soilml.fitting.weighted_rows import NOISE_ROUNDS, WeightedRows
-from soilml.numerics.quantiles import chi_squared_quantile
+from soilml.fitting.shared_errors import errors_at, with_modelled_errors
+from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.remarks import Remark
 
-Z_999 = 3.09  # Normal quantile of 0.999
+#: Rounds in which the fit is repeated with noise estimated from its residuals, and with errors of
+#: sensors in proportion to its predictions.
+NOISE_ROUNDS = 3
+#: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
+INITIAL_NOISE = 0.05
+FEW = 16  # Readings of each channel of the few rows that tell good starts from bad ones
+
+
+@dataclass(frozen=True)
+class WeightedRows:
+    """Readings whose noise depends on what is expected of them, and the case that is fitted."""
+
+    case: Case  # With the errors that the model is solved with, where there are any
+    readings: Readings  # With the standard deviations (m,) that the fit gives them
+    declared: Readings  # The readings as they were declared
+    unknown: Sequence[Coordinate]  # The p free parameters, and behind them these errors
+    # Columns (m, e) of errors that all rows share and that act on the readings alone
+    shared: Floats
+
+    @staticmethod
+    def of(case: Case, readings: Readings, free: Sequence[Coordinate]) -> WeightedRows:
+        """With noise as declared, and errors that all rows share as parameters."""
+        changed, unknown = with_modelled_errors(
+            case, readings.shared_errors, readings.row_load, free
+        )
+        std = np.where(np.isfinite(readings.std), readings.std, _initial_noise(readings))
+        shared = sensor_columns(readings, readings.measured[None, :])
+        return WeightedRows(
+            case=changed,
+            readings=replace(readings, std=std),
+            declared=readings,
+            unknown=unknown,
+            shared=np.zeros((len(readings), 0)) if shared is None else shared[0],
+        )
+
+    @cached_property
+    def problem(self) -> LeastSquaresProblem:
+        """The problem, weighted by noise, model discrepancy and shared errors."""
+        process = discrepancy_process(
+            self.readings,
+            self.case.discrepancy,
+            Discrepancy(),
+            LEAST_EIGENVALUE,
+            self.case.remainder,
+        )
+        columns = np.hstack([process.columns, self.shared])
+        whiten = Whitening.of(self.readings.std, columns)
+        return LeastSquaresProblem(self.case, self.unknown, self.readings, whiten)
+
+    def of_few_rows(self) -> WeightedRows:
+        """A few of the rows, from the lightest to the heaviest of each channel."""
+        selected, few = self.readings.of_rows(_few_rows(self.readings))
+        return replace(self, readings=few, shared=self.shared[selected])
+
+    def with_noise_at(self, optimum: Solution) -> WeightedRows:
+        """The same with noise at the optimum's predictions, or from its residuals.
+
+        Errors of sensors that all rows share are in proportion to the same predictions.
+        """
+        prediction, readings = optimum.prediction, self.declared
+        total = np.hypot(
+            readings.noise_at(prediction),
+            noise_of_operation(self.case, readings, self.unknown, optimum.x),
+        )
+        free = sum(c.normal_std is None for c in self.unknown)
+        estimated = _residual_noise(readings, optimum.problem.residual(prediction), free)
+        shared = sensor_columns(readings, prediction[None, :])
+        return replace(
+            self,
+            readings=replace(readings, std=np.where(np.isfinite(total), total, estimated)),
+            shared=self.shared if shared is None else shared[0],
+        )
+
+
+def _few_rows(readings: Readings) -> NDArray[np.int64]:
+    """Rows that stand for all: from the lightest to the heaviest with a reading of each channel."""
+    rows = []
+    for i in range(len(readings.channels)):
+        measured = readings.row[readings.channel == i]
+        slip, load = readings.row_slip[measured], readings.row_load[measured]
+        in_order = measured[np.lexsort((slip, load))]
+        few = np.linspace(0, len(in_order) - 1, min(FEW, len(in_order)))
+        rows.append(in_order[few.round().astype(int)])
+    return np.unique(np.concatenate(rows))
+
+
+def _initial_noise(readings: Readings) -> Floats:
+    """A fraction of each channel's RMS reading, (m,)."""
+    return _by_channel(readings, lambda own: INITIAL_NOISE * _rms(readings.measured[own]) + 1e-12)
+
+
+def _residual_noise(readings: Readings, residual: Floats, p: int) -> Floats:
+    """Noise of each channel (m,) from its residuals, p parameters shared among all readings."""
+
+    def noise(own: NDArray[np.bool_]) -> float:
+        size = int(own.sum())
+        freedom = max(size - p * size / len(readings), 1.0)
+        scatter = float(np.sqrt(residual[own] @ residual[own] / freedom))
+        return max(scatter, 1e-6 * _rms(readings.measured[own]) + 1e-15)
+
+    return _by_channel(readings, noise)
+
+
+def _by_channel(readings: Readings, noise: Callable[[NDArray[np.bool_]], float]) -> Floats:
+    std = np.empty(len(readings))
+    for i in range(len(readings.channels)):
+        own = readings.channel == i
+        std[own] = noise(own)
+    return std
+
+
+def _rms(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+CHANCE = 0.001  # Probability by chance of residuals that are significant
 #: Sum of squared residuals that is significant where no degree of freedom is left: 3 sigma.
 SIGNIFICANT_COST = 9.0
 
@@ -68,7 +191,9 @@ def misfit_limit(freedom: int) -> float:
 
     The 0.999 quantile of chi-squared over its degrees of freedom; infinite without any.
     """
-    return chi_squared_quantile(freedom, Z_999) / freedom if freedom >= 1 else np.inf
+    from scipy.special import chdtri
+
+    return float(chdtri(freedom, CHANCE)) / freedom if freedom >= 1 else np.inf
 
 
 def fit_under_declared_noise(

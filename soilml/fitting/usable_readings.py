@@ -33,7 +33,10 @@ def usable_readings(case: Case, table: Table) -> Readings:
     Raises `InputError` where no row remains, `TableError` where the table names another wheel than
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
-    table, excluded = answered_rows(with_rover_columns(case, with_order_columns(case, table)))
+    models = (case.model, *case.gears.values())
+    if any(effect.about.uses for model in models for effect in model.effects):
+        table = with_order_columns(case, table)
+    table, excluded = answered_rows(with_rover_columns(case, table))
     check_wheel_size(case, table)
     notes = [*_remarks_on(case, table), *excluded]
     found = stack_readings(case, table)

@@ -18,7 +18,7 @@ from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import included_bias, usual_errors
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.condensing import condensed
+from soilml.identification import condensing
 from soilml.identification.fit import Fit, disagreeing_soil_tests
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton
@@ -130,8 +130,8 @@ def identify(
     if as_usual:
         errors = usual_errors(case, readings.row_load, [c.path for c in selected])
         readings = replace(readings, shared_errors=errors)
-    if method not in CLOSED_FORM:
-        readings = condensed(case, readings, selected)
+    if method not in CLOSED_FORM and len(readings.row_slip) > condensing.MOST_ROWS:
+        readings = condensing.condensed(case, readings, selected)
     fit = METHODS[method](case, readings, selected)
     if method not in CLOSED_FORM and fit.low is None:
         fit = _within_priors(fit, selected)

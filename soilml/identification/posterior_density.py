@@ -20,11 +20,11 @@ from soilml.fitting.covariance import (
     squared_residuals_and_log_determinant,
 )
 from soilml.fitting.least_squares import SoilTestTerms, Solution
+from soilml.fitting.misfit import WeightedRows
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
-from soilml.fitting.weighted_rows import WeightedRows
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample

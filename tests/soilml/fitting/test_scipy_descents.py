@@ -10,9 +10,9 @@ from scipy.stats import qmc
 from soilml import identify
 from soilml.fitting import least_squares, scipy_descents
 from soilml.fitting.coordinates import select_free
+from soilml.fitting.misfit import FEW, WeightedRows, _few_rows
 from soilml.fitting.predictions import linearise
 from soilml.fitting.usable_readings import usable_readings
-from soilml.fitting.weighted_rows import FEW, WeightedRows, _few_rows
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.physics import sinkage_search

@@ -10,7 +10,7 @@ from channel_readings import rows_of
 
 from soilml import Operating, read_case
 from soilml.errors import FitError
-from soilml.fitting import scipy_descents, weighted_rows
+from soilml.fitting import misfit, scipy_descents
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.identification import condensing
@@ -58,15 +58,15 @@ def test_noise_before_and_after_a_fit_is_that_of_each_channel(case):
     reading = np.asarray([3.0, 4.0, 3.0, 4.0, 1.0, 1.0, 1.0])
     residual = np.asarray([1.0, -1.0, 1.0, -1.0, 0.1, 0.1, -0.2])
     data = rows_of(case, measured=reading)
-    found = weighted_rows._residual_noise(data, residual, 3)
+    found = misfit._residual_noise(data, residual, 3)
     # three parameters, shared among four and three readings
     torque, sinkage = np.sqrt(4.0 / (4.0 - 12.0 / 7.0)), np.sqrt(0.06 / (3.0 - 9.0 / 7.0))
     np.testing.assert_allclose(found, [torque] * 4 + [sinkage] * 3)
-    exact = weighted_rows._residual_noise(data, 0.0 * residual, 3)
+    exact = misfit._residual_noise(data, 0.0 * residual, 3)
     np.testing.assert_allclose(exact, [1e-6 * np.sqrt(12.5)] * 4 + [1e-6] * 3, rtol=1e-6)
-    many = weighted_rows._residual_noise(data, residual, 7)
+    many = misfit._residual_noise(data, residual, 7)
     np.testing.assert_allclose(many[0], 2.0)  # at least one degree of freedom
-    first = weighted_rows._initial_noise(data)
+    first = misfit._initial_noise(data)
     np.testing.assert_allclose(first, [0.05 * np.sqrt(12.5)] * 4 + [0.05] * 3)
 
 
