@@ -19,7 +19,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/parquet.py": {"pyarrow"},
     "soilml/io/table.py": {"pyarrow"},
-    "soilml/fitting/misfit.py": {"scipy"},
     "soilml/fitting/scipy_descents.py": {"scipy"},
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
+from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.remarks import Remark
 
@@ -142,7 +143,7 @@ def _rms(values: Floats) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-CHANCE = 0.001  # Probability by chance of residuals that are significant
+Z_999 = 3.09  # Normal quantile of 0.999
 #: Sum of squared residuals that is significant where no degree of freedom is left: 3 sigma.
 SIGNIFICANT_COST = 9.0
 
@@ -186,14 +187,13 @@ class Misfit:
         return self.per_freedom > misfit_limit(self.freedom)
 
 
+@lru_cache(maxsize=64)
 def misfit_limit(freedom: int) -> float:
     """Misfit per degree of freedom that noise alone exceeds with a probability of 0.001.
 
     The 0.999 quantile of chi-squared over its degrees of freedom; infinite without any.
     """
-    from scipy.special import chdtri
-
-    return float(chdtri(freedom, CHANCE)) / freedom if freedom >= 1 else np.inf
+    return chi_squared_quantile(freedom, Z_999) / freedom if freedom >= 1 else np.inf
 
 
 def fit_under_declared_noise(
