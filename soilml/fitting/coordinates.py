@@ -38,15 +38,25 @@ class Coordinate:
     and a shape coefficient is its own x: `prior` is then a scale alone, from the value at x = 0 to
     the one at x = 1.
 
-    path: As in `Case.parameters`: `cohesion`, `slip-sinkage.n1`, `grousers@lugged.height`.
-    unit: SI unit of its values.
-    prior: Maps x to the value: the case's prior, the one that is assumed, or a scale.
-    nominal: The value that the case gives it.
-    assumed: Whether the case has no prior for it.
-    normal_std: Standard deviation of a normal density of the value about zero that is to be
+    Attributes
+    ----------
+    path
+        As in `Case.parameters`: `cohesion`, `slip-sinkage.n1`, `grousers@lugged.height`.
+    unit
+        SI unit of its values.
+    prior
+        Maps x to the value: the case's prior, the one that is assumed, or a scale.
+    nominal
+        The value that the case gives it.
+    assumed
+        Whether the case has no prior for it.
+    normal_std
+        Standard deviation of a normal density of the value about zero that is to be
         multiplied with that of the prior; None where there is none.
-    lower, upper: Bounds of x.
-    is_shape: Whether it is a shape coefficient of an effect's law.
+    lower, upper
+        Bounds of x.
+    is_shape
+        Whether it is a shape coefficient of an effect's law.
     """
 
     path: str

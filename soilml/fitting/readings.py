@@ -51,23 +51,37 @@ class CondensedRows:
 class Readings:
     """Operating points of n rows, and the m readings of all channels in one vector.
 
-    at: Operating points, arrays (n,).
-    run, runs, order: Index (n,) of each row's run in `runs`; position (n,) of the row in its run,
+    Attributes
+    ----------
+    at
+        Operating points, arrays (n,).
+    run, runs, order
+        Index (n,) of each row's run in `runs`; position (n,) of the row in its run,
         by time.
-    channels: Names of the channels.
-    row, channel: Row, and index in `channels`, of each reading, (m,).
-    measured, std: Measured values (m,), of planned rows the expected ones, and their noise: as
+    channels
+        Names of the channels.
+    row, channel
+        Row, and index in `channels`, of each reading, (m,).
+    measured, std
+        Measured values (m,), of planned rows the expected ones, and their noise: as
         declared, NaN where it is not; in a fit, as it is taken.
-    noise, from_case: Noise of each channel that the case declares, and of which readings (m,) it is
+    noise, from_case
+        Noise of each channel that the case declares, and of which readings (m,) it is
         the noise; that of others stands in the table.
-    slip_std, load_std: Declared noise of slip and of load (N), (n,); 0 where none is declared.
-    sensor_std: The part (m,) of `std` that is not noise of slip and load, where these were added.
-    excluded_channels: Columns that are not fitted, since their noise is not declared and that of
+    slip_std, load_std
+        Declared noise of slip and of load (N), (n,); 0 where none is declared.
+    sensor_std
+        The part (m,) of `std` that is not noise of slip and load, where these were added.
+    excluded_channels
+        Columns that are not fitted, since their noise is not declared and that of
         others is.
-    notes: Remarks on the table.
-    shared_errors: Standard deviations of the errors that all rows share, by name: as [bias]
+    notes
+        Remarks on the table.
+    shared_errors
+        Standard deviations of the errors that all rows share, by name: as [bias]
         declares them, or with those that sensors and models typically have.
-    condensed: What the rows stand for, where many were condensed.
+    condensed
+        What the rows stand for, where many were condensed.
     """
 
     at: Operating
