@@ -85,6 +85,11 @@ class Recipe:
         return replace(self, rows=rows, seed=seed)
 
     @property
+    def driven(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Smallest and largest slip, and load (N)."""
+        return (self.slip.lower, self.slip.upper), (self.load.lower, self.load.upper)
+
+    @property
     def text(self) -> str:
         """Everything that determines the rows, as canonical JSON."""
         return json.dumps(self.content | {"rows": self.rows, "seed": self.seed}, sort_keys=True)

@@ -21,7 +21,7 @@ from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.quantities import COLUMNS, QUANTITIES
+from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column
 from soilml.row_status import Status
 
 MOST_RUNS = 2**30  # Points of a Sobol sequence of scipy: runs that a block can have
@@ -110,6 +110,8 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
     at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
     force = forces_of_one_gear(case, at)
     truth = true_values(rows.slip, rows.load, force)
+    for name, error in model_error(recipe, block, rows).items():
+        truth[name] = truth[name] + error
     sensor_columns = _add_gear_sensors(recipe, case, block, rows, truth)
     row = np.arange(piece.first, piece.last)
     readings = noisy_readings(recipe, block, row, rows.run, truth)
@@ -121,6 +123,32 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
         **sensor_columns,
     }
     return rows.run, columns, force.status
+
+
+def model_error(recipe: Recipe, block: int, rows: SampledRows) -> dict[str, Floats]:
+    r"""The error about its mean (n,) of each column with a [remainder].
+
+    .. math:: \delta_r(s, W) = \sum_j w_{rj} \phi_j(s, \ln W), \quad w_{rj} \sim N(0, 1)
+
+    All rows of a run r share the weights: the error is a smooth function of slip and load that
+    differs between runs, and no noise. Its variance is that of a model whose soil is fitted anew,
+    as the soil of a run is one of the prior.
+
+    References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
+    """
+    remainder, errors = recipe.case.remainder, dict[str, Floats]()
+    if remainder is None:
+        return errors
+    first, last = int(rows.run[0]), int(rows.run[-1]) + 1
+    for name in CHANNELS:
+        if not remainder.of(name):
+            continue
+        functions = remainder.error_functions(name, *recipe.driven)
+        index = np.arange(first * functions.count, last * functions.count)
+        seed = recipe.seed, block, SENSOR_COLUMNS.index(column(name)), 3
+        weights = _normal(seed, index).reshape(-1, functions.count)[rows.run - first]
+        errors[column(name)] = (functions.at(rows.slip, rows.load) * weights).sum(axis=1)
+    return errors
 
 
 def _add_gear_sensors(

@@ -121,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
     from soilml.cli.options import available_effects
     from soilml.cli.progress import progress_bar
-    from soilml.fitting.covariance import ignored_discrepancy, ignored_remainder
+    from soilml.fitting.covariance import ignored_discrepancy
     from soilml.physics.computing_device import computing_on
 
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
@@ -142,9 +142,9 @@ def run(args: argparse.Namespace) -> int:
     )
     for line in ignored_discrepancy(recipe.case, "generate", consequence):
         print(line, file=sys.stderr)
-    consequence = "its mean is added to every row, its uncertainty is not"
-    for line in ignored_remainder(recipe.case, "generate", consequence):
-        print(line, file=sys.stderr)
+    if (learned := recipe.case.remainder) is not None:
+        what = f"[remainder] of {', '.join(learned.columns)}"
+        print(f"{what} is in the rows: its mean, and one draw of its error a run", file=sys.stderr)
     note = f", {result.failed} without equilibrium" if result.failed else ""
     kept = f", {result.kept} of them there before" if result.kept else ""
     print(f"{result.rows} rows{note} written to {args.out}{kept}", file=sys.stderr)

@@ -16,6 +16,8 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.io.toml_settings import Settings
+from soilml.numerics.smooth_functions import SmoothFunctions
+from soilml.numerics.smooth_process import process_columns, squared_exponential
 from soilml.physics.contact import Force
 from soilml.quantities import CHANNELS, column
 
@@ -97,12 +99,12 @@ class RemainderPart:
     def factor(self) -> Floats:
         """Cholesky factor L (k, k) of the correlations of the points."""
         z = self.scaled(*np.asarray(self.points).T)
-        return np.asarray(np.linalg.cholesky(_correlation(z, z)))
+        return np.asarray(np.linalg.cholesky(squared_exponential(z, z)))
 
     def functions(self, slip: Floats, load: Floats) -> Floats:
         """The functions psi (n, k) at slips and loads (n,)."""
         z = self.scaled(*np.asarray(self.points).T)
-        between = _correlation(z, self.scaled(slip, load))
+        between = squared_exponential(z, self.scaled(slip, load))
         return np.asarray(np.linalg.solve(self.factor, between).T)
 
     def mean_and_std(self, slip: Floats, load: Floats) -> tuple[Floats, Floats]:
@@ -118,7 +120,7 @@ class RemainderPart:
         r"""Columns C (n, q), with C C^T the covariance (n, n) of the remainder at these rows.
 
         fitted_anew: Whether soil and effects are fitted anew, and the remainder is uncertain with
-            them. The variance outside the range beyond the process's own is left out.
+            them.
         """
         psi = self.functions(slip, load)
         inner = np.eye(len(self.mean)) - self._matrix("known") @ self._matrix("known").T
@@ -126,11 +128,12 @@ class RemainderPart:
             inner += self._matrix("shared") @ self._matrix("shared").T
         value, vector = np.linalg.eigh(inner)
         within = psi @ (vector * np.sqrt(np.maximum(value, 0.0)))
-        # what the points do not represent: independent of the weights, zero at the points
-        left = np.maximum(1.0 - (psi**2).sum(axis=1), 0.0)
-        beyond = np.sqrt(self.amplitude**2 * left + self._beyond(slip, load))
-        smooth = _smooth_columns(self.scaled(slip, load), beyond)
-        return np.column_stack([self.amplitude * within, smooth])
+        # what the points do not represent: a process that is zero at them, whatever the weights
+        z, at = self.scaled(*np.asarray(self.points).T), self.scaled(slip, load)
+        at_rows, at_points = np.split(process_columns(np.concatenate([at, z])), [len(at)])
+        left = at_rows - psi @ np.linalg.solve(self.factor, at_points)
+        beyond = _smooth_columns(at, np.sqrt(self._beyond(slip, load)))
+        return np.column_stack([self.amplitude * within, self.amplitude * left, beyond])
 
     def _matrix(self, name: str) -> Floats:
         return np.asarray(getattr(self, name), dtype=np.float64).reshape(len(self.mean), -1)
@@ -203,6 +206,21 @@ class Remainder:
         own = [p.columns(slip, load, fitted_anew=fitted_anew) for p in self.of(channel, gear)]
         return np.concatenate([np.zeros((len(slip), 0)), *own], axis=1)
 
+    def error_functions(
+        self, channel: str, slip: tuple[float, float], load: tuple[float, float], gear: str = ""
+    ) -> SmoothFunctions:
+        """The error about the mean in these ranges (N), where soil and effects are fitted anew.
+
+        Raises `ValueError` for a channel and gear without a remainder.
+        """
+        own = self.of(channel, gear)
+        lengths = min(p.slip_length for p in own), min(p.log_load_length for p in own)
+
+        def columns(slips: Floats, loads: Floats) -> Floats:
+            return self.process_columns(channel, slips, loads, gear, fitted_anew=True)
+
+        return SmoothFunctions.of(columns, lengths, slip, load)
+
     def added_to(self, force: Force, slip: Any, load: Any) -> Force:
         """Forces with the mean added to torque, drawbar pull and sinkage, of one gear."""
         slip, load = np.asarray(slip, dtype=np.float64), np.asarray(load, dtype=np.float64)
@@ -260,7 +278,7 @@ def _take_part(settings: Settings, gears: Sequence[str]) -> RemainderPart:
     if part._matrix("known").size and np.linalg.norm(part._matrix("known"), 2) > 1.0 + TOLERANCE:
         settings.fail("known is larger than 1: the variance would be negative")
     z = part.scaled(*np.asarray(points).T)
-    if np.linalg.eigvalsh(_correlation(z, z))[0] < LEAST_PIVOT:
+    if np.linalg.eigvalsh(squared_exponential(z, z))[0] < LEAST_PIVOT:
         settings.fail("points contains points that are too near each other")
     return part
 
@@ -299,15 +317,8 @@ def _written(value: Any) -> str:
     return repr(float(value))
 
 
-def _correlation(a: Floats, b: Floats) -> Floats:
-    """Correlations (n, m) of points (n, 2) with points (m, 2)."""
-    return np.asarray(np.exp(-0.5 * ((a[:, None, :] - b) ** 2).sum(axis=-1)))
-
-
 def _smooth_columns(points: Floats, std: Floats) -> Floats:
     """Columns of a process of these standard deviations (n,); none where all are negligible."""
-    from soilml.numerics.smooth_process import process_columns
-
     if not np.any(std > TOLERANCE * max(float(std.max(initial=0.0)), 1e-300)):
         return np.zeros((len(points), 0))
     return process_columns(points, std)

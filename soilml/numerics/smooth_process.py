@@ -48,10 +48,10 @@ def process_columns(
     if len(points) == 0:
         return np.zeros((0, 0))
     centres = _spread_centres(points)
-    eigenvalue, vector = np.linalg.eigh(_squared_exponential(centres, centres))
+    eigenvalue, vector = np.linalg.eigh(squared_exponential(centres, centres))
     kept = eigenvalue > least_eigenvalue * eigenvalue[-1]
     basis = vector[:, kept] / np.sqrt(eigenvalue[kept])
-    unit = _squared_exponential(points, centres) @ basis
+    unit = squared_exponential(points, centres) @ basis
     return np.asarray(np.reshape(amplitude, (-1, 1)) * unit)
 
 
@@ -81,7 +81,7 @@ def slip_load_points(
     return np.column_stack([slip / slip_length, np.log(load) / log_load_length])
 
 
-def _squared_exponential(a: Floats, b: Floats) -> Floats:
+def squared_exponential(a: Floats, b: Floats) -> Floats:
     """Correlations (n, m) of points (n, d) with points (m, d)."""
     return np.asarray(np.exp(-0.5 * ((a[:, None, :] - b) ** 2).sum(axis=-1)))
 
@@ -113,7 +113,7 @@ def independent_bound(points: Floats) -> Floats:
     """
     return np.concatenate(
         [
-            _squared_exponential(points[i : i + BLOCK], points).sum(axis=1)
+            squared_exponential(points[i : i + BLOCK], points).sum(axis=1)
             for i in range(0, len(points), BLOCK)
         ]
         or [np.zeros(0)]

@@ -80,8 +80,34 @@ def test_outside_the_range_the_mean_fades_and_the_error_becomes_a_usual_one():
         mean, std = own.mean_and_std(*(np.asarray([v]) for v in far))
         assert abs(mean[0]) < 1e-6
         assert std[0] == pytest.approx(0.3, rel=1e-6)
+        columns = own.columns(*(np.asarray([v]) for v in far), fitted_anew=True)
+        assert (columns**2).sum() == pytest.approx(0.09, rel=1e-4)
     small = replace(own, usual=0.1)  # an error that was larger than a usual one stays so
     assert small.mean_and_std(np.asarray([0.9]), np.asarray([5000.0]))[1][0] == pytest.approx(0.2)
+
+
+def test_columns_have_the_covariance_of_the_process_given_the_points():
+    """Rasmussen and Williams, eq. 2.19: what weights on the points leave is a process too."""
+    own = part(usual=0.1)
+    slip, load = np.asarray([0.15, 0.3, 0.42, 0.5]), np.asarray([50.0, 95.0, 70.0, 40.0])
+    at = own.scaled(slip, load)
+    prior = np.exp(-0.5 * ((at[:, None] - at) ** 2).sum(axis=-1))
+    psi, known = own.functions(slip, load), np.asarray(own.known)
+    expected = 0.04 * (prior - psi @ known @ known.T @ psi.T)
+    columns = own.columns(slip, load, fitted_anew=False)
+    np.testing.assert_allclose(columns @ columns.T, expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("ends", [((0.05, 0.6), (30.0, 120.0)), ((-0.3, 0.9), (20.0, 400.0))])
+def test_functions_of_its_error_have_the_same_covariance(ends):
+    """Beyond the range too, where the edge of the larger error is a kink."""
+    (low, high), (light, heavy) = ends
+    functions = Remainder((part(),)).error_functions("torque", *ends)
+    u = np.random.default_rng(0).random((90, 2))
+    slip, load = low + (high - low) * u[:, 0], light * (heavy / light) ** u[:, 1]
+    columns, found = part().columns(slip, load, fitted_anew=True), functions.at(slip, load)
+    difference = (found @ found.T - columns @ columns.T) / 0.3**2
+    assert np.sqrt(np.mean(difference**2)) < 0.02
 
 
 def test_mean_and_error_are_continuous_at_the_edge():

@@ -1,0 +1,84 @@
+"""[remainder] of a recipe: its mean and one draw of its error a run are in the generated rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import RECIPE
+
+from datagen.recipe import read_recipe
+from datagen.simulation import SampledRows, model_error, sample_rows, simulate_rows
+from soilml.config.remainder import Remainder, RemainderPart
+
+RUNS = 4000
+
+
+@pytest.fixture
+def recipe(tmp_path):
+    """A recipe with eight rows a run, and a remainder of the torque."""
+    (tmp_path / "recipe.toml").write_text(
+        RECIPE.format(rows=64, seed=1) + "[[runs]]\nrows = 8\nshare = 1.0\n"
+    )
+    plain = read_recipe(tmp_path / "recipe.toml")
+    part = RemainderPart(
+        column="torque_Nm",
+        gear="",
+        amplitude=0.2,
+        usual=0.1,
+        slip_length=0.3,
+        log_load_length=0.6,
+        slip=(0.1, 0.5),
+        load=(40.0, 110.0),
+        points=((0.2, 60.0), (0.5, 60.0)),
+        mean=(1.5, -0.5),
+        known=((0.9, 0.0), (0.0, 0.5)),
+        shared=((0.1,), (0.2,)),
+    )
+    return replace(plain, case=replace(plain.case, remainder=Remainder((part,))))
+
+
+def at(slip, load=60.0):
+    """One row of each of many runs."""
+    run = np.arange(RUNS)
+    return SampledRows(run, {}, np.full(RUNS, slip), np.full(RUNS, load), {})
+
+
+def test_errors_of_many_runs_have_the_covariance_of_the_remainder(recipe):
+    """Two rows of a run have errors alike; runs are independent of each other."""
+    slips = np.asarray([0.2, 0.25, 0.5])
+    drawn = np.stack([model_error(recipe, 0, at(s))["torque_Nm"] for s in slips])
+    columns = recipe.case.remainder.process_columns(
+        "torque", slips, np.full(3, 60.0), fitted_anew=True
+    )
+    expected = columns @ columns.T
+    # 4000 draws tell a variance within 2.2 %, five of whose standard errors are allowed
+    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    np.testing.assert_allclose(drawn @ drawn.T / RUNS / size, expected / size, atol=0.11)
+    assert np.abs(drawn.mean(axis=1)).max() < 5.0 * np.sqrt(expected.max() / RUNS)
+    assert abs(np.corrcoef(drawn[0, 1:], drawn[0, :-1])[0, 1]) < 5.0 / np.sqrt(RUNS)
+
+
+def test_the_rows_of_one_run_have_one_smooth_error(recipe):
+    slip = np.linspace(0.1, 0.5, 401)
+    rows = SampledRows(np.full(401, 7), {}, slip, np.full(401, 60.0), {})
+    error = model_error(recipe, 0, rows)["torque_Nm"]
+    # neighbours are 0.003 of a correlation length apart: white noise would differ by its size
+    assert np.abs(np.diff(error)).max() < 0.05 * np.abs(error).max()
+
+
+def test_generated_rows_are_the_model_its_mean_and_the_error(recipe):
+    exact = replace(recipe, bias={}, case=replace(recipe.case, noise={}))
+    rows, sampled = simulate_rows(exact, 0, 0, 64), sample_rows(exact, 0, 0, 64)
+    bare = simulate_rows(replace(exact, case=replace(exact.case, remainder=None)), 0, 0, 64)
+    mean, _ = recipe.case.remainder.mean_and_std("torque", sampled.slip, sampled.load)
+    added = rows["torque_Nm"] - bare["torque_Nm"]
+    error = model_error(recipe, 0, sampled)["torque_Nm"]
+    np.testing.assert_allclose(added, mean + error, rtol=1e-9, atol=1e-12)
+    assert np.std(error) > 0.05
+    np.testing.assert_array_equal(rows["sinkage_m"], bare["sinkage_m"])
+
+
+def test_the_error_does_not_depend_on_how_the_rows_are_divided(recipe):
+    whole = simulate_rows(recipe, 0, 0, 64)["torque_Nm"]
+    parts = [simulate_rows(recipe, 0, a, b)["torque_Nm"] for a, b in ((0, 5), (5, 37), (37, 64))]
+    np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12)
