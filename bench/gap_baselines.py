@@ -11,9 +11,9 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import stack_readings
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import column

@@ -9,10 +9,10 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, run_effect_columns
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
 from soilml.numerics.subspaces import project_out
 from soilml.physics.effects import EFFECTS, Effect
@@ -39,7 +39,7 @@ class Separation:
 def testable_effects(case: Case) -> dict[str, type[Effect]]:
     """The effects of the catalogue that suit the gears of a case, by name."""
     if getattr(case, "gears", {}):
-        from soilml.gap.candidate_effects import candidate_effects
+        from soilml.fitting.candidate_effects import candidate_effects
 
         return candidate_effects(case, EFFECTS)
     return {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}

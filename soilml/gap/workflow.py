@@ -11,12 +11,12 @@ from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.config.measurement_noise import checked_sensors
 from soilml.errors import InputError, solvable
+from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
-from soilml.gap.candidate_effects import candidate_effects, effect_names
 from soilml.gap.checks import (
     DataCheckResult,
     check_readings,

@@ -9,11 +9,11 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError, raised
+from soilml.fitting.candidate_effects import effect_names
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
 from soilml.fitting.readings import Readings
-from soilml.gap.candidate_effects import effect_names
 from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
 from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.design.run_options import RunOption, run_options

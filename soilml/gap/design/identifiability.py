@@ -11,16 +11,16 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, solvable
+from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, free_soil_parameters
+from soilml.fitting.effect_signatures import Signature, effect_signatures
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import answered_rows
-from soilml.gap.candidate_effects import candidate_effects
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_kinds import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.evidence.directions import Signature, effect_signatures
 from soilml.gap.evidence.score_test import SignatureSimilarity
 from soilml.gap.report.results import as_json_entry
 from soilml.io.read_table import Rows, as_table

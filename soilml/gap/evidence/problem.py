@@ -11,19 +11,19 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, raised
+from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coordinate
 from soilml.fitting.covariance import Whitening, discrepancy_process
 from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.effect_signatures import Signature, current_size, effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.fitting.readings import Readings
-from soilml.gap.candidate_effects import with_effect
 from soilml.gap.evidence.covariance import (
     Covariance,
     assemble_covariance,
     run_effect_columns,
 )
-from soilml.gap.evidence.directions import Signature, current_size, effect_signatures
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column

@@ -12,6 +12,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
+from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
@@ -23,7 +24,7 @@ from soilml.gap.evidence.covariance import (
     estimate_covariance,
     run_effect_columns,
 )
-from soilml.gap.evidence.directions import Signature, smooth_basis
+from soilml.gap.evidence.directions import smooth_basis
 from soilml.gap.evidence.outliers import (
     MAX_OUTLIER_FRACTION,
     OUTLIER_SIGMA,

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.directions import Signature
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
 from soilml.numerics.subspaces import ROUNDING, project_out

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.fitting.effect_signatures import Signature, effect_signatures
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.directions import Signature, effect_signatures, smooth_basis
+from soilml.gap.evidence.directions import smooth_basis
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
 from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.gap.search.explanation import (

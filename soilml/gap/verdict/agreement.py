@@ -9,10 +9,10 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.misfit import declared_misfit, excess_residuals_remark
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.gap.evidence.order_trend import TREND_LEVEL
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import NoiseAgreement, SoilTrend

@@ -9,11 +9,11 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.covariance import FEW_RUNS
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
 from soilml.gap.evidence.problem import FitProblem, MarginalFit

@@ -12,8 +12,8 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
+from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.directions import Signature
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, SMALLEST_SIZE, TEMPERING
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import EstimatedValue

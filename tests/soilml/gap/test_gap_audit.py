@@ -7,13 +7,13 @@ import pytest
 from gap_sets import case_of, driven
 
 from soilml.errors import InputError
+from soilml.fitting.effect_signatures import Signature
 from soilml.gap import audit
 from soilml.gap.design.identifiability import (
     NAMEABLE_SIGMA,
     identifiability,
     indistinguishable_classes,
 )
-from soilml.gap.evidence.directions import Signature
 from soilml.physics.effects import EFFECTS
 
 STD = np.asarray([0.5, 1.0, 1.0, 1.0, 1.0])

@@ -10,9 +10,9 @@ from scipy.integrate import quad
 
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.effect_signatures import SECANT_STEP, Signature, effect_signatures
 from soilml.gap.design.planned_readings import joined_readings
 from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
-from soilml.gap.evidence.directions import SECANT_STEP, Signature, effect_signatures
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
 from soilml.gap.evidence.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
 from soilml.gap.evidence.problem import FitProblem

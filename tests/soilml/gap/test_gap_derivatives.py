@@ -7,6 +7,7 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
+from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import shape_coordinates, size_coordinate
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.joined_cases import CaseSets, joined_load_case
@@ -18,7 +19,6 @@ from soilml.fitting.predictions import (
     predict,
     predict_many,
 )
-from soilml.gap.candidate_effects import with_effect
 from soilml.gap.evidence.problem import StartedFit, fit_many
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears.rigid_wheel import RigidWheel

@@ -9,11 +9,11 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.effect_signatures import Signature
 from soilml.gap.design import discriminating_runs as design
 from soilml.gap.design.identifiability import _are_equal, identifiability, indistinguishable_classes
 from soilml.gap.design.planned_readings import expected_readings, planned_readings
 from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
-from soilml.gap.evidence.directions import Signature
 from soilml.gap.report.results import NextRun
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior

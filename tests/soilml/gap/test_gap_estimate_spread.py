@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.gap import gap
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.gap.verdict.estimates import SIZES, by_undetected_effects
 
 

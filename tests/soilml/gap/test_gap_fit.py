@@ -7,14 +7,15 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 
 from soilml.errors import InputError
+from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import size_coordinate
 from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.predictions import linearise, predict
 from soilml.fitting.readings import stack_readings
-from soilml.gap.candidate_effects import with_effect
 from soilml.gap.evidence import problem as problem_module
-from soilml.gap.evidence.directions import effect_signatures, regions, smooth_basis
+from soilml.gap.evidence.directions import regions, smooth_basis
 from soilml.gap.evidence.problem import StartedFit, fit_many
 from soilml.physics.effects import EFFECTS
 

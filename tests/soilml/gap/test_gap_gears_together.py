@@ -10,6 +10,7 @@ from test_gap_several_gears import LUGS, REST, WHEELS, rows
 from soilml import identify
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
+from soilml.fitting.candidate_effects import candidate_effects, with_effect
 from soilml.fitting.coordinates import select_free, size_coordinate
 from soilml.fitting.covariance import discrepancy_process
 from soilml.fitting.predictions import (
@@ -19,7 +20,6 @@ from soilml.fitting.predictions import (
 )
 from soilml.fitting.readings import stack_readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.gap.candidate_effects import candidate_effects, with_effect
 from soilml.gap.design.planned_readings import expected_readings, joined_readings
 from soilml.gap.design.run_options import run_options
 from soilml.gap.evidence.problem import exclude_each_other

@@ -9,9 +9,9 @@ from scipy.stats import multivariate_normal
 
 from soilml.fitting.coordinates import shape_coordinates
 from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.predictions import linearise
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.gap.evidence.held_out import held_out_folds, predict_parts
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit

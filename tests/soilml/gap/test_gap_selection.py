@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
 
-from soilml.gap.evidence.directions import effect_signatures
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.search.screening import (

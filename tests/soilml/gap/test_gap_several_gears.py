@@ -9,14 +9,14 @@ from soilml import Operating, identify
 from soilml.cli.tables import print_table_hints
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
+from soilml.fitting.candidate_effects import candidate_effects, with_effect
 from soilml.fitting.coordinates import select_free, size_coordinate
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.operating_points import operating_points
 from soilml.fitting.predictions import forces, linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.candidate_effects import candidate_effects, with_effect
 from soilml.gap.design.planned_readings import planned_readings
-from soilml.gap.evidence.directions import effect_signatures
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import CHANNELS, column

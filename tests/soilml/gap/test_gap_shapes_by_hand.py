@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from gap_sets import candidate, case_of, driven, fit_problem, with_readings
 
-from soilml.gap.evidence.directions import Signature
+from soilml.fitting.effect_signatures import Signature
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.search import explanation
