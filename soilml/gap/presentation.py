@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.io.text_tables import csv_text, format_table
 from soilml.remarks import texts
-from soilml.report.numbers import format_residual
+from soilml.report.numbers import format_probability, format_residual
 from soilml.report.page import Provenance, json_text
 from soilml.report.terminal import rounded, shown_unit, significant
 
@@ -110,8 +110,11 @@ def _suspect_table(report: GapReport) -> str:
     """The likeliest suspects, where no cause is named."""
     if report.status not in ("suspected", "unknown", "not-testable"):
         return ""
-    rows = [(" + ".join(s.effects), f"{s.log_odds:+.1f}") for s in report.suspects[:5]]
-    return format_table(("suspect", "ln(odds)"), rows) if rows else ""
+    rows = [
+        (" + ".join(s.effects), format_probability(s.probability), f"{s.log_odds:+.1f}")
+        for s in report.suspects[:5]
+    ]
+    return format_table(("suspect", "probability", "ln(odds)"), rows) if rows else ""
 
 
 def _discrepancy_table(report: GapReport) -> str:

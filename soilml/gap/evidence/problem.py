@@ -25,6 +25,7 @@ from soilml.gap.evidence.covariance import (
     run_effect_columns,
 )
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
+from soilml.gap.evidence.prior_odds import effect_penalties
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 
@@ -66,6 +67,15 @@ class FitProblem:
         """Amplitude of the discrepancy that the case declares by channel, in usual ones: 1 or 0."""
         declared = [column(name) in self.case.discrepancy for name in self.readings.channels]
         return np.asarray(declared, dtype=np.float64)
+
+    @cached_property
+    def penalties(self) -> dict[str, float]:
+        """-2 ln of the prior odds of each effect against its absence, by name."""
+        return effect_penalties(self.effects)
+
+    def penalty(self, names: Sequence[str]) -> float:
+        """-2 ln of the prior odds of a set of effects against the soil alone."""
+        return sum(self.penalties[name] for name in names)
 
     def effects_not_in(self, fit: Solution) -> dict[str, type[Effect]]:
         """The effects of the catalogue without coordinates in a fit.

@@ -54,15 +54,11 @@ class Suspect:
     """An explanation with its odds against all others, under the conditions of the report."""
 
     effects: tuple[str, ...]
-    log_odds: float  # natural logarithm
+    log_odds: float  # natural logarithm, within the catalogue
+    probability: float  # that these effects are present, causes outside the catalogue included
     #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
     #: smooth remainder; None where no row was kept back for it
     predictive_gain: float | None = None
-
-    @property
-    def probability(self) -> float:
-        """The probability that belongs to the odds."""
-        return 1.0 / (1.0 + float(np.exp(-self.log_odds)))
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ from soilml.gap.evidence.outliers import (
 )
 from soilml.gap.evidence.problem import FitProblem, covariance_at
 from soilml.gap.evidence.score_test import ScoreTest
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.opened_priors import open_priors
 from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
 from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, without_search
@@ -132,7 +132,7 @@ def explains_better(found: Analysis, other: Analysis) -> bool:
     rivals = [c for c in (_predictive(found), found.result.soil_alone) if c is not None]
     rival = min(rivals, key=lambda c: c.objective)
     value = found.problem.discrepancy.evidence(likeliest.fit, likeliest.amplitude).value
-    value += EFFECT_PENALTY * len(likeliest.names)
+    value += likeliest.penalty
     explains_more = likeliest.amplitude.max() < 0.5 * rival.amplitude.max()
     return value < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
 

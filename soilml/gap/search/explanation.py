@@ -14,9 +14,6 @@ from soilml.fitting.predictions import Linearisation
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
-#: -2 ln of the prior odds of one effect: one in twenty, for a catalogue of about twenty.
-EFFECT_PENALTY = 2.0 * float(np.log(20.0))
-
 
 @dataclass(frozen=True)
 class Explanation:
@@ -31,6 +28,8 @@ class Explanation:
     free_law: MarginalFit | None = None
     #: where the catalogue's law explains most under noise alone, as another start of the free law
     noise_only: Solution | None = None
+    #: -2 ln of the prior odds of its effects against the soil alone
+    penalty: float = 0.0
 
     @property
     def shape_supported(self) -> bool:
@@ -56,7 +55,7 @@ class Explanation:
     @property
     def objective(self) -> float:
         """-2 ln of the posterior probability, up to a constant that all candidates share."""
-        return self.best.evidence.value + EFFECT_PENALTY * len(self.names)
+        return self.best.evidence.value + self.penalty
 
     @property
     def shape_deviation(self) -> float:
@@ -106,7 +105,8 @@ def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) ->
         best = _better(first, second)
         if best is not None:
             noise_only = second.first if second else None
-            candidates.append(Explanation(request.names, best, noise_only=noise_only))
+            penalty = problem.penalty(request.names)
+            candidates.append(Explanation(request.names, best, None, noise_only, penalty))
     return candidates
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -19,6 +19,9 @@ MAX_CHANCE_NAME, MAX_CHANCE_CLASS = 0.01, 0.2
 #: Probability that an effect of the catalogue is the right description of a cause that it explains:
 #: the share on the sets that calibrated `TEMPERING`, causes outside the catalogue among them.
 IN_CATALOGUE = 0.9
+#: The same, relative to that, of an effect that explains the data by another law than the
+#: catalogue's.
+OTHER_LAW = 0.5
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
 
@@ -30,11 +33,11 @@ class Posterior:
     """Natural logarithms of the posterior probabilities of sets of effects, by names.
 
     Sets in `refused` explain the data only by a law or a size that the catalogue does not have:
-    they count as causes outside the catalogue, but for those of their effects, given with them,
-    that explain most of the data without the others.
+    another cause may be at work, but for those of their effects, given with them, that explain
+    most of the data without the others. A set with another law counts with `OTHER_LAW`.
 
-    Of these, the sets in `unlisted` are no suspects either: they predict rows that were kept back
-    no better than the soil alone does, or need an implausible size.
+    Of these, the sets in `unlisted` are no suspects: they predict rows that were kept back no
+    better than the soil alone does, or need an implausible size.
     """
 
     log_weights: dict[Names, float]
@@ -43,35 +46,43 @@ class Posterior:
 
     def probability(self, *effects: str) -> float:
         """Probability that these effects are present, causes outside the catalogue included."""
-        inside = self._log_sum(lambda names: set(effects) <= set(self.refused.get(names, names)))
-        return IN_CATALOGUE * float(np.exp(inside))
+        return IN_CATALOGUE * float(np.exp(self._log_shares(effects)[0]))
 
     def weight(self, names: Names) -> float:
         """Probability that exactly this set of effects is present."""
         return float(np.exp(self.log_weights.get(names, -np.inf)))
 
-    def effect_log_odds(self, effect: str) -> float:
-        """Natural logarithm of the odds that an effect is present, within the catalogue."""
-        return self._log_odds(lambda names: effect in self._credited(names))
+    def log_odds(self, *effects: str) -> float:
+        """Natural logarithm of the odds that these effects are present, within the catalogue."""
+        present, absent = self._log_shares(effects)
+        return float(np.clip(present - absent, -MOST_LOG_ODDS, MOST_LOG_ODDS))
 
     def ranked(self) -> list[tuple[Names, float]]:
         """Sets of effects with the natural logarithm of their odds, the likeliest first.
 
-        A set that contains a likelier one counts towards it and is not listed; so does a set to the
-        part of it whose effects are each present with a probability above one half.
+        A set that contains a listed one is not listed, unless the others of its effects are more
+        likely than not where that one is present: then it is listed in its place. Of a set with
+        effects that are each more likely than not, these are listed.
 
         References: Barbieri and Berger, Optimal predictive model selection, Annals of Statistics
         32, 2004: of single models, that of these effects predicts best under usual conditions.
         """
-        groups: dict[Names, set[Names]] = {}
-        for names in sorted(self.log_weights, key=lambda n: (-self.log_weights[n], n)):
-            if credited := self._credited(names):
-                smaller = next((n for n in groups if set(n) <= set(credited)), None)
-                groups.setdefault(smaller or self._core(credited), set()).add(names)
-        odds = {names: self._log_odds(group.__contains__) for names, group in groups.items()}
-        return sorted(odds.items(), key=lambda item: (-item[1], item[0]))
+        listed = {self._core(own) for names in self.log_weights if (own := self._suspects(names))}
+        odds = {names: self.log_odds(*names) for names in listed}
+        for names in sorted(listed, key=lambda n: (-len(n), n)):
+            parts = [n for n in odds if set(n) < set(names)]
+            if parts and min(self._given(names, part) for part in parts) > 0.5:
+                odds = {n: value for n, value in odds.items() if n not in parts}
+            elif parts:
+                del odds[names]
+        return sorted(odds.items(), key=lambda item: (-item[1], -self.weight(item[0]), item[0]))
 
-    def _credited(self, names: Names) -> Names:
+    def effects(self) -> list[str]:
+        """All effects with a probability, the likeliest first."""
+        names = {name for names in self.log_weights for name in names}
+        return sorted(names, key=lambda name: (-self.log_odds(name), name))
+
+    def _suspects(self, names: Names) -> Names:
         """The effects of a set that can be suspected."""
         if names in self.unlisted:
             return tuple(sorted(self.refused.get(names, ())))
@@ -79,21 +90,29 @@ class Posterior:
 
     def _core(self, names: Names) -> Names:
         """The effects of a set that are more likely than not, if they are a set themselves."""
-        core = tuple(name for name in names if self.effect_log_odds(name) > 0.0)
+        core = tuple(name for name in names if self.log_odds(name) > 0.0)
         return core if core and core in self.log_weights else names
 
-    def _log_odds(self, counts: Callable[[Names], bool]) -> float:
-        odds = self._log_sum(counts) - self._log_sum(lambda names: not counts(names))
-        return float(np.clip(odds, -MOST_LOG_ODDS, MOST_LOG_ODDS))
+    def _given(self, names: Names, part: Names) -> float:
+        """Probability that all effects of a set are present where those of a part of it are."""
+        return float(np.exp(self._log_shares(names)[0] - self._log_shares(part)[0]))
 
-    def _log_sum(self, counts: Callable[[Names], bool]) -> float:
-        values = [w for names, w in self.log_weights.items() if counts(names)]
-        return float(np.logaddexp.reduce(values)) if values else -np.inf
+    def _share(self, names: Names, effects: Collection[str]) -> float:
+        """Probability, within the catalogue, that these effects are causes where a set explains."""
+        if not set(effects) <= set(names):
+            return 0.0
+        if names not in self.refused or set(effects) <= self.refused[names]:
+            return 1.0
+        return 0.0 if names in self.unlisted else OTHER_LAW
 
-    def effects(self) -> list[str]:
-        """All effects with a probability, the likeliest first."""
-        names = {name for names in self.log_weights for name in names}
-        return sorted(names, key=lambda name: (-self.probability(name), name))
+    def _log_shares(self, effects: Collection[str]) -> tuple[float, float]:
+        """Logarithms of the probabilities, within the catalogue, that effects are there or not."""
+        weights = np.fromiter(self.log_weights.values(), dtype=np.float64)
+        share = np.asarray([self._share(names, effects) for names in self.log_weights])
+        with np.errstate(divide="ignore"):
+            both = [weights + np.log(part) for part in (share, 1.0 - share)]
+        present, absent = (float(np.logaddexp.reduce(logs, initial=-np.inf)) for logs in both)
+        return present, absent
 
 
 def explanations(candidates: Sequence[Explanation], found: Posterior) -> tuple[Explanation, ...]:

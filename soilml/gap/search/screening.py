@@ -9,7 +9,7 @@ import numpy as np
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 from soilml.numerics.subspaces import ROUNDING, project_out
 
 
@@ -41,8 +41,9 @@ def predicted_gains(
             candidate.fit, candidate.amplitude, s.column[:, None]
         )
         possible = s.sign == 0 or float(evidence.step[-1]) * s.sign > 0.0
-        value = evidence.value + EFFECT_PENALTY * (len(candidate.names) + 1)
-        gains[s.name] = objective - value if possible else -EFFECT_PENALTY
+        penalty = problem.penalties[s.name]
+        value = evidence.value + candidate.penalty + penalty
+        gains[s.name] = objective - value if possible else -penalty
     return gains
 
 

@@ -140,7 +140,7 @@ def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool
 
 
 def _first_suspect(result: SearchResult) -> Explanation | None:
-    """The candidate that is listed first: the likeliest, sets that contain it counted towards it.
+    """The candidate that is listed first: the likeliest; see `Posterior.ranked`.
 
     An effect that was not fitted in full is passed over.
     """
@@ -152,8 +152,13 @@ def _first_suspect(result: SearchResult) -> Explanation | None:
 def by_probability(
     candidates: Sequence[Explanation], posterior: Posterior
 ) -> tuple[Explanation, ...]:
-    """Explanations in the order of the probability that their effects are present."""
-    return tuple(sorted(candidates, key=lambda c: -posterior.probability(*c.names)))
+    """Explanations in the order of suspects, and the others of the probability of their effects."""
+    order = {names: i for i, (names, _) in enumerate(posterior.ranked())}
+
+    def place(c: Explanation) -> tuple[float, int]:
+        return -posterior.log_odds(*c.names), order.get(c.names, len(order))
+
+    return tuple(sorted(candidates, key=place))
 
 
 def is_left_open(result: SearchResult) -> bool:
@@ -238,7 +243,8 @@ def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...]
         unlisted = result.posterior.unlisted
         kept = [c for c in result.candidates if c.names not in unlisted]
         found = by_probability(not_rejected(kept), result.posterior)
-        return tuple(c.names for c in found if c.names)
+        first = (decision.shown.names,) if decision.shown else ()
+        return tuple(dict.fromkeys((*first, *(c.names for c in found if c.names))))
     return tuple(c.names for c in decision.claimed)
 
 

@@ -115,12 +115,13 @@ def suspects(analysis: Analysis) -> list[Suspect]:
 
     None stands before the likeliest one that was fitted in full, whose figures are shown.
     """
-    ranked = analysis.result.posterior.ranked()
+    posterior = analysis.result.posterior
+    ranked = posterior.ranked()
     fitted = {c.names for c in analysis.result.candidates}
     first = next((i for i, (names, _) in enumerate(ranked) if names in fitted), 0)
     gains = predictive_gains(analysis.predictions)
     return [
-        Suspect(names, odds, gains.get(names))
+        Suspect(names, odds, posterior.probability(*names), gains.get(names))
         for names, odds in ranked[first : first + LISTED_SUSPECTS]
     ]
 
@@ -287,7 +288,7 @@ def named_effects(
                 separating_snr=snr,
                 nearest_rival=rival,
                 probability=posterior.probability(name),
-                log_odds=posterior.effect_log_odds(name),
+                log_odds=posterior.log_odds(name),
             )
         )
     return effects

@@ -17,7 +17,7 @@ from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, SMALLEST_SIZE, TEMPERING
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import EstimatedValue
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import Posterior
 from soilml.numerics.prior import Prior
 from soilml.quantities import Z_90
@@ -71,7 +71,8 @@ def by_undetected_effects(
 
     with its signature s, the Jacobian X and the precision P of the soil's prior. The size has the
     prior of `soilml.gap.evidence.marginal_likelihood`, times the likelihood of what the soil
-    leaves; an effect has prior odds of one to twenty against the soil alone.
+    leaves; an effect has the prior odds of `soilml.gap.evidence.prior_odds` against the soil
+    alone.
     """
     fit = soil.whitened_by(problem.covariance.whiten)
     stds = {c.effect: c.std for c in problem.size_coordinates([s.name for s in signatures])}
@@ -81,7 +82,7 @@ def by_undetected_effects(
         moved = np.linalg.solve(fit.information, fit.jacobian.T @ column)
         apart = column - fit.jacobian @ moved
         size, log = _size_posterior(apart, fit.residual, s.sign, stds[s.name])
-        logs.append(log)
+        logs.append(log - 0.5 * problem.penalties[s.name])
         offsets.append(size[:, None] * moved)
     log, offset = np.concatenate(logs), np.concatenate(offsets)
     rate = rates_at(fit.coordinates, fit.x)
@@ -106,7 +107,7 @@ def _size_posterior(
     log_prior -= np.logaddexp.reduce(log_prior)
     log = log_prior + size * (column @ residual) - 0.5 * size**2 * (column @ column)
     total = float(np.logaddexp.reduce(log))
-    return size, log + (TEMPERING - 1.0) * total - 0.5 * EFFECT_PENALTY
+    return size, log + (TEMPERING - 1.0) * total
 
 
 COVERAGE = 0.90  # Probability of the interval by which a mixture is summarised

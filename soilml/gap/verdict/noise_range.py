@@ -7,7 +7,7 @@ import numpy as np
 from soilml.gap.evidence.covariance import Covariance
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel
 from soilml.gap.search.analysis import Analysis
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 from soilml.remarks import Remark
 
 #: Factors on the estimated noise and scatter that are tried: published figures are read to about
@@ -40,8 +40,5 @@ def _likeliest(analysis: Analysis, factor: float) -> tuple[str, ...]:
     scaled = Covariance(found.matrix * factor**2, found.whiten / factor, found.components)
     model = DiscrepancyModel(scaled, problem.discrepancy.process)
     listed = [c for c in result.candidates if c.names not in result.posterior.unlisted]
-    values = {
-        c.names: model.evidence(c.fit, c.amplitude).value + EFFECT_PENALTY * len(c.names)
-        for c in listed
-    }
+    values = {c.names: model.evidence(c.fit, c.amplitude).value + c.penalty for c in listed}
     return min(values, key=lambda names: values[names])

@@ -15,9 +15,9 @@ from soilml.gap.design.planned_readings import joined_readings
 from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
 from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
 from soilml.gap.evidence.outliers import OUTLIER_SIGMA, REPEAT_SIGMA, outliers
+from soilml.gap.evidence.prior_odds import EXPECTED_CAUSES
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.evidence.score_test import SignatureSimilarity
-from soilml.gap.search.explanation import EFFECT_PENALTY
 from soilml.gap.search.screening import free_law_gains, noise_only_gains, predicted_gains
 from soilml.gap.verdict.entries import named_effects, signature_similarity
 from soilml.gap.verdict.estimates import (
@@ -99,7 +99,7 @@ def test_named_effects_carry_their_estimates_and_rivals(problem, found):
         def probability(self, name):
             return 0.45
 
-        def effect_log_odds(self, name):
+        def log_odds(self, name):
             return 0.0
 
     similar = SignatureSimilarity(
@@ -249,9 +249,10 @@ def test_an_effect_of_an_impossible_sign_gains_less_than_nothing(problem, found)
     none = candidate(problem, [], {})
     signs = {"more": 1, "less": -1, "any": 0}
     signatures = [Signature(name, "soil", column, sign) for name, sign in signs.items()]
-    gains = predicted_gains(problem, none, none.objective, signatures)
+    three = replace(problem, effects=dict.fromkeys(signs, EFFECTS["slip-sinkage"]))
+    gains = predicted_gains(three, none, none.objective, signatures)
     assert gains["more"] == gains["any"] > 50.0
-    assert gains["less"] == -EFFECT_PENALTY < 0.0
+    assert gains["less"] == pytest.approx(-2.0 * np.log(3.0 / EXPECTED_CAUSES))
 
 
 def test_a_trend_of_residuals_is_stated_in_sigma_by_channel(problem):

@@ -153,11 +153,11 @@ def test_figures_are_those_of_the_suspect_that_is_listed_first():
         "suspected",
         "",
         case_of(),
-        suspects=(Suspect(("a",), 0.0),),
+        suspects=(Suspect(("a",), 0.0, 0.45),),
         best_unclaimed=unclaimed_effects(decision, result),
         gap={"train": GapReduction(8.8, 1.0, {}, 108, "all rows fitted")},
     )
-    assert "first suspect is a (probability 0.50); the gap shrinks 8.80 -> 1.0" in headline(report)
+    assert "first suspect is a (probability 0.45); the gap shrinks 8.80 -> 1.0" in headline(report)
 
 
 @pytest.mark.parametrize(("height", "said"), [(0.08, True), (0.02, False)])

@@ -15,7 +15,6 @@ from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.report.page import conditions_text
 from soilml.gap.report.results import EstimatedValue, soil_test_agreement
 from soilml.gap.search.explanation import (
-    EFFECT_PENALTY,
     Explanation,
 )
 from soilml.gap.search.posterior import Posterior
@@ -38,7 +37,7 @@ from soilml.remarks import Remark, texts
 def made(*names, objective=0.0, amplitude=(0.0, 0.0)):
     """A candidate with this objective and discrepancy."""
     known = np.asarray(amplitude, dtype=float)
-    evidence = Evidence(objective - EFFECT_PENALTY * len(names), known, np.zeros(0), known)
+    evidence = Evidence(objective, known, np.zeros(0), known)
     marginal = MarginalFit(SimpleNamespace(objective=objective, x=np.zeros(2)), evidence)
     return Explanation(names, marginal, marginal)
 

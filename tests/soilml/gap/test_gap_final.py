@@ -9,14 +9,14 @@ from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, VarianceComponents
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit, _changed
 from soilml.gap.search import analysis
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import Posterior, explanations, not_rejected, posterior
 
 
 def made(*names, objective=0.0):
     """A candidate with this objective."""
     none = np.zeros(2)
-    evidence = Evidence(objective - EFFECT_PENALTY * len(names), none, np.zeros(0), none)
+    evidence = Evidence(objective, none, np.zeros(0), none)
     marginal = MarginalFit(SimpleNamespace(objective=objective), evidence)
     return Explanation(names, marginal, marginal)
 

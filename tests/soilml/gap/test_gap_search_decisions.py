@@ -9,7 +9,7 @@ import pytest
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.search import screening, stepwise
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 
 
 def fit_of(objective=0.0, x=None):
@@ -26,7 +26,7 @@ def fit_of(objective=0.0, x=None):
 def made(*names, objective=0.0, amplitude=(0.0, 0.0), noise_only=None, x=None):
     """A candidate with this objective and discrepancy."""
     known = np.asarray(amplitude, dtype=float)
-    evidence = Evidence(objective - EFFECT_PENALTY * len(names), known, np.zeros(0), known)
+    evidence = Evidence(objective, known, np.zeros(0), known)
     marginal = MarginalFit(fit_of(objective, x), evidence)
     return Explanation(names, marginal, marginal, noise_only)
 

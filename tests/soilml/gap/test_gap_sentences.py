@@ -1,5 +1,6 @@
 """The verdict in words and what it does not support, by status."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -85,9 +86,9 @@ def test_without_a_cause_the_first_reason_is_stated():
 
 def test_suspects_have_their_odds_and_the_first_three_are_listed():
     odds = {"a": 3.0, "b": 0.0, "c": -1.0, "d": -2.0}
-    suspects = tuple(Suspect((n,), v) for n, v in odds.items())
+    suspects = tuple(Suspect((n,), v, 0.9 / (1.0 + math.exp(-v))) for n, v in odds.items())
     assert said("suspected", suspects=suspects) == (
-        "A gap of uncertain cause: first suspect is a (probability 0.95); the gap shrinks "
+        "A gap of uncertain cause: first suspect is a (probability 0.86); the gap shrinks "
         "8.80 -> 1.10."
     )
     found = lines("suspected", suspects=suspects)

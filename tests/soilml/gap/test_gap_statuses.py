@@ -10,7 +10,7 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.report.sentences import NOT_DECISIVE
-from soilml.gap.search.explanation import EFFECT_PENALTY, Explanation
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import (
     MAX_CHANCE_CLASS,
     MAX_CHANCE_NAME,
@@ -56,7 +56,7 @@ def marginal(value, amplitude=(0.0, 0.0), coordinates=(), x=()):
 def candidate(names, objective, amplitude=(0.0, 0.0), **fit):
     """A candidate whose objective, the penalty of its effects included, is that given."""
     names = tuple(names.split("+")) if names else ()
-    own = marginal(objective - EFFECT_PENALTY * len(names), amplitude, **fit)
+    own = marginal(objective, amplitude, **fit)
     return Explanation(names, own, own)
 
 

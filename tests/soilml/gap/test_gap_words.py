@@ -94,8 +94,8 @@ PARTS = {
     "reasons": (Remark("strange", LONG), Remark("other", LONG)),
     "best_unclaimed": ("lateral-slip@first", "load-transfer@first", "stress-shift"),
     "suspects": (
-        Suspect(("lateral-slip@first", "load-transfer@first", "stress-shift"), 1.0),
-        Suspect(("grousers",), 0.0),
+        Suspect(("lateral-slip@first", "load-transfer@first", "stress-shift"), 1.0, 0.66),
+        Suspect(("grousers",), 0.0, 0.45),
     ),
     "cause_set": (("a", "b", "c"), ("d",)),
     "effects": tuple(NamedEffect(n, {}, (), 1.0, "", 0.9, 2.0) for n in ("a", "b", "c")),

@@ -159,7 +159,7 @@ def report(status="named", **changes):
             "friction_angle_std": 0.00698,
         },
         residual_trend={"torque_Nm": 0.25, "sinkage_m": 0.0},
-        suspects=(Suspect(("slip-sinkage",), 7.0),),
+        suspects=(Suspect(("slip-sinkage",), 7.0, 0.9),),
         conditions=(Remark("one-bed", "the bed was the same for all rows"),),
         discrepancy={
             "torque_Nm": RemainingDiscrepancy(
@@ -223,7 +223,7 @@ def test_hostile_names_stay_text():
         not_claimed=(said(EVIL),),
         untestable={EVIL: said(EVIL)},
         residual_trend={EVIL: 1.0},
-        suspects=(Suspect((EVIL,), 0.0),),
+        suspects=(Suspect((EVIL,), 0.0, 0.45),),
         discrepancy={EVIL: RemainingDiscrepancy(EVIL, 2.0, 1.0, 2.0, 1.0, EVIL)},
         variance_components={EVIL: 1.0},
         cause_set=((EVIL,),),
