@@ -23,7 +23,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	  --disable-pip-version-check --editable '.[ground,logs,serve,dev]'
 	@touch $@
 
-demo: $(VENV)/.ready ## from the forward model to an estimate on board, with a table and a picture
+demo: $(VENV)/.ready ## the story of README: data, training, comparison, a gap, a better board; one picture
 	@$(BIN)/python examples/wheel/demo.py
 
 gap: $(VENV)/.ready ## five examples of a model that lacks an effect, with their reports

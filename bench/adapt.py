@@ -88,9 +88,8 @@ def board_sets(plan: Plan, soil: dict[str, float], loads: Floats) -> tuple[list[
         own = soil | {name: float(rng.uniform(*getattr(family, name))) for name in SHEAR}
         slip = np.sort(rng.uniform(0.06, 0.58, ROWS))
         load = rng.choice(loads, ROWS)
-        fixed = {"radius": RADIUS, "width": WIDTH, "speed": 0.05, "pass_number": 1.0}
-        state = {k: np.full(ROWS, v) for k, v in (own | fixed | {"slip_angle": 0.0}).items()}
-        found = solve_equilibrium(WheelState(slip=slip, load=load, **state), active)
+        rows = WheelState.on_soil(own, slip, load, RADIUS, WIDTH)
+        found = solve_equilibrium(rows, active)
         torque = found.torque + noise.std(found.torque) * rng.standard_normal(ROWS)
         if np.isfinite(torque).all():
             sets.append({"slip": slip, "load": load, "torque": torque})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import final
 
@@ -38,6 +38,16 @@ class WheelState:
     slip_angle: Floats  # rad
     #: share of the campaign that is over, 0 at its first run and 1 at its last
     elapsed: Floats = field(default_factory=lambda: np.zeros(1))
+
+    @staticmethod
+    def on_soil(
+        soil: Mapping[str, float], slip: Floats, load: Floats, radius: float, width: float
+    ) -> WheelState:
+        """One wheel on one soil at these slips and loads (N), first pass, straight ahead."""
+        fixed = {"radius": radius, "width": width, "speed": 0.05, "pass_number": 1.0}
+        values = dict(soil) | fixed | {"slip_angle": 0.0}
+        rows = {name: np.full(slip.shape, value) for name, value in values.items()}
+        return WheelState(slip=slip, load=load, **rows)
 
     @property
     def travel_ratio(self) -> Floats:
