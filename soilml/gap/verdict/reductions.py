@@ -8,6 +8,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
@@ -136,8 +137,14 @@ def without_grown(
 def predict_held_out(
     problem: FitProblem, soil: Solution, after: Solution, readings: Readings, description: str
 ) -> GapReduction:
-    """Gap reduction on rows that took no part in the analysis, predicted by both fits."""
+    """Gap reduction on rows that took no part in the analysis, predicted by both fits.
+
+    Their noise is that of the analysed rows: at the predictions by `after`, not at readings that
+    may have strayed, and with what the noise of slip and load causes.
+    """
     old = predict(soil.case, soil.coordinates, soil.x[None, :], readings)[0]
     new = predict(after.case, after.coordinates, after.x[None, :], readings)[0]
+    readings = readings.with_noise_at(new)
+    readings = readings.with_noise_of_operation(noise_of_operation(after.fitted(), readings))
     std = covariance_at(problem, after, readings).std
     return gap_reduction(readings, std, old, new, description)

@@ -276,6 +276,11 @@ def test_rows_that_took_no_part_are_predicted_as_well(dug, named):
     found = predict_held_out(problem, soil, named.fit, other.readings, "others")
     assert found.readings == len(other.readings)
     assert 0.4 < found.after < 2.0 < found.before
+    # noise that is a share of the reading is that of the prediction, whatever the reading was
+    strayed = replace(other.readings, std=2.0 * other.readings.std)
+    assert predict_held_out(problem, soil, named.fit, strayed, "others") == found
+    unsure = replace(other.readings, slip_std=np.full_like(other.readings.slip_std, 0.02))
+    assert predict_held_out(problem, soil, named.fit, unsure, "").after < 0.9 * found.after
 
 
 def test_a_prediction_without_equilibrium_counts_as_ten_sigma(dug):
