@@ -16,8 +16,9 @@ from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
+from soilml.traction.draws import SoilDraws
 from soilml.traction.pull_and_slope import Traction, predict_traction
-from soilml.traction.soil_draws import DRAWS, SoilDraws, estimated_soil, posterior_draws
+from soilml.traction.soil_draws import DRAWS, estimated_soil, posterior_draws
 
 Floats = NDArray[np.float64]
 

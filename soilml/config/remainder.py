@@ -112,9 +112,8 @@ class RemainderPart:
         psi = self.functions(slip, load)
         told = ((psi @ self._matrix("known")) ** 2).sum(axis=1)
         variance = self.amplitude**2 * np.maximum(1.0 - told, 0.0)
-        return self.amplitude * psi @ np.asarray(self.mean), np.sqrt(
-            variance + self._beyond(slip, load)
-        )
+        std = np.sqrt(variance + self._std_beyond(slip, load) ** 2)
+        return self.amplitude * psi @ np.asarray(self.mean), std
 
     def columns(self, slip: Floats, load: Floats, *, fitted_anew: bool) -> Floats:
         r"""Columns C (n, q), with C C^T the covariance (n, n) of the remainder at these rows.
@@ -122,6 +121,11 @@ class RemainderPart:
         fitted_anew: Whether soil and effects are fitted anew, and the remainder is uncertain with
             them.
         """
+        beyond = _smooth_columns(self.scaled(slip, load), self._std_beyond(slip, load))
+        return np.column_stack([self._own_columns(slip, load, fitted_anew=fitted_anew), beyond])
+
+    def _own_columns(self, slip: Floats, load: Floats, *, fitted_anew: bool) -> Floats:
+        """The columns of the process itself, without what it has beyond its range."""
         psi = self.functions(slip, load)
         inner = np.eye(len(self.mean)) - self._matrix("known") @ self._matrix("known").T
         if fitted_anew:
@@ -132,19 +136,36 @@ class RemainderPart:
         z, at = self.scaled(*np.asarray(self.points).T), self.scaled(slip, load)
         at_rows, at_points = np.split(process_columns(np.concatenate([at, z])), [len(at)])
         left = at_rows - psi @ np.linalg.solve(self.factor, at_points)
-        beyond = _smooth_columns(at, np.sqrt(self._beyond(slip, load)))
-        return np.column_stack([self.amplitude * within, self.amplitude * left, beyond])
+        return self.amplitude * np.column_stack([within, left])
+
+    def error_functions(
+        self, slip: tuple[float, float], load: tuple[float, float]
+    ) -> SmoothFunctions:
+        """The covariance of `columns` as functions of slip and load (N), soil fitted anew."""
+        lengths = self.slip_length, self.log_load_length
+
+        def own(slip: Floats, load: Floats) -> Floats:
+            return self._own_columns(slip, load, fitted_anew=True)
+
+        def unit(slip: Floats, load: Floats) -> Floats:
+            return process_columns(self.scaled(slip, load))
+
+        inside = SmoothFunctions.of(own, lengths, slip, load)
+        if self.usual <= self.amplitude:
+            return inside
+        outside = SmoothFunctions.of(unit, lengths, slip, load)
+        return SmoothFunctions.joined([inside, outside.times(self._std_beyond)])
 
     def _matrix(self, name: str) -> Floats:
         return np.asarray(getattr(self, name), dtype=np.float64).reshape(len(self.mean), -1)
 
-    def _beyond(self, slip: Floats, load: Floats) -> Floats:
-        """Variance (n,) beyond the process's own, which grows outside the range."""
+    def _std_beyond(self, slip: Floats, load: Floats) -> Floats:
+        """Standard deviation (n,) beside the process's own, which grows outside the range."""
         more = max(self.usual**2 - self.amplitude**2, 0.0)
         low, high = (self.scaled(*(np.asarray([v]) for v in end)) for end in self._corners)
         at = self.scaled(slip, load)
         distance = np.maximum(np.maximum(low - at, at - high), 0.0)
-        return np.asarray(more * -np.expm1(-0.5 * (distance**2).sum(axis=1)))
+        return np.asarray(np.sqrt(more * -np.expm1(-0.5 * (distance**2).sum(axis=1))))
 
     @property
     def _corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
@@ -213,13 +234,8 @@ class Remainder:
 
         Raises `ValueError` for a channel and gear without a remainder.
         """
-        own = self.of(channel, gear)
-        lengths = min(p.slip_length for p in own), min(p.log_load_length for p in own)
-
-        def columns(slips: Floats, loads: Floats) -> Floats:
-            return self.process_columns(channel, slips, loads, gear, fitted_anew=True)
-
-        return SmoothFunctions.of(columns, lengths, slip, load)
+        parts = [part.error_functions(slip, load) for part in self.of(channel, gear)]
+        return SmoothFunctions.joined(parts)
 
     def added_to(self, force: Force, slip: Any, load: Any) -> Force:
         """Forces with the mean added to torque, drawbar pull and sinkage, of one gear."""

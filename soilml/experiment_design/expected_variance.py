@@ -47,8 +47,8 @@ def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> 
     """Predictions of all channels whose noise the case declares; `at` holds arrays (m,).
 
     Noise of slip and load is propagated as in the posterior, at the sample nearest to the mean. A
-    model discrepancy is added as an error that is independent of those of other rows. Raises
-    `InputError` where no noise is declared.
+    model discrepancy, or a learned remainder, is added as an error that is independent of those of
+    other rows. Raises `InputError` where no noise is declared.
     """
     channels = tuple(name for name in CHANNELS if column(name) in case.noise)
     if not channels:
@@ -57,7 +57,7 @@ def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> 
     y = np.stack([predicted[name].T for name in channels])
     sensor = np.stack(
         [
-            np.hypot(case.noise[column(n)].std(v), _model_error(case, n, v))
+            np.hypot(case.noise[column(n)].std(v), _model_error(case, n, v, at))
             for n, v in zip(channels, y, strict=True)
         ]
     )
@@ -69,13 +69,21 @@ def predicted_readings(case: Case, samples: ParameterSamples, at: Operating) -> 
     return PredictedReadings(at, channels, y, np.fmax(std, least), failure < MOST_FAILURE)
 
 
-def _model_error(case: Case, name: str, y: Floats) -> float:
-    """Standard deviation of a channel's discrepancy; its range is that of typical readings."""
+def _model_error(case: Case, name: str, y: Floats, at: Operating) -> Floats:
+    """Standard deviation (m, 1) of a channel's remainder, or of its declared discrepancy.
+
+    The range of a discrepancy is that of typical readings.
+    """
+    slip, load = np.broadcast_arrays(*(np.atleast_1d(np.asarray(v)) for v in (at.slip, at.load)))
+    if case.remainder is not None and case.remainder.of(name):
+        columns = case.remainder.process_columns(name, slip, load, fitted_anew=True)
+        return np.asarray(np.sqrt((columns**2).sum(axis=1, keepdims=True)))
     own = case.discrepancy.get(column(name))
     if own is None:
-        return 0.0
+        return np.zeros((len(slip), 1))
     carried = np.isfinite(y).any(axis=1)
-    return own.amplitude(range_with_zero(np.nanmedian(y[carried], axis=1)))
+    amplitude = own.amplitude(range_with_zero(np.nanmedian(y[carried], axis=1)))
+    return np.full((len(slip), 1), amplitude)
 
 
 def _input_noise(

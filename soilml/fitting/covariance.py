@@ -206,15 +206,6 @@ def ignored_discrepancy(
     return [Remark("discrepancy-ignored", text, tuple(names))]
 
 
-def ignored_remainder(case: Case, what: str, consequence: str) -> list[Remark]:
-    """A remark that `what` leaves out [remainder] or a part of it; none for a case without one."""
-    if case.remainder is None:
-        return []
-    names = case.remainder.columns
-    text = f"[remainder] of {', '.join(names)} in {what}: {consequence}"
-    return [Remark("remainder-ignored", text, tuple(names))]
-
-
 def noise_of_operation(
     case: Case, readings: Readings, coordinates: Sequence[Coordinate] = (), x: Floats | None = None
 ) -> Floats:

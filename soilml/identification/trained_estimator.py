@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.compatibility import (
     check_wheel_columns,
@@ -21,13 +20,12 @@ from soilml.config.compatibility import (
     recipe_case,
     soil_value_differences,
 )
-from soilml.config.measurement_noise import Discrepancy, common_errors, range_with_zero
+from soilml.config.measurement_noise import common_errors
 from soilml.errors import InputError, TableError
-from soilml.fitting.covariance import ignored_remainder
 from soilml.identification.fit import ignored_soil_tests
+from soilml.identification.model_error_inputs import model_error_remarks
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.numerics.smooth_process import independent_bound, slip_load_points
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, OPERATING_NOISE
 from soilml.parameters import declared
@@ -109,50 +107,6 @@ def with_sensors_of(estimator: Estimator, case: Case) -> Estimator:
     if "torque_bias" in errors:
         noise["torque_bias"] = (errors.pop("torque_bias"), 0.0)
     return estimator.on(noise, **errors)
-
-
-def std_with_discrepancy(
-    discrepancy: Mapping[str, Discrepancy],
-    readings: Mapping[str, Floats],
-    noise: Mapping[str, tuple[float, float]],
-    *,
-    together: bool,
-) -> dict[str, Floats]:
-    r"""Standard deviations (rows,) by input name, of channels with a discrepancy, with it included.
-
-    .. math:: \sigma_i'^2 = \sigma_i^2 + a^2 \sum_j \rho_{ij}
-
-    A model file takes the errors of the rows as independent, those of the model are alike in
-    neighbouring rows. With the sum of the correlations the independent errors are no smaller in any
-    combination of the rows, so that the estimate of rows that are taken `together` is wider than
-    with the process itself, never narrower. For rows estimated one by one the sum is 1.
-
-    discrepancy: By column name, as in `Case`.
-    readings: Inputs of the model file by name, (rows,): slip, load, channels and their
-        `<name>_std`.
-    noise: Constant part and share of the noise by name, where there is no `<name>_std`.
-    """
-    changed = {}
-    for name in CHANNELS:
-        own = discrepancy.get(column(name))
-        if own is None or name not in readings:
-            continue
-        reading = np.asarray(readings[name])
-        amplitude = own.amplitude(range_with_zero(reading))
-        constant, share = noise.get(name, (0.0, 0.0))
-        std = readings.get(f"{name}_std", np.hypot(constant, share * np.abs(reading)))
-        alike = np.ones(len(reading))
-        measured = np.isfinite(reading)
-        if together:
-            points = slip_load_points(
-                readings["slip"][measured],
-                readings["load"][measured],
-                own.slip_length,
-                own.log_load_length,
-            )
-            alike[measured] = independent_bound(points)
-        changed[f"{name}_std"] = np.hypot(std, amplitude * np.sqrt(alike))
-    return changed
 
 
 def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:
@@ -248,23 +202,10 @@ def estimators_for_case(
             remarks += _compare(estimator, case, name, together)
             estimator = with_sensors_of(estimator, case) if together else estimator
         given.append(estimator)
-    if case is not None and case.discrepancy:
-        remarks.append(_discrepancy_remark(given[0], case, pooled))
     if case is not None:
+        remarks += model_error_remarks(given[0], case, pooled=pooled)
         remarks += ignored_soil_tests(case)
-        consequence = "the file was trained without it, and it is not taken from the readings"
-        remarks += ignored_remainder(case, "estimate", consequence)
     return given, remarks
-
-
-def readings_with_discrepancy(
-    estimator: Estimator, readings: dict[str, Any], case: Case | None, *, together: bool
-) -> dict[str, Any]:
-    """Inputs (rows,) by name, whose standard deviations include the discrepancy of the case."""
-    if case is None or not case.discrepancy or estimator.sets is None:
-        return readings
-    noise = estimator.sets.noise
-    return readings | std_with_discrepancy(case.discrepancy, readings, noise, together=together)
 
 
 def _compare(estimator: Estimator, case: Case, name: str, together: bool) -> list[Remark]:
@@ -305,18 +246,6 @@ def _noise_differences(case: Case, own: Case, name: str) -> Iterator[str]:
             yield f"noise of {key} as in its recipe, {name} has another one"
     if case.bias:
         yield f"no bias of {', '.join(case.bias)}, {name} declares it"
-
-
-def _discrepancy_remark(estimator: Estimator, case: Case, pooled: bool) -> Remark:
-    names = ", ".join(case.discrepancy)
-    if estimator.sets is None or not (pooled or estimator.sets.sets_only):
-        text = f"estimate ignores the [discrepancy] of {names}: the file takes no noise of a row"
-        return Remark("ignored-setting", text, tuple(case.discrepancy))
-    text = (
-        f"[discrepancy] of {names} is included as independent errors of the rows, enlarged by the "
-        "rows near them: intervals are wider than those of soilml identify"
-    )
-    return Remark("discrepancy-included", text, tuple(case.discrepancy), "note")
 
 
 def check_table_wheel(estimator: Estimator, table: Table) -> None:

@@ -2,19 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.numerics.smooth_process import slip_load_points, squared_exponential
 
+Factor = Callable[[Floats, Floats], Floats]
 #: Distance of the nodes, in correlation lengths. Of a process with a squared exponential
 #: covariance, 3e-5 of the power has a shorter wave length than two of these distances.
 SPACING = 0.75
 #: Share of the process's variance at the nodes that the functions may leave out.
 LEFT_OUT = 1e-3
+
+
+@dataclass(frozen=True)
+class _Interpolated:
+    """Functions that interpolate between nodes (k, 2), times a factor of slip and load.
+
+    coefficients (k, q): In the unit of the process, or without one where the factor has it.
+    """
+
+    lengths: tuple[float, float]
+    nodes: Floats
+    coefficients: Floats
+    factor: Factor | None = None
+
+    def at(self, slip: Floats, load: Floats) -> Floats:
+        points = slip_load_points(slip, load, *self.lengths)
+        values = squared_exponential(points, self.nodes) @ self.coefficients
+        return values if self.factor is None else self.factor(slip, load)[:, None] * values
 
 
 @dataclass(frozen=True)
@@ -29,22 +48,15 @@ class SmoothFunctions:
     the rows at which it is asked for, as one from their covariance matrix does. Outside the range
     the functions fade.
 
-    slip_length, log_load_length: Correlation lengths in slip and in the natural logarithm of load.
-    nodes (k, 2): Over these lengths.
-    coefficients (k, q): B, in the unit of the process.
-
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 2.25 (the
     interpolation), section 4.3 (principal components of a process).
     """
 
-    slip_length: float
-    log_load_length: float
-    nodes: Floats
-    coefficients: Floats
+    parts: tuple[_Interpolated, ...]
 
     @staticmethod
     def of(
-        columns: Callable[[Floats, Floats], Floats],
+        columns: Factor,
         lengths: tuple[float, float],
         slip: tuple[float, float],
         load: tuple[float, float],
@@ -62,17 +74,25 @@ class SmoothFunctions:
         left = 1.0 - np.cumsum(size**2) / max(float(np.sum(size**2)), 1e-300)
         kept = min(int(np.sum(left > LEFT_OUT)) + 1, int(np.sum(size > 0.0)))
         between = np.linalg.solve(squared_exponential(nodes, nodes), vector[:, :kept] * size[:kept])
-        return SmoothFunctions(*lengths, nodes, between)
+        return SmoothFunctions((_Interpolated(lengths, nodes, between),))
+
+    @staticmethod
+    def joined(parts: Iterable[SmoothFunctions]) -> SmoothFunctions:
+        """The functions of processes that are independent of each other, and add up."""
+        return SmoothFunctions(tuple(own for part in parts for own in part.parts))
+
+    def times(self, factor: Factor) -> SmoothFunctions:
+        """The functions of `of` times a factor (n,) of slips and loads (n,)."""
+        return SmoothFunctions(tuple(replace(part, factor=factor) for part in self.parts))
 
     @property
     def count(self) -> int:
         """Number of functions, q."""
-        return int(self.coefficients.shape[1])
+        return sum(part.coefficients.shape[1] for part in self.parts)
 
     def at(self, slip: Floats, load: Floats) -> Floats:
         """The functions (n, q) at slips and loads (n,)."""
-        points = slip_load_points(slip, load, self.slip_length, self.log_load_length)
-        return np.asarray(squared_exponential(points, self.nodes) @ self.coefficients)
+        return np.concatenate([part.at(slip, load) for part in self.parts], axis=1)
 
 
 def _steps(width: float) -> int:

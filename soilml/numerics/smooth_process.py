@@ -13,7 +13,7 @@ MOST_CENTRES = 100
 #: Eigenvalues below this fraction of the largest are dropped: all together they hold a few
 #: thousandths of the process's standard deviation.
 LEAST_EIGENVALUE = 1e-6
-BLOCK = 1000  # Points whose correlations with all others are computed at once, which bounds memory
+BLOCK = 1000  # Points whose covariances with all others are computed at once, which bounds memory
 SAME_POINT_DECIMALS = 6  # Decimals, in correlation lengths, to which points count as the same
 
 
@@ -100,21 +100,20 @@ def _spread_centres(points: Floats) -> Floats:
     return np.asarray(centres[taken])
 
 
-def independent_bound(points: Floats) -> Floats:
-    """Variances (n,) of independent errors that are no smaller than a process of unit amplitude.
+def independent_bound(columns: Floats) -> Floats:
+    """Variances (n,) of independent errors that are no smaller than a process with these columns.
 
-    They are the row sums of its correlations: the difference between a diagonal matrix of them and
-    the correlations, which are positive, is diagonally dominant, so that it is positive
-    semi-definite. No linear combination of the process at the points (n, d) has a larger variance
-    than that of the independent errors. A point far from all others has 1; one of m close together
-    has about m.
+    They are the row sums of its covariances without signs: the difference between a diagonal matrix
+    of them and the covariance is diagonally dominant, so that it is positive semi-definite. No
+    linear combination of the process at the n points has a larger variance than that of the
+    independent errors. A point far from all others has its own variance; one of m close together
+    has about m times it.
+
+    columns (n, q): Their products are the covariance.
 
     References: Golub and Van Loan, Matrix Computations, section 4.1.1 (diagonal dominance).
     """
-    return np.concatenate(
-        [
-            squared_exponential(points[i : i + BLOCK], points).sum(axis=1)
-            for i in range(0, len(points), BLOCK)
-        ]
-        or [np.zeros(0)]
-    )
+    parts = [np.zeros(0)]
+    for i in range(0, len(columns), BLOCK):
+        parts.append(np.abs(columns[i : i + BLOCK] @ columns.T).sum(axis=1))
+    return np.concatenate(parts)

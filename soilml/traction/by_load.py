@@ -16,8 +16,8 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.row_status import Status
-from soilml.traction.pull_and_slope import PullDiscrepancy, Traction, predict_traction
-from soilml.traction.soil_draws import SoilDraws
+from soilml.traction.draws import SoilDraws
+from soilml.traction.pull_and_slope import Traction, predict_traction
 
 #: Extrapolation beyond the measured slips (difference) and loads (factor) that is reported.
 SLIP_MARGIN, LOAD_FACTOR = 0.1, 1.25
@@ -147,26 +147,18 @@ def predictions_by_load(
     slip: Floats,
     measured: MeasuredRange,
     covariates: Mapping[str, float] | None = None,
-    discrepancy: PullDiscrepancy | None = None,
 ) -> list[LoadPrediction]:
     """Pull and slope under each load (N) at the slips (m,), by draws and by draws of the prior.
 
-    `discrepancy` holds draws of the error of the pull at the same loads and slips. Raises
-    `InputError` for a load that more than half of the draws do not carry at any sinkage.
+    Raises `InputError` for a load that more than half of the draws do not carry at any sinkage.
     """
     predictions = []
-    for i, load in enumerate(loads):
+    for load in loads:
         _check_carried(case, draws, load, slip, covariates)
-        errors: tuple[Floats | None, Floats | None] = (None, None)
-        if discrepancy is not None:
-            errors = discrepancy.posterior[:, i], discrepancy.prior[:, i]
-        after, before = (
-            predict_traction(case, d, load, slip, covariates, error)
-            for d, error in zip((draws, prior), errors, strict=True)
-        )
+        after, before = (predict_traction(case, d, load, slip, covariates) for d in (draws, prior))
         bare = LoadPrediction(after, before, ())
         texts = prediction_warnings(
-            after, bare.remaining_fraction, measured, error_included=discrepancy is not None
+            after, bare.remaining_fraction, measured, error_included=draws.errors is not None
         )
         predictions.append(LoadPrediction(after, before, tuple(texts)))
     return predictions

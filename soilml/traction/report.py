@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +28,8 @@ from soilml.traction.by_load import (
     predictions_by_load,
     slip_grid,
 )
-from soilml.traction.pull_and_slope import draw_pull_discrepancy, excluded_effects
+from soilml.traction.model_errors import draw_model_errors
+from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.soil_draws import measured_soil, prior_draws
 
 if TYPE_CHECKING:
@@ -128,10 +129,14 @@ def pull_report(
     }
     loads = measured_loads(table["load_N"]) if loads is None else loads
     slip = slip_grid(slip_limit, measured_range)
-    error = draw_pull_discrepancy(case, table, draws, loads, slip, noise_scale=soil.noise_scale)
-    predictions = predictions_by_load(
-        case, draws, prior_draws(unknown, case=case), loads, slip, measured_range, covariates, error
+    before, error, scale = prior_draws(unknown, case=case), None, soil.noise_scale
+    errors = draw_model_errors(
+        case, table, draws, slip, loads, channels=("drawbar_pull",), noise_scale=scale
     )
+    if errors is not None:
+        draws, before = replace(draws, errors=errors[0]), replace(before, errors=errors[1])
+        error = errors[1].amplitude("drawbar_pull")
+    predictions = predictions_by_load(case, draws, before, loads, slip, measured_range, covariates)
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)
     known = np.isfinite(pull)
@@ -141,7 +146,7 @@ def pull_report(
         measured_range,
         predictions,
         measured_pull,
-        (*warnings, limitations(None if error is None else error.amplitude)),
+        (*warnings, limitations(error)),
     )
 
 

@@ -11,11 +11,10 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
-from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.root_finding import rising_root
 from soilml.physics.operating_point import Operating
+from soilml.traction.draws import SoilDraws
 from soilml.traction.pull_and_slope import on_a_vehicle
-from soilml.traction.soil_draws import SoilDraws
 
 SAME_LOAD = 1e-9  # Loads (N) that agree to this share are those of one wheel, solved once
 LARGEST_SLOPE = np.deg2rad(60.0)  # Steepest slope that is looked at, rad (60 degrees)
@@ -78,7 +77,7 @@ def wheel_curves(
             and np.allclose(load, other, rtol=SAME_LOAD, atol=0.0)
         ]
         if not same:
-            found = _forces(own_case, draws, load, slip, passes[name], speed)
+            found = _forces(own_case, draws, load, slip, passes[name], speed, gears[name])
             solved.append((gears[name], passes[name], load, found))
             same = [found]
         curves.append(same[0])
@@ -87,15 +86,20 @@ def wheel_curves(
 
 
 def _forces(
-    case: Case, draws: SoilDraws, load: Floats, slip: Floats, number: int, speed: float | None
+    case: Case,
+    draws: SoilDraws,
+    load: Floats,
+    slip: Floats,
+    number: int,
+    speed: float | None,
+    gear: str,
 ) -> tuple[Floats, ...]:
     case = on_a_vehicle(case)
     draw, column = (grid.ravel() for grid in np.indices((len(load), len(slip))))
-    soils = draws.of(case, draw)
     at = Operating(
         slip=slip[column], load=load[draw], pass_number=float(number), speed=speed, slip_angle=0.0
     )
-    force = forces_of_one_gear(soils, at)
+    force = draws.forces(case, draw, at, gear)
     shape = (len(load), len(slip))
     return tuple(
         np.reshape(np.asarray(part), shape)
@@ -241,7 +245,7 @@ def _steepest(
     steepest = np.full(len(share), np.nan)
     if not moving.size:
         return steepest
-    own = SoilDraws(draws.names, draws.values[moving])
+    own = draws.of_draws(moving)
 
     def excess(slope: Floats) -> Floats:
         """Weight along the slope less the largest pull there, over the weight."""

@@ -21,10 +21,12 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.figure_style import take_axes
 from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
+from soilml.traction.draws import DrawnErrors, SoilDraws
+from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.report import POSTERIOR, PRIOR
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
-from soilml.traction.soil_draws import SoilDraws, measured_soil, prior_draws
+from soilml.traction.soil_draws import measured_soil, prior_draws
 
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])  # Slopes that are looked at by default, rad
 #: Gravity, m/s^2, and relative difference from it, from which on it is not the Earth's.
@@ -89,9 +91,14 @@ def rover_report(
     slip = slip_grid(slip_limit, measured)
     key = column("speed")
     speed = float(np.nanmedian(table[key])) if key in table else None
-    found = rover_performance(case, soil.draws, slopes, slip, speed)
-    before = _steepest_before(case, prior_draws(soil.unknown, case=case), slip, speed)
-    warnings = (*soil.warnings, *_warnings(case, found, measured))
+    draws, prior = soil.draws, prior_draws(soil.unknown, case=case)
+    loads = np.ravel(case.rover.loads(slopes)).tolist()
+    errors = draw_model_errors(case, table, draws, slip, loads, noise_scale=soil.noise_scale)
+    if errors is not None:
+        draws, prior = replace(draws, errors=errors[0]), replace(prior, errors=errors[1])
+    found = rover_performance(case, draws, slopes, slip, speed)
+    before = _steepest_before(case, prior, slip, speed)
+    warnings = (*soil.warnings, *_warnings(case, found, measured, draws.errors))
     return RoverReport(len(table), measured, found, before, warnings)
 
 
@@ -110,15 +117,18 @@ def _steepest_before(case: Case, draws: SoilDraws, slip: Floats, speed: float | 
         return np.full(len(draws.values), np.nan)
 
 
-def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> Iterator[Remark]:
+def _warnings(
+    case: Case, found: RoverPerformance, measured: MeasuredRange, errors: DrawnErrors | None
+) -> Iterator[Remark]:
     assert case.rover is not None
+    outside = "" if errors else ", whose error is not in the bands"
     loads = np.stack(list(found.loads.values()))
     if loads.max() > LOAD_FACTOR * measured.load[1] or loads.min() < measured.load[0] / LOAD_FACTOR:
         yield Remark(
             "extrapolated",
             f"wheels carry {loads.min():.4g} to {loads.max():.4g} N, measured were "
-            f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model, "
-            "whose error is not in the bands",
+            f"{measured.load[0]:.4g} to {measured.load[1]:.4g} N: extrapolated by the model"
+            f"{outside}",
         )
     if found.slip_limit > measured.slip[1] + SLIP_MARGIN:
         yield Remark(
@@ -136,15 +146,14 @@ def _warnings(case: Case, found: RoverPerformance, measured: MeasuredRange) -> I
     if np.nanmean(found.steepest_slope > tipping - 1e-3) > 0.05:
         yield Remark("tipping", f"a wheel leaves the ground at {np.rad2deg(tipping):.1f} deg")
     yield from excluded_effects(case)
-    if case.discrepancy:
-        yield Remark(
-            "discrepancy-not-in-bands",
-            "[discrepancy] widens the soil's parameters, not the bands of the rover",
-        )
+    included = "the uncertainty of the soil and the noise, not errors of the model"
+    if errors is not None:
+        names = ", ".join(dict.fromkeys(name for name, _ in errors.functions))
+        included = f"the uncertainty of the soil, the noise and errors of the model ({names})"
     yield Remark(
         "band-content",
-        "bands include the uncertainty of the soil and the noise, not errors of the model; all "
-        "wheels driven at one slip, loads of equally stiff wheels, no side slope",
+        f"bands include {included}; all wheels driven at one slip, loads of equally stiff wheels, "
+        "no side slope",
         severity="note",
     )
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -19,15 +18,17 @@ from soilml.config.compatibility import (
 )
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
-from soilml.fitting.covariance import ignored_discrepancy
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import usual_errors
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
+from soilml.identification.model_error_inputs import (
+    model_error_remarks,
+    readings_with_model_error,
+)
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
-from soilml.identification.trained_estimator import std_with_discrepancy
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
@@ -36,23 +37,10 @@ from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark
+from soilml.traction.draws import SoilDraws
 
 #: Number of draws: the probability below a 5 % quantile of as many has a standard error of 1.1 %.
 DRAWS = 400
-
-
-@dataclass(frozen=True)
-class SoilDraws:
-    """Equally weighted draws (n, p) of the parameters `names`, in SI units."""
-
-    names: tuple[str, ...]
-    values: Floats
-
-    def of(self, case: Case, rows: NDArray[np.int64]) -> Case:
-        """The case with the values of these draws as arrays of the shape of `rows`."""
-        known = case.parameters()
-        kept = {n: self.values[rows, i] for i, n in enumerate(self.names) if n in known}
-        return case.with_values(kept)
 
 
 def posterior_draws(
@@ -148,11 +136,8 @@ def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSo
         names = ", ".join(column(name) for name in estimator.inputs)
         raise FitError(f"{table.source}: no row has all of {names}, which {estimator.path} reads")
     readings = {name: values[complete] for name, values in inputs.items()}
-    if estimator.sets is None:
-        warnings += ignored_discrepancy(case, estimator.path)
-    elif case.discrepancy:
-        noise = estimator.sets.noise
-        readings |= std_with_discrepancy(case.discrepancy, readings, noise, together=True)
+    readings = readings_with_model_error(estimator, readings, case, together=True)
+    warnings += model_error_remarks(estimator, case, pooled=True)
     warnings += ignored_soil_tests(case)
     estimate = estimator.run(**readings)
     if not estimate.in_range:

@@ -80,6 +80,10 @@ def test_bands_of_pull_are_wider_and_say_what_they_include(folder, capsys):
 def test_advice_says_how_the_error_of_a_next_row_is_counted(folder, capsys):
     said = spoken(capsys, "advise", "model.toml", "runs.csv", "--slips", "0.1,0.5", "--loads", "60")
     assert "the [discrepancy] of a next row counts as independent" in said.err
+    (folder / "learned.toml").write_text(MODEL + REMAINDER)
+    asked = ("runs.csv", "--slips", "0.1,0.5", "--loads", "60")
+    said = spoken(capsys, "advise", "learned.toml", *asked)
+    assert "the error of the [remainder] of a next row counts as independent" in said.err
 
 
 REMAINDER = """
@@ -100,11 +104,28 @@ shared = [[0.1]]
 """
 
 
-def test_a_remainder_is_said_to_be_left_out_by_an_estimate(folder, capsys):
+def test_an_estimate_has_the_mean_and_the_error_of_a_remainder(folder, capsys):
+    """Rows with the mean in them get the estimate of rows without it, with wider intervals."""
     (folder / "learned.toml").write_text(MODEL + REMAINDER)
-    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
-    assert "[remainder] of torque_Nm in estimate" in spoken(capsys, *command, "learned.toml").err
-    assert "[remainder]" not in spoken(capsys, *command, "plain.toml").err
+    with Path("runs.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    at = (np.asarray([float(row[key]) for row in rows]) for key in ("slip", "load_N"))
+    mean = read_case("learned.toml").remainder.mean_and_std("torque", *at)[0]
+    for row, added in zip(rows, mean, strict=True):
+        row["torque_Nm"] = float(row["torque_Nm"]) + added
+    lines = [",".join(str(v) for v in row.values()) for row in rows]
+    Path("shifted.csv").write_text("\n".join([",".join(rows[0]), *lines]))
+    command = ("--by", "run", "--case")
+    plain = spoken(capsys, "estimate", ANY_WHEEL, "runs.csv", *command, "plain.toml")
+    wide = spoken(capsys, "estimate", ANY_WHEEL, "shifted.csv", *command, "learned.toml")
+    said = "[remainder] of torque_Nm: its mean is taken from the readings, its error is included"
+    assert said in wide.err
+    assert "[remainder]" not in plain.err
+    before, after = table(plain)[0], table(wide)[0]
+    for key in ("cohesion_Pa", "friction_angle_rad", "shear_modulus_m"):
+        size = float(after[f"{key}_std"])
+        assert size > 1.05 * float(before[f"{key}_std"])
+        assert abs(float(after[key]) - float(before[key])) < size
 
 
 def test_generate_says_what_of_a_remainder_is_in_the_rows(folder, capsys):

@@ -44,7 +44,7 @@ Candidate channels are those whose noise is declared in [noise]: torque alone,
 and torque with each other channel. Without --loads, loads from half to twice
 the measured ones are tried. A point is excluded where a twentieth or more of
 the posterior samples does not carry the wheel. Model errors are considered where
-[discrepancy] declares them.
+[discrepancy] declares them or [remainder] has them.
 """
 #: Largest number of rows planned in a sequence, and of operating points (slips times loads).
 MAX_COUNT, MAX_POINTS = 5, 1000
@@ -151,8 +151,9 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *readings.notes]
-    if case.discrepancy:
-        text = "the [discrepancy] of a next row counts as independent of that of other rows: "
+    if case.discrepancy or case.remainder is not None:
+        which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
+        text = f"the {which} of a next row counts as independent of that of other rows: "
         remarks.append(Remark("independent-discrepancy", f"{text}repetitions are overrated"))
     if advice.excluded_points:
         text = (

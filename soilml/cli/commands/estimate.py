@@ -288,15 +288,14 @@ def _all_rows(
 ) -> Estimate:
     """An estimate for every row; one that is not usable counts as out of range."""
     from soilml.cli.progress import progress_bar
-    from soilml.identification.trained_estimator import readings_with_discrepancy
+    from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.onboard import table_estimates
 
     rows = table.rows(usable)
     readings = table_estimates.row_readings(estimator, rows)
     if estimator.sets is not None and estimator.sets.sets_only:
-        readings = readings_with_discrepancy(
-            estimator, table_estimates.joint_readings(estimator, rows), case, together=False
-        )
+        readings = table_estimates.joint_readings(estimator, rows)
+    readings = readings_with_model_error(estimator, readings, case, together=False)
     with progress_bar(f"estimating {len(rows)} rows", len(rows)) as done:
         return table_estimates.estimates_of_rows(estimator, readings, usable, done)
 
@@ -326,7 +325,8 @@ def _group_estimates(
     import numpy as np
 
     from soilml.experiment_design.advice_after_results import advice_after_estimate
-    from soilml.identification.trained_estimator import narrower_priors, readings_with_discrepancy
+    from soilml.identification.model_error_inputs import readings_with_model_error
+    from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.set_contract import MODEL_ERROR_INPUT
@@ -335,7 +335,7 @@ def _group_estimates(
     groups = list(table.rows(usable).groups(by))
     names = [name for name, _ in groups]
     readings = [
-        readings_with_discrepancy(
+        readings_with_model_error(
             estimator, table_estimates.joint_readings(estimator, rows), case, together=True
         )
         for _, rows in groups

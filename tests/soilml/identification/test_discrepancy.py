@@ -8,10 +8,11 @@ from remarked import remarked
 
 from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Discrepancy, Noise, range_with_zero
+from soilml.config.remainder import Remainder, RemainderPart
 from soilml.experiment_design import samples_of_prior
 from soilml.experiment_design.expected_variance import predicted_readings
 from soilml.fitting.coordinates import select_free
-from soilml.identification.trained_estimator import std_with_discrepancy
+from soilml.identification.model_error_inputs import with_model_error
 from soilml.io.table import Table
 from soilml.remarks import texts
 
@@ -90,15 +91,61 @@ def test_rows_estimated_together_have_larger_errors_the_more_alike_they_are():
     readings["torque"] = np.asarray([0.0, 5.0, 10.0])
     noise = {"torque": (0.3, 0.0)}
     discrepancy = {"torque_Nm": Discrepancy(constant=0.4)}
-    single = std_with_discrepancy(discrepancy, readings, noise, together=False)
+    single = with_model_error(discrepancy, None, readings, noise, together=False)
     assert single["torque_std"] == pytest.approx(0.5)
-    pooled = std_with_discrepancy(discrepancy, readings, noise, together=True)
+    pooled = with_model_error(discrepancy, None, readings, noise, together=True)
     alike = np.hypot(0.3, 0.4 * np.sqrt(2.0))
     assert pooled["torque_std"] == pytest.approx([alike, alike, 0.5])
     own = {"torque_std": np.full(3, 1.2)}
-    assert std_with_discrepancy(discrepancy, readings | own, noise, together=False)[
+    assert with_model_error(discrepancy, None, readings | own, noise, together=False)[
         "torque_std"
     ] == pytest.approx(np.hypot(1.2, 0.4))
+
+
+def learned():
+    """A remainder of the torque that is known at two slips under one load."""
+    part = RemainderPart(
+        "torque_Nm", "", 0.3, 0.6, 0.3, 0.6, (0.1, 0.4), (60.0, 60.0),
+        ((0.1, 60.0), (0.4, 60.0)), (1.0, 0.5), ((0.9, 0.0), (0.0, 0.9)), ((0.1,), (0.0,)),
+    )  # fmt: skip
+    return Remainder((part,))
+
+
+def test_an_estimate_takes_the_mean_of_a_remainder_from_the_readings():
+    """Alone each row has the variance of the process; together they have no less than it."""
+    readings = {"slip": np.asarray([0.1, 0.2, 0.4]), "load": np.asarray([60.0, 60.0, 5000.0])}
+    readings["torque"] = np.asarray([1.0, 5.0, 10.0])
+    at, noise = (readings["slip"], readings["load"]), {"torque": (0.3, 0.0)}
+    mean, _ = learned().mean_and_std("torque", *at)
+    columns = learned().process_columns("torque", *at, fitted_anew=True)
+    single = with_model_error({}, learned(), readings, noise, together=False)
+    assert single["torque"] == pytest.approx(readings["torque"] - mean)
+    assert single["torque_std"] ** 2 == pytest.approx(0.09 + (columns**2).sum(axis=1))
+    # far from its range the mean has faded, and the error is a usual one
+    assert single["torque"][2] == pytest.approx(10.0, abs=1e-6)
+    assert single["torque_std"][2] == pytest.approx(np.hypot(0.3, 0.6), rel=1e-3)
+    pooled = with_model_error({}, learned(), readings, noise, together=True)
+    independent = np.diag(pooled["torque_std"] ** 2 - 0.09)
+    assert np.linalg.eigvalsh(independent - columns @ columns.T).min() > -1e-9
+    # a file that takes no noise of a row gets the mean alone; a declared error of torque is unused
+    bare = with_model_error(USUAL, learned(), readings, None, together=True)
+    assert bare.keys() == readings.keys()
+    assert bare["torque"] == pytest.approx(single["torque"])
+
+
+def test_readings_of_a_next_row_have_the_error_of_a_remainder(case):
+    samples = samples_of_prior(select_free(case, None))
+    at = Operating(slip=np.asarray([0.1, 0.4]), load=np.asarray([60.0, 2000.0]))
+    plain = predicted_readings(case, samples, at)
+    wide = predicted_readings(replace(case, remainder=learned()), samples, at)
+    columns = learned().process_columns("torque", at.slip, at.load, fitted_anew=True)
+    error = np.sqrt((columns**2).sum(axis=1))
+    assert error[1] > 1.9 * error[0]  # a usual one, far from the range
+    torque = plain.channels.index("torque")
+    carried = np.isfinite(plain.y[torque]).all(axis=0)
+    for k in (0, 1):
+        noise = np.hypot(case.noise["torque_Nm"].std(wide.y[torque, k]), error[k])
+        assert wide.std[torque, k][carried] == pytest.approx(noise[carried], rel=1e-6)
 
 
 @pytest.mark.slow

@@ -7,9 +7,11 @@ import pytest
 
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Discrepancy, Noise
+from soilml.config.remainder import Remainder, RemainderPart
 from soilml.io.table import Table
-from soilml.traction.pull_and_slope import draw_pull_discrepancy, predict_traction
-from soilml.traction.soil_draws import SoilDraws
+from soilml.traction.draws import SoilDraws
+from soilml.traction.model_errors import draw_model_errors
+from soilml.traction.pull_and_slope import predict_traction
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 SAME_SOIL = SoilDraws(NAMES, np.tile([900.0, 0.6, 0.012], (2000, 1)))
@@ -31,11 +33,23 @@ def rows(case, error=None):
     return Table({"slip": SLIP, "load_N": LOAD, **measured})
 
 
+def drawn(case, table, loads, *, slips=SLIP, noise_scale=1.0):
+    """Largest standard deviation of the pull, and errors (2000, loads, slips) after and before."""
+    found = draw_model_errors(
+        case, table, SAME_SOIL, SLIP, loads, channels=("drawbar_pull",), noise_scale=noise_scale
+    )
+    draw, load, slip = (
+        g.ravel() for g in np.meshgrid(np.arange(2000), loads, slips, indexing="ij")
+    )
+    shape = 2000, len(loads), len(slips)
+    after, before = (f.at("drawbar_pull", "", draw, slip, load).reshape(shape) for f in found)
+    return found[1].amplitude("drawbar_pull"), after, before
+
+
 def test_where_no_pull_was_measured_the_error_is_as_declared(case):
-    found = draw_pull_discrepancy(case, rows(case), SAME_SOIL, [60.0, 90.0], SLIP)
-    assert found.amplitude == 0.5
-    for draws in (found.posterior, found.prior):
-        assert draws.shape == (2000, 2, 3)
+    amplitude, *both = drawn(case, rows(case), [60.0, 90.0])
+    assert amplitude == pytest.approx(0.5, rel=0.01)
+    for draws in both:
         assert draws.std(axis=0) == pytest.approx(0.5, rel=0.07)
         correlation = np.corrcoef(draws[:, 0, 0], draws[:, 1, 0])[0, 1]
         assert correlation == pytest.approx(np.exp(-0.5 * (np.log(1.5) / 0.6) ** 2), abs=0.05)
@@ -43,36 +57,66 @@ def test_where_no_pull_was_measured_the_error_is_as_declared(case):
 
 def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):
     table = rows(case, error=0.4)
-    found = draw_pull_discrepancy(case, table, SAME_SOIL, [60.0, 2000.0], SLIP)
-    near, far = found.posterior[:, 0], found.posterior[:, 1]
+    _, after, before = drawn(case, table, [60.0, 2000.0])
+    near, far = after[:, 0], after[:, 1]
     assert near.mean(axis=0) == pytest.approx(0.4, abs=0.02)
     assert (near.std(axis=0) < 0.02).all()
     assert far.mean(axis=0) == pytest.approx(0.0, abs=0.05)
     assert far.std(axis=0) == pytest.approx(0.5, rel=0.07)
-    assert found.prior[:, 0].std(axis=0) == pytest.approx(0.5, rel=0.07)
-    without = draw_pull_discrepancy(case, table, SAME_SOIL, [60.0], SLIP, noise_scale=None)
-    assert without.posterior.std(axis=0) == pytest.approx(0.5, rel=0.07)
+    assert before[:, 0].std(axis=0) == pytest.approx(0.5, rel=0.07)
+    without = drawn(case, table, [60.0], noise_scale=None)[1]
+    assert without.std(axis=0) == pytest.approx(0.5, rel=0.07)
+
+
+def test_beyond_its_range_the_error_is_as_at_the_end(case):
+    found = draw_model_errors(case, rows(case), SAME_SOIL, SLIP, [60.0])[0]
+    draw, slip = np.arange(2000), np.full(2000, 0.3)
+    at_end, beyond = (
+        found.at("drawbar_pull", "", draw, slip, np.full(2000, load)) for load in (60.0, 600.0)
+    )
+    np.testing.assert_array_equal(at_end, beyond)
 
 
 def test_a_share_is_of_the_measured_range_or_of_the_predicted_one(case):
     share = replace(case, discrepancy={"drawbar_pull_N": Discrepancy(share=0.02)})
-    known = draw_pull_discrepancy(share, rows(case, error=0.0), SAME_SOIL, [60.0], SLIP)
-    predicted = draw_pull_discrepancy(share, rows(case), SAME_SOIL, [60.0], SLIP)
-    assert known.amplitude == pytest.approx(predicted.amplitude)
-    assert known.amplitude > 0.0
+    known = drawn(share, rows(case, error=0.0), [60.0])[0]
+    predicted = drawn(share, rows(case), [60.0])[0]
+    assert known == pytest.approx(predicted)
+    assert known > 0.0
 
 
 def test_none_is_drawn_where_none_is_declared(case):
     torque_only = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.02)})
-    assert draw_pull_discrepancy(torque_only, rows(case), SAME_SOIL, [60.0], SLIP) is None
+    channels = ("drawbar_pull",)
+    assert (
+        draw_model_errors(torque_only, rows(case), SAME_SOIL, SLIP, [60.0], channels=channels)
+        is None
+    )
+
+
+def test_a_learned_remainder_widens_with_the_distance_from_its_range(case):
+    """Near its points it is known; far from them it has a usual error."""
+    part = RemainderPart(
+        "drawbar_pull_N", "", 0.2, 0.5, 0.3, 0.6, (0.1, 0.5), (60.0, 60.0),
+        ((0.1, 60.0), (0.3, 60.0), (0.5, 60.0)), (1.0, 0.0, 0.0), np.eye(3).tolist(),
+        np.zeros((3, 1)).tolist(),
+    )  # fmt: skip
+    learned = replace(case, remainder=Remainder((part,)), discrepancy={})
+    amplitude, after, before = drawn(learned, rows(case), [60.0, 1200.0])
+    assert amplitude == pytest.approx(0.5, rel=0.03)
+    for draws in (after, before):
+        assert draws[:, 0].std(axis=0).max() < 0.03
+        assert draws[:, 1].std(axis=0) == pytest.approx(0.5, rel=0.07)
 
 
 def test_the_error_widens_the_bands_of_pull_and_slope(case):
-    draws = SoilDraws(NAMES, SAME_SOIL.values[:50])
-    error = np.random.default_rng(1).normal(0.0, 2.0, (50, 1)) * np.ones(3)
-    plain = predict_traction(case, draws, 60.0, SLIP)
-    wide = predict_traction(case, draws, 60.0, SLIP, pull_error=error)
-    assert wide.pull == pytest.approx(plain.pull + error)
+    declared = replace(case, discrepancy={"drawbar_pull_N": Discrepancy(constant=2.0)})
+    after, _ = draw_model_errors(declared, rows(case), SAME_SOIL, SLIP, [60.0])
+    draws = SoilDraws(NAMES, SAME_SOIL.values, after).of_draws(np.arange(200))
+    plain = predict_traction(case, replace(draws, errors=None), 60.0, SLIP)
+    wide = predict_traction(case, draws, 60.0, SLIP)
+    error = wide.pull - plain.pull
+    assert error.std(axis=0) == pytest.approx(2.0, rel=0.2)
     slope = wide.slope[:, 1]
     assert 60.0 * np.sin(slope).std() == pytest.approx(2.0, rel=0.3)
-    assert np.argmax(slope) == np.argmax(error[:, 1])
+    assert np.corrcoef(slope, error[:, 1])[0, 1] > 0.99

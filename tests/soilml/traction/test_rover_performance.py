@@ -7,15 +7,18 @@ import pytest
 from remarked import remarked
 
 from soilml import Operating, Wheel, identify, read_case
+from soilml.config.measurement_noise import Discrepancy
+from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.errors import InputError, TableError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.model import Model
+from soilml.traction.draws import SoilDraws
+from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.rover_performance import rover_performance
 from soilml.traction.rover_report import rover_report, with_gravity
-from soilml.traction.soil_draws import SoilDraws
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 SOIL = np.asarray([900.0, 0.6, 0.012])
@@ -143,3 +146,50 @@ def test_the_report_knows_what_the_rows_tell(case):
     light = rover_report(with_gravity(case, 1.62), table, slopes=SLOPES)
     assert remarked(light.warnings, "gravity is 1.62")
     assert remarked(light.warnings, "wheels carry")
+
+
+@pytest.mark.slow
+def test_bands_of_a_rover_have_the_error_of_its_model(case):
+    """At needed slip the torque has the declared error, whether declared or learned."""
+    table = measured(case, list(FOUR))
+    plain = rover_report(case, table, slopes=SLOPES)
+    part = RemainderPart(
+        "torque_Nm", "", 0.2, 0.3, 0.3, 0.6, (0.1, 0.5), (20.0, 20.1),
+        ((0.3, 20.0),), (0.0,), ((0.0,),), ((0.0,),),
+    )  # fmt: skip
+    learned = replace(case, remainder=Remainder((part,)))
+    declared = replace(case, discrepancy={"torque_Nm": Discrepancy(constant=0.3)})
+    for wide in (learned, declared):
+        found = rover_report(wide, table, slopes=SLOPES)
+        assert not remarked(found.warnings, "not errors of the model")
+        assert remarked(found.warnings, "errors of the model (torque)")
+        torque, exact = (f.performance.torque["front-left"][:, 0] for f in (found, plain))
+        # the wheel carries 68.7 N, two lengths beyond the learned range: a usual error, 0.3 N m
+        assert np.std(torque) == pytest.approx(np.hypot(0.3, np.std(exact)), rel=0.15)
+    assert remarked(plain.warnings, "not errors of the model")
+
+
+@pytest.mark.slow
+def test_the_error_of_a_gear_is_that_of_its_wheels(case):
+    """Another gear's error changes nothing, and measured rows tell the error of their gear."""
+    names = ("smooth", "lugged")
+    both = replace(
+        case,
+        gears=dict.fromkeys(names, case.model),
+        rover=replace(
+            case.rover,
+            wheels={n: replace(w, gear=names[n[:4] == "rear"]) for n, w in FOUR.items()},
+        ),
+    )
+    part = RemainderPart(
+        "torque_Nm", "lugged", 0.3, 0.3, 0.3, 0.6, (0.1, 0.5), (60.0, 70.0),
+        ((0.3, 65.0),), (0.0,), ((0.0,),), ((0.0,),),
+    )  # fmt: skip
+    learned = replace(both, remainder=Remainder((part,)))
+    at = measured(case, list(FOUR))
+    after, _ = draw_model_errors(learned, with_rover_columns(learned, at), draws(), SLIP, [65.0])
+    assert list(after.functions) == [("torque", "lugged")]
+    found = rover_performance(learned, replace(draws(), errors=after), SLOPES, SLIP)
+    exact = rover_performance(both, draws(), SLOPES, SLIP)
+    assert np.allclose(found.torque["front-left"], exact.torque["front-left"])
+    assert not np.allclose(found.torque["rear-left"], exact.torque["rear-left"], rtol=1e-6)

@@ -1,0 +1,91 @@
+"""Equally weighted draws of the soil, and of the model's error beside each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.config.case import Case
+from soilml.fitting.predictions import forces_of_one_gear
+from soilml.numerics.smooth_functions import SmoothFunctions
+from soilml.physics.contact import Force
+from soilml.physics.operating_point import Operating
+
+
+@dataclass(frozen=True)
+class DrawnErrors:
+    """Errors of n draws, of each channel and gear that has one.
+
+    functions: By channel and gear; the gear of a case with one is "".
+    weights: Weights (n, q) of the functions.
+    slip, load: Range of the errors; beyond it they are as at its end.
+    """
+
+    functions: Mapping[tuple[str, str], SmoothFunctions]
+    weights: Mapping[tuple[str, str], Floats]
+    slip: tuple[float, float]
+    load: tuple[float, float]
+
+    def at(
+        self, channel: str, gear: str, draw: NDArray[np.int64], slip: Floats, load: Floats
+    ) -> Floats:
+        """Errors (k,), in the channel's unit, of these draws at slips and loads (k,), N."""
+        key = channel, gear
+        if key not in self.functions:
+            return np.zeros(len(draw))
+        functions = self.functions[key].at(np.clip(slip, *self.slip), np.clip(load, *self.load))
+        return np.asarray((functions * self.weights[key][draw]).sum(axis=1))
+
+    def amplitude(self, channel: str) -> float:
+        """Largest standard deviation of a channel's error before any reading; 0 without one."""
+        grid = np.meshgrid(np.linspace(*self.slip, 25), np.geomspace(*self.load, 25))
+        at = [values.ravel() for values in grid]
+        own = [f.at(*at) for (name, _), f in self.functions.items() if name == channel]
+        return max((float(np.sqrt((f**2).sum(axis=1).max())) for f in own), default=0.0)
+
+    def of_draws(self, index: NDArray[np.int64]) -> DrawnErrors:
+        """The errors of some of the draws."""
+        return replace(self, weights={key: w[index] for key, w in self.weights.items()})
+
+    def added_to(
+        self, force: Force, gear: str, draw: NDArray[np.int64], slip: Floats, load: Floats
+    ) -> Force:
+        """Forces (k,) of these draws with their errors."""
+        own = [name for name, of in self.functions if of == gear]
+        errors = {name: self.at(name, gear, draw, slip, load) for name in own}
+        return replace(force, **{name: getattr(force, name) + e for name, e in errors.items()})
+
+
+@dataclass(frozen=True)
+class SoilDraws:
+    """Draws (n, p) of the parameters `names`, in SI units, and errors of the model of each."""
+
+    names: tuple[str, ...]
+    values: Floats
+    errors: DrawnErrors | None = None
+
+    def of(self, case: Case, rows: NDArray[np.int64]) -> Case:
+        """The case with the values of these draws as arrays of the shape of `rows`."""
+        known = case.parameters()
+        kept = {n: self.values[rows, i] for i, n in enumerate(self.names) if n in known}
+        return case.with_values(kept)
+
+    def of_draws(self, index: NDArray[np.int64]) -> SoilDraws:
+        """Some of the draws."""
+        errors = None if self.errors is None else self.errors.of_draws(index)
+        return SoilDraws(self.names, self.values[index], errors)
+
+    def forces(self, case: Case, draw: NDArray[np.int64], at: Operating, gear: str = "") -> Force:
+        """Forces (k,) of a case of one gear, by the draw of each point (k,), with its error.
+
+        gear: Its name, where it is one of several.
+        """
+        force = forces_of_one_gear(self.of(case, draw), at)
+        if self.errors is None:
+            return force
+        slip, load = (np.asarray(v, dtype=np.float64) for v in (at.slip, at.load))
+        return self.errors.added_to(force, gear, draw, slip, load)
