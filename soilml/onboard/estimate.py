@@ -90,6 +90,8 @@ class Estimate:
         Rows that repeat another one are in neither.
     reason : ndarray of int, shape (...)
         A `Reason`: why `in_range` is false, and 0 where it is true.
+    load : ndarray, shape (...)
+        The load (N) of a single reading, where the file reads it; else NaN.
     errors : HeldOutErrors or None
         Errors of the file that made the estimate, for `soilml.onboard.multi_sensor`.
 
@@ -116,11 +118,12 @@ class Estimate:
     rows_used: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     rows_set_aside: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     reason: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    load: Floats = field(default_factory=lambda: _NOT_GIVEN)
 
     #: The fields that are arrays with the leading dimensions of the readings.
     ARRAYS: ClassVar[tuple[str, ...]] = (
         *("mean", "std", "covariance", "low", "high", "in_range"),
-        *("misfit", "rows_used", "rows_set_aside", "reason"),
+        *("misfit", "rows_used", "rows_set_aside", "reason", "load"),
     )
 
     def __post_init__(self) -> None:
@@ -128,6 +131,8 @@ class Estimate:
         inside = np.asarray(self.in_range)
         if self.misfit is _NOT_GIVEN:
             object.__setattr__(self, "misfit", np.full(inside.shape, np.nan))
+        if self.load is _NOT_GIVEN:
+            object.__setattr__(self, "load", np.full(inside.shape, np.nan))
         if self.rows_used is _NOT_GIVEN:
             object.__setattr__(self, "rows_used", inside.astype(int))
         if self.rows_set_aside is _NOT_GIVEN:

@@ -147,7 +147,7 @@ class Estimator:
         flat, shape = flatten_readings(self.inputs, measured)
         found = run_rows(self.session, dict(zip(self.inputs, flat, strict=True)))
         q = len(self.names)
-        return Estimate.gaussian(
+        estimate = Estimate.gaussian(
             self.names,
             self.units,
             self.prior,
@@ -158,6 +158,8 @@ class Estimator:
             self.pooling.single_row_coverage_factor,
             self.pooling.held_out,
         )
+        load = dict(zip(self.inputs, flat, strict=True)).get("load")
+        return estimate if load is None else replace(estimate, load=load.reshape(shape))
 
     def run(self, **measured: Any) -> Estimate:
         """One estimate from all readings (rows,) of one soil.

@@ -28,6 +28,8 @@ ACROSS_FILES = (CORRELATED, PRIOR_ONCE, *(rule for rule in RULES if rule != BEST
 CONTRADICTION = 4.0
 #: Priors that differ by less than this share of their standard deviation count as the same.
 SAME_PRIOR = 0.05
+#: Loads that differ by less than this share are readings of the same load.
+SAME_LOAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,8 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
 
     Estimates out of range are not used. A single remaining one is returned unchanged. Where none
     remains, or where two differ by more than `CONTRADICTION` standard deviations of their
-    difference, the result is the prior and `in_range` is false.
+    difference, the result is the prior and `in_range` is false. By the rule `correlated`, the
+    correlation of their errors is part of that difference's deviation.
 
     Parameters
     ----------
@@ -91,8 +94,8 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
     Raises
     ------
     InputError
-        For an unknown rule, for estimates of different quantities, shapes or priors, and for the
-        rule `correlated` where the correlation is not known.
+        For an unknown rule, for estimates of different quantities, shapes, priors or loads, and
+        for the rule `correlated` where the correlation is not known.
     """
     if rule is not None and rule not in ACROSS_FILES:
         raise InputError(f"rule is {rule!r}; for estimates of several files: {_join(ACROSS_FILES)}")
@@ -124,17 +127,23 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
             of_members = mean[members][:, rows], covariance[members][:, rows]
             if rule == CORRELATED:
                 files = [estimates[int(i)].errors for i in members]
-                *found, disagreement[rows] = _fuse_by_correlation(*of_members, files)
+                *found, apart = _fuse_by_correlation(*of_members, files)
+                disagreement[rows], contradictory[rows] = apart, apart > CONTRADICTION
             else:
                 found = _fuse_by_variance(*of_members, first.prior, rule)
         else:
             continue
         for key, values in zip(("mean", "covariance", "low", "high"), found, strict=True):
             getattr(fused, key)[rows] = values
+    if (far := contradictory & used.any(axis=0)).any():
+        for key in ("mean", "covariance", "low", "high"):
+            prior = Estimate.from_prior(first.names, first.units, first.prior)
+            getattr(fused, key)[far] = getattr(prior, key)
+        used = used & ~far
     lower, upper = first.prior.lower, first.prior.upper
     std = np.sqrt(np.diagonal(fused.covariance, axis1=1, axis2=2))
     in_range = np.asarray(used.any(axis=0).reshape(shape))
-    apart = contradictory.reshape(shape)
+    reason = np.where(in_range, 0, Reason.OUT_OF_RANGE)
     estimate = Estimate(
         names=first.names,
         units=first.units,
@@ -145,7 +154,8 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
         high=np.clip(fused.high, lower, upper).reshape(*shape, q),
         in_range=in_range,
         prior=first.prior,
-        reason=np.where(apart, Reason.CONTRADICTORY, np.where(in_range, 0, Reason.OUT_OF_RANGE)),
+        reason=np.where(contradictory.reshape(shape), Reason.CONTRADICTORY, reason),
+        load=first.load,
     )
     return MultiSensorEstimate(
         estimate, used.reshape(len(used), *shape), rule, np.asarray(disagreement.reshape(shape))
@@ -211,6 +221,13 @@ def _check_compatible(estimates: Sequence[Estimate]) -> None:
             raise InputError(
                 f"estimates have the shapes {first.in_range.shape} and {other.in_range.shape}; "
                 "needed is one shape"
+            )
+        off = np.abs(other.load - first.load) > SAME_LOAD * np.abs(first.load)
+        if off.any():
+            loads = (float(x[off].flat[0]) for x in (first.load, other.load))
+            raise InputError(
+                f"estimates are of the loads {' and '.join(f'{x:g} N' for x in loads)}; needed are "
+                "readings of one slip under one load"
             )
         for key in ("mean", "std", "lower", "upper"):
             own, its = getattr(first.prior, key), getattr(other.prior, key)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError
-from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import are_comparable, joint_errors
 from soilml.onboard.multi_sensor import fuse_estimates
@@ -176,16 +176,32 @@ def test_shrunk_estimates_are_not_shrunk_twice():
     assert rmse(fuse_estimates(each).estimate, truth) == pytest.approx(exact, rel=0.02)
 
 
-def test_readings_that_disagree_widen_the_estimate():
+def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_deviations():
     files = Sensors().files()
-    near, far = (
+    near, far, contradictory = (
         fuse_estimates([estimate([0.3], 0.05, files[0]), estimate([0.3 + d], 0.05, files[1])])
-        for d in (0.05, 0.2)
+        for d in (0.05, 0.15, 0.2)
     )
-    assert far.disagreement[0] == pytest.approx(4.0 * near.disagreement[0])
-    assert far.disagreement[0] > 3.0
+    assert far.disagreement[0] == pytest.approx(3.0 * near.disagreement[0])
     widening = far.estimate.std[0, 0] / near.estimate.std[0, 0]
     assert widening == pytest.approx(far.disagreement[0] / 2.0, rel=0.01)
+    independent = 0.2 / np.sqrt(2.0 * 0.05**2)
+    assert independent < 4.0 < contradictory.disagreement[0]
+    answer = contradictory.estimate
+    assert not answer.in_range[0] and answer.reason[0] == Reason.CONTRADICTORY
+    np.testing.assert_array_equal(answer.mean[0], answer.prior.mean)
+    assert not contradictory.used.any()
+
+
+def test_estimates_of_different_loads_are_refused():
+    files = Sensors().files()
+    at = [
+        replace(estimate([0.3, 0.3], 0.05, f), load=np.asarray([20.0, load]))
+        for f, load in zip(files, (21.0, 40.0), strict=False)
+    ]
+    with pytest.raises(InputError, match=r"loads 21 N and 40 N"):
+        fuse_estimates(at)
+    assert fuse_estimates([at[0], at[0]]).estimate.in_range.all()
 
 
 def test_files_of_other_data_are_fused_as_before():
