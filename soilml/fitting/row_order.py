@@ -10,6 +10,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.fitting.levels import is_one_load
 from soilml.io.table import Table
 from soilml.physics.operating_point import FROM_ORDER
 
@@ -24,9 +25,11 @@ MOST_EXPLAINED, DEGREE = 0.95, 2
 def with_order_columns(case: Case, table: Table, fields: Collection[str] | None = None) -> Table:
     """The table with the columns of `FROM_ORDER` that it lacks.
 
-    Those of `fields`; None: those that effects of the case use. There is no progress where slip and
-    load follow from the order of the rows and no times are known, and none between two runs, which
-    may differ for any reason.
+    Those of `fields`; None: those that effects of the case use. Rows have an order if they were
+    timed, or if those of each run stand together: a table in which runs alternate was sorted by
+    something else. There is no progress where slip and load follow from the order of the rows and
+    no times are known, and none between two runs, which may differ for any reason. A load has no
+    direction where all loads are of one level.
     """
     if fields is None:
         models = (case.model, *case.gears.values())
@@ -37,10 +40,12 @@ def with_order_columns(case: Case, table: Table, fields: Collection[str] | None 
     progress = campaign_progress(table)
     columns = {}
     runs = np.unique(table["run"]).size if "run" in table else 1
-    ordered = runs != 2 and (_has_times(table) or not _is_sorted(table, progress))
-    if "progress" in wanted and ordered:
+    timed = _has_times(table)
+    if not (timed or _runs_stand_together(table)):
+        return table
+    if "progress" in wanted and runs != 2 and (timed or not _is_sorted(table, progress)):
         columns[FROM_ORDER["progress"]] = progress
-    if "load_direction" in wanted:
+    if "load_direction" in wanted and not is_one_load(table["load_N"]):
         order = np.argsort(progress, kind="stable")
         direction = np.empty(len(table))
         direction[order] = load_directions(table["load_N"][order])
@@ -70,6 +75,14 @@ def _has_times(table: Table) -> bool:
     spans = sorted((time[run == r].min(), time[run == r].max()) for r in np.unique(run))
     apart = all(end <= start for (_, end), (start, _) in pairwise(spans))
     return apart and float(np.ptp(time)) > 0.0
+
+
+def _runs_stand_together(table: Table) -> bool:
+    """Whether the rows of each run follow each other."""
+    if "run" not in table:
+        return True
+    changes = int(np.count_nonzero(table["run"][1:] != table["run"][:-1]))
+    return changes == np.unique(table["run"]).size - 1
 
 
 def _is_sorted(table: Table, progress: Floats) -> bool:

@@ -70,6 +70,25 @@ def test_two_runs_that_differ_may_do_so_for_any_reason():
     assert "progress" not in with_order_columns(PLAIN, two, FROM_ORDER)
 
 
+def test_rows_of_runs_that_alternate_have_no_order_unless_they_were_timed():
+    mixed = np.tile(["a", "b", "c", "d"], 4)
+    assert (
+        with_order_columns(PLAIN, rows(run=mixed), FROM_ORDER).columns.keys()
+        == rows().columns.keys()
+    )
+    timed = with_order_columns(
+        PLAIN, rows(run=np.repeat(["a"], 16), time_s=np.arange(16.0)), FROM_ORDER
+    )
+    assert {"progress", "load_direction"} <= timed.columns.keys()
+
+
+def test_loads_of_one_level_neither_rise_nor_fall():
+    """One of them is 15 % below the others, as a load cell scatters."""
+    load = np.linspace(24.3, 26.1, 16)
+    load[9] = 21.6
+    assert "load_direction" not in with_order_columns(PLAIN, rows(load_N=load), FROM_ORDER)
+
+
 def test_simulated_rows_say_that_the_campaign_is_over():
     case = Case(PLAIN.model + EFFECTS["load-hysteresis"](error=0.1), SAND)
     simulated = simulate(case, slip=[0.1, 0.3], load=[60.0, 40.0])
