@@ -40,6 +40,8 @@ SETS, ROWS, SEED = 100, 16, 1
 EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
 #: A model with its usual errors, beside those of the sensors.
 USUAL_MODEL = {MODEL_ERROR_INPUT: 1.0}
+#: Files that pool the readings of a set as Gaussians.
+POOLED = ("wheel_linear", "wheel_mlp", "wheel_lssvm")
 #: Nominal coverage of the intervals.
 COVERAGE = 0.9
 
@@ -124,6 +126,31 @@ def coverage_table(estimator: Estimator, worlds: Sequence[World], channels: Sequ
     return "\n".join(lines)
 
 
+def pooled_table(worlds: Sequence[World] = WORLDS) -> str:
+    """Files without a set posterior, torque alone: coverage of single readings and of sets."""
+    lines = [
+        "| file | what is wrong | one reading: 90 % of c, phi, K | set: refused | 90 % | score |",
+        "|---|---|---|---:|---|---:|",
+    ]
+    for name in POOLED:
+        estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+        for world in worlds:
+            drives = simulate(world, SETS, ROWS, SEED)
+            one, truth = (
+                estimator(**{k: drives.readings[k] for k in estimator.inputs}),
+                drives.truth,
+            )
+            inside = (one.low <= truth[:, None]) & (truth[:, None] <= one.high)
+            sets = Scores.of(answers(estimator, drives, CHANNELS["torque"], None), truth)
+            single, pooled = (
+                " / ".join(f"{100 * share:.0f}" for share in held)
+                for held in (inside.mean(axis=(0, 1)), sets.covered.mean(axis=0))
+            )
+            cells = f"{sets.refused.mean():.0%} | {pooled} | {sets.score.mean():.2f}"
+            lines.append(f"| `{name}` | {world.name} | {single} | {cells} |")
+    return "\n".join(lines)
+
+
 def refused_table(estimator: Estimator, worlds: Sequence[World], channels: Sequence[str]) -> str:
     """Of the sets that are refused: coverage, error and width, beside those of the prior."""
     lines = [
@@ -199,6 +226,7 @@ def tables(file: Path = ROOT / "exported" / "wheel.onnx") -> str:
         "### Noise of slip and load that is declared, torque",
         coverage_table(estimator, (*NOISE_OF_SLIP, *NOISE_OF_LOAD), CHANNELS["torque"]),
     ]
+    parts += ["### Files without a set posterior, which take the model as exact", pooled_table()]
     for label, channels in CHANNELS.items():
         parts += [
             f"### Mechanisms of the blind sets that no error describes, {label}",
