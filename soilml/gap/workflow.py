@@ -71,6 +71,7 @@ from soilml.gap.verdict.learned_remainder import (
     learned_remainder,
     without_learned_discrepancy,
 )
+from soilml.gap.verdict.lookalikes import like_another_soil
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
@@ -222,6 +223,7 @@ def gap(
     report = replace(report, sentence=headline(report), lines=lines)
     fixed = fixed_parameters(case, soil)
     conclusions = unsupported_conclusions(report, checks.naming_obstacles, fixed)
+    conclusions += like_another_soil(analysis.problem, analysis.result)
     return replace(report, not_claimed=tuple(conclusions))
 
 

@@ -1,0 +1,51 @@
+"""Effects that these runs cannot tell from another soil."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.search.stepwise import SearchResult
+from soilml.remarks import Remark
+
+#: Change of the readings by an effect of usual size, in sigma, from which it is visible on a known
+#: soil, and what another soil leaves of it, below which it is not.
+VISIBLE, UNSEEN = 6.0, 2.0
+#: Share of the largest contribution to the other soil from which a parameter is stated.
+NOTABLE = 0.3
+
+
+def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]:
+    r"""The effects of usual size that a change of the soil imitates, by the parameters it takes.
+
+    .. math:: \Delta x = (X^T V^{-1} X + P)^{-1} X^T V^{-1} s
+
+    with the signature s, the Jacobian X of the soil and its prior precision P: what is left, in
+    sigma, is the norm of :math:`s - X \Delta x`. References: omitted variables; Greene,
+    Econometric Analysis, 7th ed., section 4.3.2.
+    """
+    soil = result.soil.whitened_by(problem.covariance.whiten)
+    alike: dict[tuple[str, ...], list[str]] = {}
+    for s in result.soil_test.signatures:
+        whole = np.asarray(problem.covariance.whiten @ s.column)
+        change = np.linalg.solve(soil.information, soil.jacobian.T @ whole)
+        left = float(np.linalg.norm(whole - soil.jacobian @ change))
+        if float(np.linalg.norm(whole)) < VISIBLE or left >= UNSEEN:
+            continue
+        part = np.abs(change) * np.linalg.norm(soil.jacobian, axis=0)
+        told = [
+            c.name.replace("_", " ")
+            for c, own in zip(soil.coordinates, part, strict=True)
+            if own >= NOTABLE * part.max()
+        ]
+        alike.setdefault(tuple(told), []).append(s.name)
+    return [
+        Remark(
+            "like-another-soil",
+            f"that {', '.join(names)} {'are' if len(names) > 1 else 'is'} absent: at usual size, "
+            f"these runs cannot tell {'them' if len(names) > 1 else 'it'} from another "
+            f"{', '.join(parameters)}",
+            tuple(names),
+        )
+        for parameters, names in alike.items()
+    ]
