@@ -21,7 +21,7 @@ from soilml.gap.search.explanation import (
     predicted_shape_gain,
     shape_directions,
 )
-from soilml.gap.search.posterior import Posterior, explanations, posterior
+from soilml.gap.search.posterior import Posterior, explanations, for_decisions, posterior
 from soilml.gap.search.screening import (
     LARGE_DISCREPANCY,
     WITHIN_REACH,
@@ -155,8 +155,8 @@ def search(
         if not level or min(c.objective for c in level) > lowest - MIN_IMPROVEMENT:
             break
     candidates = tuple(sorted(fitted.values(), key=lambda c: c.objective))
-    found = posterior(candidates, gains, soil_alone)
-    accepted = explanations(candidates, found)
+    found = posterior(candidates, gains, soil_alone, problem.penalties)
+    accepted = explanations(candidates, for_decisions(candidates, gains, soil_alone))
     return SearchResult(
         soil=soil,
         soil_test=soil_test,

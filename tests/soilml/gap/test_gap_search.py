@@ -21,7 +21,13 @@ from soilml.gap.search.explanation import (
     fit_candidates,
     fit_shapes,
 )
-from soilml.gap.search.posterior import IN_CATALOGUE, OTHER_LAW, Posterior, explanations, posterior
+from soilml.gap.search.posterior import (
+    IN_CATALOGUE,
+    OTHER_LAW,
+    Posterior,
+    explanations,
+    for_decisions,
+)
 from soilml.gap.search.screening import predicted_gains
 from soilml.gap.search.stepwise import search
 from soilml.gap.verdict.decision import law_matters
@@ -185,7 +191,7 @@ def test_a_larger_set_gives_way_to_a_smaller_that_explains_as_much(dug, named):
     assert pair.objective > named.objective
     none = MarginalFit(soil, problem.discrepancy.evidence(soil))
     candidates = (pair, named, Explanation((), none, none))
-    found = posterior(candidates, {}, candidates[-1])
+    found = for_decisions(candidates, {}, candidates[-1])
     assert [c.names for c in explanations(candidates, found)] == [("slip-sinkage",)]
 
 
