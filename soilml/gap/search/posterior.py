@@ -22,6 +22,8 @@ IN_CATALOGUE = 0.9
 #: The same, relative to that, of an effect that explains the data by another law than the
 #: catalogue's: 1 of 4 on tuning sets, most of them with a cause outside the catalogue.
 OTHER_LAW = 0.3
+#: Smallest rise of log odds that counts: beyond rounding.
+RAISED = 1e-3
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
 
@@ -56,6 +58,14 @@ class Posterior:
         """Natural logarithm of the odds that these effects are present, within the catalogue."""
         present, absent = self._log_shares(effects)
         return float(np.clip(present - absent, -MOST_LOG_ODDS, MOST_LOG_ODDS))
+
+    def favours(self, names: Names, penalty: float) -> bool:
+        """Whether the data raise the odds of a set of effects against the soil alone.
+
+        penalty: -2 ln of its prior odds. A set that leaves the evidence as it is raises nothing.
+        """
+        logs = self.log_weights
+        return logs.get(names, -np.inf) - logs.get((), -np.inf) > RAISED - 0.5 * penalty
 
     def ranked(self) -> list[tuple[Names, float]]:
         """Sets of effects with the natural logarithm of their odds, the likeliest first.

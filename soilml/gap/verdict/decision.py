@@ -240,11 +240,12 @@ def reasons(
 def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...], ...]:
     """The explanations that the data do not reject, where a cause is claimed or suspected."""
     if decision.status == "suspected":
-        unlisted = result.posterior.unlisted
+        found, unlisted = result.posterior, result.posterior.unlisted
         kept = [c for c in result.candidates if c.names not in unlisted]
-        found = by_probability(not_rejected(kept), result.posterior)
+        kept = [c for c in kept if found.favours(c.names, c.penalty)]
+        left = by_probability(not_rejected(kept), found)
         first = (decision.shown.names,) if decision.shown else ()
-        return tuple(dict.fromkeys((*first, *(c.names for c in found if c.names))))
+        return tuple(dict.fromkeys((*first, *(c.names for c in left))))
     return tuple(c.names for c in decision.claimed)
 
 

@@ -113,16 +113,20 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
 def suspects(analysis: Analysis) -> list[Suspect]:
     """Explanations with their odds against all others, the likeliest first.
 
-    None stands before the likeliest one that was fitted in full, whose figures are shown.
+    None stands before the likeliest one that was fitted in full, whose figures are shown; after it
+    come those only whose odds the data raise.
     """
-    posterior = analysis.result.posterior
+    problem, posterior = analysis.problem, analysis.result.posterior
     ranked = posterior.ranked()
     fitted = {c.names for c in analysis.result.candidates}
     first = next((i for i, (names, _) in enumerate(ranked) if names in fitted), 0)
+    rest = [
+        own for own in ranked[first + 1 :] if posterior.favours(own[0], problem.penalty(own[0]))
+    ]
     gains = predictive_gains(analysis.predictions)
     return [
         Suspect(names, odds, posterior.probability(*names), gains.get(names))
-        for names, odds in ranked[first : first + LISTED_SUSPECTS]
+        for names, odds in [*ranked[first : first + 1], *rest[: LISTED_SUSPECTS - 1]]
     ]
 
 

@@ -56,6 +56,7 @@ def analysed(*candidates, accepted=(), runs=("a", "b"), weights=None, outliers=(
         readings=SimpleNamespace(channels=("torque", "sinkage"), runs=runs),
         covariance=SimpleNamespace(components=SimpleNamespace(**(found | components))),
         discrepancy=SimpleNamespace(evidence=evidence),
+        penalty=lambda names: 8.0 * len(names),
     )
     result = SimpleNamespace(
         soil=soil,
@@ -99,7 +100,12 @@ def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_
 def test_suspects_are_the_likeliest_eight_under_stated_conditions():
     weights = {(f"e{i}",): -1.0 - i for i in range(12)} | {(): -3.0}
     found = suspects(analysed(weights=weights))
-    assert [s.effects[0] for s in found] == [f"e{i}" for i in range(8)]
+    # prior odds of 1 to e^4: those below 1 to e^4 beside the soil alone are none, but the first
+    assert [s.effects[0] for s in found] == [f"e{i}" for i in range(6)]
+    many = suspects(analysed(weights={names: 0.1 * w for names, w in weights.items()}))
+    assert [s.effects[0] for s in many] == [f"e{i}" for i in range(8)]
+    unlikely = {("e0",): -9.0, (): -3.0}
+    assert [s.effects for s in suspects(analysed(weights=unlikely))] == [("e0",)]
     assert found[0].log_odds > found[1].log_odds
     plain = conditions_of_suspects(analysed(), [])
     assert [c.code for c in plain] == ["catalogue-complete"]
