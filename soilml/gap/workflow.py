@@ -71,7 +71,7 @@ from soilml.gap.verdict.learned_remainder import (
     learned_remainder,
     without_learned_discrepancy,
 )
-from soilml.gap.verdict.lookalikes import like_another_soil
+from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
@@ -224,6 +224,8 @@ def gap(
     fixed = fixed_parameters(case, soil)
     conclusions = unsupported_conclusions(report, checks.naming_obstacles, fixed)
     conclusions += like_another_soil(analysis.problem, analysis.result)
+    first = report.cause_set[0] if report.cause_set else report.best_unclaimed
+    conclusions += like_another_force(analysis.problem, analysis.result, first)
     return replace(report, not_claimed=tuple(conclusions))
 
 

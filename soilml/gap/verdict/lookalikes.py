@@ -1,6 +1,8 @@
-"""Effects that these runs cannot tell from another soil."""
+"""What looks like an effect, or as an effect does: another soil, or a force outside of the law."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +15,9 @@ from soilml.remarks import Remark
 VISIBLE, UNSEEN = 6.0, 2.0
 #: Share of the largest contribution to the other soil from which a parameter is stated.
 NOTABLE = 0.3
+PULL = "drawbar_pull"
+#: Largest change of the other channels, in sigma and relative to that of pull, that counts as none.
+NEGLIGIBLE = 0.01
 
 
 def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]:
@@ -48,4 +53,33 @@ def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]
             tuple(names),
         )
         for parameters, names in alike.items()
+    ]
+
+
+def like_another_force(
+    problem: FitProblem, result: SearchResult, names: Sequence[str]
+) -> list[Remark]:
+    """Of the effects of a cause, those that change the drawbar pull alone, where more was measured.
+
+    Any force along the travel direction has such a signature, by whatever law it grows.
+    """
+    readings = problem.readings
+    pull = readings.channels.index(PULL) if PULL in readings.channels else -1
+    if pull < 0 or len(readings.channels) == 1:
+        return []
+    own = readings.channel == pull
+    alone = []
+    for s in result.soil_test.signatures:
+        change = np.abs(s.column / readings.std)
+        on_pull = s.name in names and change[~own].max() < NEGLIGIBLE * change[own].max()
+        if on_pull and problem.effects[s.name].about.kind != "sensor":
+            alone.append(s.name)
+    return [
+        Remark(
+            "like-another-force",
+            f"that {name} is the force that is missing: it changes the drawbar pull alone, as the "
+            "drag of a cable or of the carriage does",
+            (name,),
+        )
+        for name in alone
     ]
