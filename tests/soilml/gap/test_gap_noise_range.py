@@ -18,7 +18,9 @@ def analysed(values):
         return SimpleNamespace(value=values[factor][fit])
 
     names = [(), ("a",), ("a", "b")]
-    candidates = [SimpleNamespace(names=n, fit=n, amplitude=None) for n in names]
+    candidates = [
+        SimpleNamespace(names=n, fit=n, amplitude=None, penalty=6.0 * len(n)) for n in names
+    ]
     covariance = SimpleNamespace(matrix=np.eye(2), whiten=np.eye(2), components=None)
     problem = SimpleNamespace(covariance=covariance, discrepancy=SimpleNamespace(process=None))
     result = SimpleNamespace(candidates=candidates, posterior=Posterior({}))

@@ -233,7 +233,8 @@ def searched(monkeypatch):
         "_test_residuals": lambda *_: SimpleNamespace(p_value=seen.p_value),
     }.items():
         monkeypatch.setattr(stepwise, name, value)
-    problem = SimpleNamespace(readings=None, effects={})
+    penalties = dict.fromkeys("abcdefgh", 0.0)
+    problem = SimpleNamespace(readings=None, effects={}, penalties=penalties)
 
     def run():
         seen.levels, seen.done = [], []
