@@ -2,6 +2,7 @@
 
     python bench/adapt.py                     the table of hidden effects, resumed in build/adapt
     python bench/adapt.py --only slip-sinkage --seeds 5
+    python bench/adapt.py limit               what the exact posterior gains by knowing the effect
     python bench/adapt.py campaign DIR        the log, model and soil of one world, for a trial
 
 Each world is a campaign of 64 rows of a blind set, whose simulator shares no code with the package,
@@ -16,8 +17,9 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+import tempfile
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +30,9 @@ from datagen.blind_sets.plans import active_mechanisms
 from datagen.blind_sets.reading_errors import sensors
 from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 from datagen.blind_sets.soil_families import FAMILIES, PRIOR, RADIUS, WIDTH
-from soilml import Estimator, adapt, read_case, read_table
+from soilml import Estimator, adapt, identify, read_case, read_table
 from soilml.io.text_tables import format_table
+from soilml.physics.effects import EFFECTS
 from soilml.quantities import SHEAR, column
 from training.set_posterior import validation
 
@@ -174,6 +177,43 @@ def table_of(outcomes: list[Outcome]) -> str:
     return f"{format_table(head, rows, text_columns=5)}\n\n{summary}"
 
 
+def limit_table(soils: int = 20) -> str:
+    """Error of the exact posterior that knows the hidden effect, over that of one without it.
+
+    No adapted file can gain more. Effects of the catalogue alone; soils as in the worlds.
+    """
+    lines, ratios = [], []
+    std = np.asarray([np.diff(PRIOR[name])[0] for name in SHEAR]) / np.sqrt(12.0)
+    for seed, (tier, key) in ((s, w) for s in SEEDS for w in WORLDS if w[1] in EFFECTS):
+        plan = plan_of(tier, key, seed)
+        blind = draw_blind_set(plan)
+        soil = {name: float(value) for name, value in blind.truth["soil"].items()}
+        with tempfile.TemporaryDirectory() as folder:
+            write_blind_set(plan, Path(folder) / "data", Path(folder) / "truth")
+            case = read_case(Path(folder) / "data/model.toml").with_values(soil)
+            loads = np.unique(read_table(Path(folder) / "data/runs.csv")["load_N"])
+        ((mechanism, size),) = (
+            (m, plan.size * m.reference) for m in active_mechanisms(plan.tier, plan.cause)
+        )
+        known = replace(case, model=case.model + EFFECTS[key](**{mechanism.size: size}))
+        sets, truth = board_sets(plan, soil, loads)
+        errors = []
+        for own in (case, known):
+            fits = [
+                identify(own, {column(k): v for k, v in one.items()}, SHEAR, "posterior")
+                for one in sets[:soils]
+            ]
+            off = np.asarray([fit.values for fit in fits]) - truth[:soils]
+            errors.append(float(np.sqrt(np.mean((off / std) ** 2))))
+        ratios.append(errors[1] / errors[0])
+        cells = (key, str(seed), f"{errors[0]:.3f}", f"{errors[1]:.3f}", f"{ratios[-1]:.2f}")
+        print("  ".join(cells), file=sys.stderr, flush=True)
+        lines.append(cells)
+    head = ("hidden", "seed", "error without the effect", "with it", "ratio")
+    median = f"median of the ratio: {np.median(ratios):.2f}"
+    return f"{format_table(head, lines, text_columns=2)}\n\n{median}"
+
+
 def write_campaign(folder: Path) -> None:
     """Log, model and true soil of a world with hidden slip-sinkage."""
     plan = plan_of("A", "slip-sinkage", SEEDS[0])
@@ -187,6 +227,9 @@ def main() -> None:
     """Print the table, or write a campaign."""
     if sys.argv[1:2] == ["campaign"]:
         write_campaign(Path(sys.argv[2]))
+        return
+    if sys.argv[1:2] == ["limit"]:
+        print(limit_table())
         return
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--only", nargs="*", help="keys of hidden effects")
