@@ -148,7 +148,7 @@ PARTS = (
         "interval score over parameters and sets, in standard deviations of the prior; the prior "
         "has about 3.3. Last table: the two answers of `identify --method posterior`, without "
         f"and with typical errors, to {wrong_worlds_identified.SETS} sets made in the same way.",
-        lambda folder: f"{model_errors.tables()}\n\n{wrong_worlds_identified.section()}",
+        lambda folder: f"{model_errors.tables(folder)}\n\n{wrong_worlds_identified.section()}",
     ),
     Part(
         "rules",

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from datagen.gear_sensors import GEAR_SENSORS, GearSensor
+from datagen.worlds import Worlds, take_worlds
 from soilml.config.case import Case, take_case
 from soilml.config.measurement_noise import Noise, take_noise
 from soilml.config.model_settings import take_prior
@@ -59,7 +60,10 @@ class Block:
 
 @dataclass(frozen=True)
 class Recipe:
-    """The content of a recipe file; `content` is the file as it was read."""
+    """The content of a recipe file; `content` is the file as it was read.
+
+    `worlds`: what may act beside the model; None where the model is taken as right.
+    """
 
     case: Case
     slip: Prior
@@ -71,6 +75,7 @@ class Recipe:
     rows: int
     seed: int
     content: dict[str, Any]
+    worlds: Worlds | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= self.rows <= 10**10:
@@ -195,6 +200,13 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
             if slip.lower < kind.lowest_slip:
                 needed = f"[{table}] needs slips of {kind.lowest_slip:g} or more"
                 operating.fail(f"slip begins at {slip.lower:g}; {needed}")
+    worlds = None
+    if "worlds" in settings:
+        if gear_sensors:
+            settings.fail(f"[worlds] and [{next(iter(gear_sensors))}] in one recipe: needed is one")
+        driven = (slip.lower, slip.upper), (load.lower, load.upper)
+        given = frozenset(covariates)
+        worlds = take_worlds(settings.table("worlds"), case, driven, effects, given)
     bias_settings = settings.table("bias")
     bias = {key: take_noise(bias_settings, key) for key in SENSOR_COLUMNS if key in bias_settings}
     bias_settings.permit(SENSOR_COLUMNS)
@@ -215,6 +227,7 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
         rows=settings.count("rows"),
         seed=int(settings.take("seed", int, "a whole number, 0 or more")),
         content=settings.content,
+        worlds=worlds,
     )
 
 

@@ -14,6 +14,7 @@ from pyarrow import compute
 from scipy.stats import qmc
 
 from datagen.gear_sensors import GEAR_SENSORS
+from datagen.random_streams import normal_by_index
 from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -108,9 +109,15 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
     rows = sample_rows(recipe, block, piece.first, piece.last)
     case = recipe.case.with_values(rows.soil)
     at = Operating(slip=rows.slip, load=rows.load, **rows.covariates)
-    force = forces_of_one_gear(case, at)
+    errors = [model_error(recipe, block, rows)]
+    if recipe.worlds is None:
+        force = forces_of_one_gear(case, at)
+    else:
+        seed = recipe.seed, block
+        force = recipe.worlds.forces(case, at, seed, rows.run)
+        errors.append(recipe.worlds.errors(recipe.driven, at, seed, rows.run))
     truth = true_values(rows.slip, rows.load, force)
-    for name, error in model_error(recipe, block, rows).items():
+    for name, error in (pair for own in errors for pair in own.items()):
         truth[name] = truth[name] + error
     sensor_columns = _add_gear_sensors(recipe, case, block, rows, truth)
     row = np.arange(piece.first, piece.last)
@@ -146,7 +153,7 @@ def model_error(recipe: Recipe, block: int, rows: SampledRows) -> dict[str, Floa
         functions = remainder.error_functions(name, *recipe.driven)
         index = np.arange(first * functions.count, last * functions.count)
         seed = recipe.seed, block, SENSOR_COLUMNS.index(column(name)), 3
-        weights = _normal(seed, index).reshape(-1, functions.count)[rows.run - first]
+        weights = normal_by_index(seed, index).reshape(-1, functions.count)[rows.run - first]
         errors[column(name)] = (functions.at(rows.slip, rows.load) * weights).sum(axis=1)
     return errors
 
@@ -312,10 +319,12 @@ def noisy_readings(
         true = truth[name]
         reading = true.copy()
         if name in recipe.case.noise:
-            noise = _normal((recipe.seed, block, position, 1), row)
+            noise = normal_by_index((recipe.seed, block, position, 1), row)
             reading += recipe.case.noise[name].std(true) * noise
         if name in recipe.bias:
-            reading += recipe.bias[name].std(true) * _normal((recipe.seed, block, position, 2), run)
+            reading += recipe.bias[name].std(true) * normal_by_index(
+                (recipe.seed, block, position, 2), run
+            )
         if name == "slip":
             reading = np.clip(reading, -0.999, 0.999)
         if name == "load_N":
@@ -333,16 +342,3 @@ def true_values(slip: Floats, load: Floats, force: Force) -> dict[str, Floats]:
         "drawbar_pull_N": force.drawbar_pull,
         "sinkage_m": force.sinkage,
     }
-
-
-def _normal(seed: tuple[int, ...], index: NDArray[np.int64]) -> Floats:
-    """Standard normal numbers by index, from a counter-based generator."""
-    first, last = int(index[0]), int(index[-1]) + 1
-    start = first - first % 4  # Philox generates four words at a time
-    generator = np.random.Philox(np.random.SeedSequence(seed))
-    generator.advance(start // 4)
-    uniform = np.random.Generator(generator).random(last - start)[first - start :]
-    from scipy.special import ndtri
-
-    normal = ndtri(np.clip(uniform, 1e-16, 1.0 - 1e-16))
-    return np.asarray(normal[index - first])

@@ -87,8 +87,8 @@ def test_the_model_file_is_valid(tmp_path):
 @pytest.mark.long
 def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypatch):
     model = blocks("docs/model-file.md", "toml")[0]
-    extra, spec = blocks("docs/recipes-and-specs.md", "toml")
-    (tmp_path / "recipe.toml").write_text(f"rows = 60000\nseed = 1\n{model}{extra}")
+    extra, worlds, spec = blocks("docs/recipes-and-specs.md", "toml")
+    (tmp_path / "recipe.toml").write_text(f"rows = 60000\nseed = 1\n{model}{extra}{worlds}")
     (tmp_path / "spec.toml").write_text(spec)
     monkeypatch.chdir(tmp_path)
     assert main(["generate", "recipe.toml", "data.parquet", "--rows", "3000"]) == 0

@@ -47,8 +47,10 @@ A recipe is a model file (see README) with rows and seed at the top, and
 [soil.prior] gives the ranges of the parameters that vary. [stick_slip] adds
 the vibration of a wheel-leg: ranges of stiffness (N/m) and of drop (fraction
 of the friction angle that sliding soil loses), turning (rad/s), foot_mass
-(kg), ...; or law = "line" alone. The same recipe and seed give the same bytes,
-on any number of processes (--workers) and with either engine.
+(kg), ...; or law = "line" alone. [worlds] adds runs in which an effect acts
+that the model lacks (effect = 0.4) or a smooth error (error = 0.5). The same
+recipe and seed give the same bytes, on any number of processes (--workers) and
+with either engine.
 
 OUT is a file, or with a slash at its end a folder of files that the workers
 write. The same command completes a folder after an interruption: files that
