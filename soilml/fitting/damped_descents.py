@@ -22,14 +22,20 @@ from soilml.fitting.predictions import (
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 25
-#: A descent has converged when a step lowers the objective by less than `ENOUGH` (far below the
-#: thresholds on differences of the objective, which start at 9) or by less than the fraction
-#: `SHARE` of its excess over the number of readings (while the model is far from the data).
-ENOUGH, SHARE = 0.01, 2e-3
+#: A descent has converged where the linearised model promises to lower the objective by less than
+#: `ENOUGH` (far below the thresholds on differences of the objective, which start at 9) or by less
+#: than the fraction `SHARE` of its excess over the number of readings (while the model is far from
+#: the data); and where the best of several steps lowers it by less than `ENOUGH` or `STEP_SHARE`.
+ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
+#: A step that achieves this fraction of what the linearised model promises is followed by one step
+#: alone, and else by a choice of several.
+KEPT_PROMISE = 0.5
 #: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
 #: factor after an iteration without improvement, and the bounds.
 FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 1.0, 10.0), 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
+#: Damping, and curvature of a coordinate that changes nothing, with which a step is defined.
+LEAST_DAMPING, LEAST_SCALE = 1e-9, 1e-9
 #: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
 #: along it and an exponent are straight in its logarithm.
 RATIO_OF_BOUNDS = 3.0
@@ -72,9 +78,15 @@ class DampedSteps:
         """Coordinates (..., p), moved to the bounds that they are beyond."""
         return np.clip(x, self.lower, self.upper)
 
-    def are_held(self, x: Floats, residual: Floats, jacobian: Floats) -> bool:
-        """Whether bounds hold every coordinate of x (p,) against the descent."""
-        return not self._free(x, self._descent(x, residual, jacobian)).any()
+    def promised(self, x: Floats, residual: Floats, jacobian: Floats) -> float:
+        """Decrease of the linearised objective by an undamped step from x (p,) to its bounds.
+
+        It is zero where the bounds hold every coordinate.
+        """
+        descent, normal = self._descent(x, residual, jacobian), self._normal(x, jacobian)
+        damped = normal + LEAST_DAMPING * np.diag(np.diag(normal) + LEAST_SCALE)
+        step = bounded_step(damped, descent, self._free(x, descent), *self._ends(x))
+        return float(2.0 * descent @ step - step @ normal @ step)
 
     def from_points(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
         r"""Where damped steps lead from several points, (b, p).
@@ -90,18 +102,20 @@ class DampedSteps:
         jacobian (m, p): Whitened derivatives of the readings, the same for all points.
         damping (b,): Factor lambda of each step.
         """
-        of_readings = jacobian.T @ jacobian + np.diag(self.precision)
         moved = np.empty_like(x)
         for i, point in enumerate(x):
-            of_tests = self.tests.rates(point)
-            normal = of_readings + of_tests.T @ of_tests
-            scale = np.diag(normal) + 1e-9
+            normal = self._normal(point, jacobian)
             descent = self._descent(point, residual[i], jacobian)
             free = self._free(point, descent)
-            damped = normal + damping[i] * np.diag(scale)
+            damped = normal + damping[i] * np.diag(np.diag(normal) + LEAST_SCALE)
             step = bounded_step(damped, descent, free, *self._ends(point))
             moved[i] = self._moved(point, step)
         return self.within(moved)
+
+    def _normal(self, x: Floats, jacobian: Floats) -> Floats:
+        """Half the curvature of the linearised objective, (p, p)."""
+        of_tests = self.tests.rates(x)
+        return np.asarray(jacobian.T @ jacobian + np.diag(self.precision) + of_tests.T @ of_tests)
 
     def _descent(self, x: Floats, residual: Floats, jacobian: Floats) -> Floats:
         """Half the negative gradient of the objective, (p,)."""
@@ -246,14 +260,19 @@ def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation
 def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation | None) -> _Descent:
     """One descent; see `descend_together`.
 
-    Each damping is tried by a step and by a second step with the same Jacobian, which follows a
-    curved valley. Trials start at the sinkage that the last iterate predicts. An iterate is solved
-    by the full search; it is no improvement where that finds an equilibrium before the one of the
-    trial.
+    As long as the linearised model keeps its promise, each iteration is one step, at the end of
+    which the model is linearised again. Else several dampings are tried first, each by a step and
+    by a second step with the same Jacobian, which follows a curved valley. Trials start at the
+    sinkage that the last iterate predicts. An iterate is solved by the full search; it is no
+    improvement where that finds an equilibrium before the one of the trial.
     """
     steps = DampedSteps.of(problem)
 
-    def trial(last: Solution, x: Floats) -> _Question:
+    def at(last: Solution, x: Floats) -> _Question:
+        sinkage = last.linearisation.sinkage_at((x - last.x)[None, :])
+        return _Question(problem.request(x[None, :], sinkage), linearise=True)
+
+    def trials(last: Solution, x: Floats) -> _Question:
         sinkage = replace(last.linearisation.sinkage_at(x - last.x), nearest=True)
         return _Question(problem.request(x, sinkage), linearise=False)
 
@@ -261,38 +280,48 @@ def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation |
     if known is None or not np.array_equal(known.x, x):
         known = yield _Question(problem.request(x[None, :]), linearise=True)
     last = problem.at(x, known)
-    damping, converged = FIRST_DAMPING, False
+    damping, converged, trusted = FIRST_DAMPING, False, True
     for _ in range(MAX_ITERATIONS):
-        if steps.are_held(last.x, last.residual, last.jacobian):
-            converged = True
+        excess = last.objective - len(last.residual)
+        promised = steps.promised(last.x, last.residual, last.jacobian)
+        converged = promised < max(ENOUGH, SHARE * excess)
+        if converged:
             break
+        if trusted:
+            factor = np.asarray([damping * DAMPING_FACTORS[0]])
+            points = last.x[None, :], last.residual[None, :]
+            (x,) = steps.from_points(*points, last.jacobian, factor)
+            new = problem.at(x, (yield at(last, x)))
+            improvement = last.objective - new.objective
+            trusted = improvement > KEPT_PROMISE * promised
+            if improvement > 0.0:
+                last, damping = new, max(float(factor[0]), MIN_DAMPING)
+                continue
         dampings = damping * np.asarray(DAMPING_FACTORS)
         here = np.tile(last.x, (len(dampings), 1))
         residual = np.tile(last.residual, (len(dampings), 1))
-        trials, objectives = [], []
+        found, objectives = [], []
         for _ in range(2):
             here = steps.from_points(here, residual, last.jacobian, dampings)
-            residual = problem.whitened((yield trial(last, here)))
-            trials.append(here)
+            residual = problem.whitened((yield trials(last, here)))
+            found.append(here)
             objectives.append(problem.objective(residual, here))
         best = int(np.argmin(objectives))
         improvement = last.objective - float(np.ravel(objectives)[best])
         if improvement > 0.0:
-            x = np.concatenate(trials)[best]
-            sinkage = last.linearisation.sinkage_at((x - last.x)[None, :])
-            question = _Question(problem.request(x[None, :], sinkage), linearise=True)
-            new = problem.at(x, (yield question))
+            x = np.concatenate(found)[best]
+            new = problem.at(x, (yield at(last, x)))
             improvement = last.objective - new.objective
         if improvement <= 0.0:
             # if the most damped, shortest step is negligible this is an optimum; else damp more
-            converged = float(np.abs(trials[0][-1] - last.x).max()) < 1e-3
+            converged = float(np.abs(found[0][-1] - last.x).max()) < 1e-3
             damping *= DAMPING_INCREASE
             if converged or damping > MAX_DAMPING:
                 break
             continue
-        last = new
-        damping = max(float(dampings[best % len(dampings)]), MIN_DAMPING)
-        if improvement < max(ENOUGH, SHARE * (last.objective - len(last.residual))):
-            converged = True
+        last, damping = new, max(float(dampings[best % len(dampings)]), MIN_DAMPING)
+        trusted = improvement > KEPT_PROMISE * promised
+        converged = improvement < max(ENOUGH, STEP_SHARE * excess)
+        if converged:
             break
     return replace(last, converged=converged)

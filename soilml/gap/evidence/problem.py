@@ -17,7 +17,7 @@ from soilml.fitting.covariance import Whitening, discrepancy_process
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.effect_signatures import Signature, current_size, effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
-from soilml.fitting.predictions import Linearisation
+from soilml.fitting.predictions import Linearisation, linearise_many
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import (
     Covariance,
@@ -202,6 +202,23 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
     for i, result in zip(refused, again, strict=True):
         found[i] = result
     return found
+
+
+def restated(problem: FitProblem, fits: Sequence[Solution]) -> list[Solution]:
+    """Fits of an earlier problem at the same values: to its readings, with the priors of its soil.
+
+    Raises `InputError` where the model refuses one of them.
+    """
+    own, points = [], []
+    for fit in fits:
+        of_effects, values = [bool(c.effect) for c in fit.coordinates], fit.values()
+        effects = [c for c in fit.coordinates if c.effect]
+        soil = [c.prior.fraction(values.get(c.path, c.nominal)) for c in problem.soil]
+        points.append(np.concatenate([soil, fit.x[of_effects]]))
+        coordinates, whiten = [*problem.soil, *effects], problem.covariance.whiten
+        own.append(LeastSquaresProblem(fit.case, coordinates, problem.readings, whiten))
+    found = linearise_many([one.request(x[None, :]) for one, x in zip(own, points, strict=True)])
+    return [one.at(x, raised(y)) for one, x, y in zip(own, points, found, strict=True)]
 
 
 def covariance_at(problem: FitProblem, fit: Solution, readings: Readings) -> Covariance:

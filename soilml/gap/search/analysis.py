@@ -31,9 +31,9 @@ from soilml.gap.evidence.outliers import (
     ends_of_monotone_series,
     outliers,
 )
-from soilml.gap.evidence.problem import FitProblem, covariance_at
+from soilml.gap.evidence.problem import FitProblem, covariance_at, restated
 from soilml.gap.evidence.score_test import ScoreTest
-from soilml.gap.search.explanation import Explanation
+from soilml.gap.search.explanation import Explanation, restated_candidates
 from soilml.gap.search.opened_priors import open_priors
 from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
 from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, without_search
@@ -44,7 +44,7 @@ from soilml.remarks import Remark
 #: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
 MAX_PASSES = 2
 #: Searches at most, each without the readings that strayed from the explanation of the last.
-OUTLIER_ROUNDS = 4
+OUTLIER_ROUNDS = 3
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the
@@ -68,6 +68,7 @@ class Analysis:
 
     `predictions` are those of rows kept back, by the soil alone and the likeliest explanations.
     `of_all` is the analysis of all readings, where some were excluded.
+    `excluded` (m,) are the readings of `outliers` among all.
     `opened` says which priors of the soil were opened, where they were.
     `error` is the reason why the data could not be analysed, if they could not.
     """
@@ -75,6 +76,7 @@ class Analysis:
     problem: FitProblem
     result: SearchResult
     outliers: tuple[str, ...] = ()
+    excluded: NDArray[np.bool_] | None = None
     predictions: Predictions = field(default_factory=dict)
     of_all: Analysis | None = None
     opened: Remark | None = None
@@ -113,27 +115,29 @@ def analyse(
         opened = open_priors(found.problem, found.result)
         if opened is not None:
             start = replace(problem, case=opened.case, soil=opened.soil)
-            other = _without_outliers(start, seed, place, progress)
-            other = replace(other, predictions=predict_with(other.problem, other.result, seed))
-            if not other.error and explains_better(found, other):
-                found = replace(other, opened=opened.remark)
+            other = _without_outliers(start, seed, place, progress, found)
+            if any(explains_better(found, other, c) for c in other.result.candidates):
+                other = replace(other, predictions=predict_with(other.problem, other.result, seed))
+                likeliest = _predictive(other)
+                if likeliest is not None and explains_better(found, other, likeliest):
+                    found = replace(other, opened=opened.remark)
     return found
 
 
-def explains_better(found: Analysis, other: Analysis) -> bool:
-    """Whether an analysis with opened priors has an explanation far better than all of another.
+def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bool:
+    """Whether an explanation, of an analysis with opened priors, is far better than all of another.
 
-    Its evidence counts beside the noise, scatter and discrepancy of the other one, and it predicts
-    rows kept back better than the soil alone does.
+    Its evidence counts beside the noise, scatter and discrepancy of the other one.
     """
-    likeliest = _predictive(other)
-    if likeliest is None or len(other.problem.readings) != len(found.problem.readings):
+    if other.error or not opened.names:
+        return False
+    if len(other.problem.readings) != len(found.problem.readings):
         return False
     rivals = [c for c in (_predictive(found), found.result.soil_alone) if c is not None]
     rival = min(rivals, key=lambda c: c.objective)
-    value = found.problem.discrepancy.evidence(likeliest.fit, likeliest.amplitude).value
-    value += likeliest.penalty
-    explains_more = likeliest.amplitude.max() < 0.5 * rival.amplitude.max()
+    value = found.problem.discrepancy.evidence(opened.fit, opened.amplitude).value
+    value += opened.penalty
+    explains_more = opened.amplitude.max() < 0.5 * rival.amplitude.max()
     return value < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
 
 
@@ -144,19 +148,28 @@ def _predictive(found: Analysis) -> Explanation | None:
 
 
 def _without_outliers(
-    problem: FitProblem, seed: int, place: Callable[[int], str], progress: Callable[[float], None]
+    problem: FitProblem,
+    seed: int,
+    place: Callable[[int], str],
+    progress: Callable[[float], None],
+    earlier: Analysis | None = None,
 ) -> Analysis:
     """The analysis of all readings; without those that no explanation accounts for, if there are.
 
     A reading is an outlier if it strays from the best explanation of all readings, and from that
-    of the readings without it.
+    of the readings without it. Each search starts from the explanations of the last; the first one
+    from those of an `earlier` analysis, without the readings that it excluded.
     """
     readings = problem.readings
     excluded = np.zeros(len(readings), dtype=np.bool_)
-    of_all = None
-    for _ in range(OUTLIER_ROUNDS):
-        found, fit = _search_in_passes(_of_readings(problem, ~excluded), seed, place, progress)
-        of_all = of_all or found
+    of_all, last = None, None
+    if earlier is not None:
+        of_all, last = earlier.of_all, earlier.result
+        excluded = excluded if earlier.excluded is None else earlier.excluded
+    for left in reversed(range(OUTLIER_ROUNDS)):
+        own = _of_readings(problem, ~excluded)
+        found, fit = _search_in_passes(own, seed, place, progress, last)
+        of_all, last = of_all or found, found.result
         if found.error:
             return found
         again = excluded.copy()
@@ -168,7 +181,7 @@ def _without_outliers(
             text = f"{count} readings are outliers: check the sensors first"
             nothing = _no_result(found.result.soil)
             return Analysis(problem, nothing, error=Remark("many-outliers", text))
-        if np.array_equal(again, excluded):
+        if not left or np.array_equal(again, excluded):
             break
         excluded = again
     if not excluded.any():
@@ -177,7 +190,7 @@ def _without_outliers(
         f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
         for i in np.flatnonzero(excluded)
     )
-    return replace(found, outliers=names, of_all=of_all)
+    return replace(found, outliers=names, excluded=excluded, of_all=of_all)
 
 
 def _of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
@@ -187,27 +200,33 @@ def _of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
 
 
 def _search_in_passes(
-    problem: FitProblem, seed: int, place: Callable[[int], str], progress: Callable[[float], None]
+    problem: FitProblem,
+    seed: int,
+    place: Callable[[int], str],
+    progress: Callable[[float], None],
+    earlier: SearchResult | None,
 ) -> tuple[Analysis, Solution]:
-    """Covariance and search in turn, and the best fit."""
-    free = problem.soil
-    nominal = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    soil = problem.fit_soil([nominal, *(np.full(len(free), x) for x in SOIL_STARTS)])
+    """Covariance and search in turn, and the best fit; see `_without_outliers`."""
+    free, starts = problem.soil, restated_candidates(problem, earlier.candidates if earlier else ())
+    first = np.asarray([f.prior.fraction(f.nominal) for f in free])
+    if earlier is not None:
+        first = restated(problem, [earlier.soil])[0].x
+    soil = problem.fit_soil([first, *(np.full(len(free), x) for x in SOIL_STARTS)])
     result = _no_result(soil)
     infeasible = np.flatnonzero(~np.isfinite(soil.prediction))
     if infeasible.size:
         row = int(problem.readings.row[infeasible[0]])
         text = f"the model cannot carry the load of {place(row)}"
         return Analysis(problem, result, error=Remark("no-equilibrium", text)), soil
-    best = soil
+    best = starts[earlier.accepted[0].names].fit if earlier and earlier.accepted else soil
     for number in range(MAX_PASSES):
         last = problem.covariance.components
         problem = _with_estimated_covariance(problem, best, result.final_test.signatures)
         if result.accepted and _have_converged(last, problem.covariance.components):
             break
         soil = problem.fit_soil([soil.x], soil.linearisation)
-        starts = {c.names: c for c in result.candidates}
         result = search(problem, soil, seed, starts, _in_pass(number, progress))
+        starts = {c.names: c for c in result.candidates}
         best = result.accepted[0].fit if result.accepted else soil
         if not result.accepted:
             break

@@ -11,7 +11,13 @@ from soilml.arrays import Floats
 from soilml.fitting.coordinates import shape_coordinates
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import Linearisation
-from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
+from soilml.gap.evidence.problem import (
+    FitProblem,
+    MarginalFit,
+    StartedFit,
+    fit_marginal,
+    restated,
+)
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
 
@@ -144,6 +150,29 @@ def fit_shapes(problem: FitProblem, candidates: Sequence[Explanation]) -> list[E
         if best is not None:
             fitted[i] = replace(candidates[i], free_law=best)
     return fitted
+
+
+def restated_candidates(
+    problem: FitProblem, candidates: Sequence[Explanation]
+) -> dict[tuple[str, ...], Explanation]:
+    """Candidates of an earlier problem by their effects, with fits as `restated` has them."""
+    fits = [c.catalogue_law.fit for c in candidates]
+    fits += [c.free_law.fit for c in candidates if c.free_law is not None]
+    fits += [c.noise_only for c in candidates if c.noise_only is not None]
+    new = dict(zip(map(id, fits), restated(problem, fits), strict=True))
+
+    def again(law: MarginalFit | None) -> MarginalFit | None:
+        return law and replace(law, fit=new[id(law.fit)])
+
+    return {
+        c.names: replace(
+            c,
+            catalogue_law=replace(c.catalogue_law, fit=new[id(c.catalogue_law.fit)]),
+            free_law=again(c.free_law),
+            noise_only=c.noise_only and new[id(c.noise_only)],
+        )
+        for c in candidates
+    }
 
 
 def shape_directions(problem: FitProblem, fit: Solution) -> list[Floats]:

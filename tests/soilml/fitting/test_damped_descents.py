@@ -64,10 +64,10 @@ def test_steps_end_at_bounds_and_do_not_leave_them():
     assert one_step(of, 0.4, 9.0) == 1.0
     assert one_step(of, 1.0, 0.5) == 1.0
     steps, jacobian = DampedSteps.of(problem_of(of)), np.eye(1)
-    assert steps.are_held(np.ones(1), np.ones(1), jacobian)
-    assert not steps.are_held(np.ones(1), -np.ones(1), jacobian)
-    assert steps.are_held(np.zeros(1), -np.ones(1), jacobian)
-    assert not steps.are_held(np.zeros(1), np.ones(1), jacobian)
+    assert steps.promised(np.ones(1), np.ones(1), jacobian) == 0.0
+    assert steps.promised(np.ones(1), -np.ones(1), jacobian) == pytest.approx(1.0)
+    assert steps.promised(np.zeros(1), -np.ones(1), jacobian) == 0.0
+    assert steps.promised(np.full(1, 0.5), np.ones(1), jacobian) == pytest.approx(0.75)
     assert one_step(of, 0.0, -0.5) == 0.0
 
 
