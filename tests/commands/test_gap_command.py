@@ -202,6 +202,11 @@ def test_one_load_has_suspects_and_names_nothing(inputs, tmp_path, capsys):
     assert found["reasons"][0]["code"] == "one-load"
     odds = [suspect["log_odds"] for suspect in found["suspects"]]
     assert odds == sorted(odds, reverse=True)
+    chance = {tuple(suspect["effects"]): suspect["probability"] for suspect in found["suspects"]}
+    assert list(chance.values()) == sorted(chance.values(), reverse=True)
+    assert all(found["probabilities"][n[0]] == p for n, p in chance.items() if len(n) == 1)
+    kept = [tuple(names) for names in found["cause_set"] if tuple(names) in chance]
+    assert kept == [names for names in chance if names in kept] and kept[0] == next(iter(chance))
     assert "inside-priors" in {condition["code"] for condition in found["conditions"]}
     first = found["suspects"][0]["effects"]
     assert found["best_unclaimed"] == first
