@@ -37,6 +37,7 @@ from soilml.gap.verdict.agreement import (
     noise_agreement,
     trend_remarks,
 )
+from soilml.gap.verdict.cause_of_remainder import described_cause
 from soilml.gap.verdict.decision import (
     NOTHING_IS_BETTER,
     Decision,
@@ -341,6 +342,7 @@ def _build_report(
         where=tuple(discrepancy_map(problem, result.soil, seed)),
         residual_trend=residual_trend(problem, left_by.fit),
         discrepancy=remaining_discrepancy(problem, beside, left_by),
+        remainder_cause=described_cause(problem, written, seed),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )
 

@@ -121,7 +121,7 @@ class DiscrepancyModel:
 
         References: MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992, section 2.
         """
-        problem = _linearised(self, fit, extra)
+        problem = linearised(self, fit, extra)
         amplitude = np.zeros(len(self.process.usual)) if start is None else start.copy()
         value = np.inf
         for _ in range(SWEEPS):
@@ -141,9 +141,11 @@ class DiscrepancyModel:
         return Evidence(value, amplitude, step, expected)
 
 
-def _linearised(
-    discrepancy: DiscrepancyModel, fit: Solution, extra: Floats | None
-) -> LinearisedFit:
+def linearised(discrepancy: DiscrepancyModel, fit: Solution, extra: Floats | None) -> LinearisedFit:
+    """A fit's neighbourhood as a linear model, beside a discrepancy.
+
+    extra (m, k): Signatures of further effects, in the readings' unit per reference size.
+    """
     whiten = discrepancy.noise_whitening
     added = np.zeros((len(fit.measured), 0)) if extra is None else extra
     jacobian = whiten @ np.column_stack([fit.derivatives, added])

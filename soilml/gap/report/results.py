@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.physics.soils.soil_tests import SoilTest, deviations
 from soilml.remarks import Remark
 
@@ -259,6 +260,8 @@ class GapReport:
         Conditions under which these odds are valid.
     discrepancy : dict of RemainingDiscrepancy
         Smooth discrepancy of each channel before and after, by column.
+    remainder_cause : RemainderCause, optional
+        Stage of the cause of the remainder, and what it depends on, where the readings tell.
     best_unclaimed : tuple of str
         The explanation that is likeliest where no cause is claimed; it is not in `model`.
     suspected_model : Case, optional
@@ -308,6 +311,7 @@ class GapReport:
     suspects: tuple[Suspect, ...] = ()
     conditions: tuple[Remark, ...] = ()
     discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
+    remainder_cause: RemainderCause | None = None
     best_unclaimed: tuple[str, ...] = ()
     suspected_model: Case | None = field(default=None, metadata=ELSEWHERE)
     lines: tuple[Remark, ...] = ()

@@ -154,6 +154,8 @@ def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[
         lines.append(Remark("suspects", listed))
     if left := _remainder(report):
         lines.append(Remark("left", left))
+    if report.remainder_cause is not None:
+        lines.append(report.remainder_cause.remark())
     lines += [
         Remark(note.code, f"{note.text[:1].upper()}{note.text[1:]}.", note.about, note.severity)
         for note in report.notes
