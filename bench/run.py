@@ -146,8 +146,8 @@ PARTS = (
         "typical errors of the sensors and an exact model, and with typical errors of the model "
         "as well (`model_error` 1). Score: mean of the "
         "interval score over parameters and sets, in standard deviations of the prior; the prior "
-        "has about 3.3. Last table: the two answers of `identify --method posterior`, without "
-        f"and with typical errors, to {wrong_worlds_identified.SETS} sets made in the same way.",
+        "has about 3.3. Last table: the averaged answer of `identify` and its `exact_model`, on "
+        f"{wrong_worlds_identified.SETS} sets made in the same way.",
         lambda folder: f"{model_errors.tables(folder)}\n\n{wrong_worlds_identified.section()}",
     ),
     Part(

@@ -11,6 +11,8 @@ from drawn_errors import STD, DrawnErrors
 from datagen.blind_sets.plans import MECHANISMS
 from datagen.blind_sets.reference_wheel import Mechanism, WheelState, solve_equilibrium
 from datagen.recipe import read_recipe
+from soilml import Operating
+from soilml.physics.effects import FlatRim
 from soilml.quantities import SHEAR, column
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -30,6 +32,7 @@ class World:
 
     name: str
     mechanism: tuple[str, float] | None = None
+    rim: float = 0.0  # compliance (m/N) of a rim that lies flat, by the package's own model
     radius: float = 1.0  # true radius over that assumed
     bearing: float = 1.0  # true bearing pressure over that assumed
     bearing_std: float = 0.0  # of the logarithm of that factor, drawn for each soil
@@ -64,6 +67,15 @@ WORLDS = (
     World("lugs of 10 mm", mechanism=("grousers", 0.01)),
     World("bearing pressure x 2", bearing=2.0),
     World("all typical errors at once", usual=1.0),
+)
+#: Worlds in which a law is another one, at the reference sizes of the blind sets; a rim that lies
+#: flat gives way by 2 % of the radius.
+LAW_WORLDS = (
+    World("flat rim", rim=4e-5),
+    World("shear curve with a peak", mechanism=("shear-softening/peak-and-decay", 0.3)),
+    World("curved strength envelope", mechanism=("curved-envelope/logarithmic", 0.08)),
+    World("stress-shift", mechanism=("stress-shift", 0.2)),
+    World("sidewall-shear", mechanism=("sidewall-shear", 1.0)),
 )
 #: An error of the usual size, as the answer that allows for it assumes, where `x 2` is one error of
 #: 1.7 standard deviations.
@@ -142,6 +154,8 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
         "sinkage": found.sinkage.reshape(slip.shape),
         "drawbar_pull": found.pull.reshape(slip.shape),
     }
+    if world.rim:
+        forces = _of_flat_rim(world.rim, truth, slip, load)
     true = errors.of_readings(forces, load)
     readings = {
         key: value + case.noise[column(key)].std(value) * rng.standard_normal(slip.shape)
@@ -152,3 +166,15 @@ def simulate(world: World, sets: int, rows: int, seed: int) -> SimulatedDrives:
     )
     readings["load"] = load * (1.0 + world.load_std * rng.standard_normal(slip.shape))
     return SimulatedDrives(readings, truth)
+
+
+def _of_flat_rim(compliance: float, truth: Floats, slip: Floats, load: Floats) -> dict[str, Floats]:
+    """Forces (sets, rows) of a rim that lies flat along a chord, which the blind sets lack."""
+    case = read_recipe("wheel").case
+    model = case.model + FlatRim(compliance=compliance)
+    forces = []
+    for own, at_slip, at_load in zip(truth, slip, load, strict=True):
+        soil = case.with_values(dict(zip(SHEAR, map(float, own), strict=True))).soil
+        forces.append(model(soil, Operating(slip=at_slip, load=at_load)))
+    names = ("torque", "sinkage", "drawbar_pull")
+    return {name: np.stack([getattr(force, name) for force in forces]) for name in names}

@@ -64,7 +64,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
     torque = add_torque_noise(case, force.torque, rng)
     single = estimator(slip=slip, torque=torque, load=LOAD)
     joint = estimator.run(slip=slip, torque=torque, load=load)
-    least = identify(case, table(slip, torque, load))
+    least = identify(case, table(slip, torque, load), method="nonlinear")
     exact = posterior(case, slip, torque, load, rng, 2000)
     header = (
         "",

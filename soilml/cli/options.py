@@ -79,6 +79,15 @@ def add_model_and_runs(parser: argparse.ArgumentParser, *, need_runs: bool = Tru
     )
 
 
+def add_exact_model_option(parser: argparse.ArgumentParser) -> None:
+    """Declare --exact-model."""
+    parser.add_argument(
+        "--exact-model",
+        action="store_true",
+        help="take model and sensors to be exactly as in MODEL.toml",
+    )
+
+
 def add_by_option(parser: argparse.ArgumentParser) -> None:
     """Declare `--by`, which `tables.result_by_group` follows."""
     parser.add_argument(

@@ -12,8 +12,10 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
+from soilml.identification.averaged_fit import soil_samples
 from soilml.identification.condensing import condensed
-from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
+from soilml.identification.posterior import PosteriorSamples, prior_fractions
+from soilml.identification.posterior_density import check_declared
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube
 
@@ -64,13 +66,16 @@ def samples_of_rows(
     free: Sequence[Coordinate],
     count: int = SAMPLES,
     found: PosteriorSamples | None = None,
+    exact_model: bool = False,
 ) -> ParameterSamples:
-    """Samples of the exact posterior of rows; raises `FitError` as the posterior method does.
+    """Samples of the soil that explains rows, averaged over explanations as by `identify`.
 
-    `found` are samples that were drawn of it before.
+    With `exact_model`, those of the exact posterior. `found` are samples that were drawn before.
+    Raises `FitError` as `identify` does, and where noise is not declared.
     """
     if found is None:
-        found = posterior_samples(case, condensed(case, readings, free), free)
+        check_declared(readings)
+        found = soil_samples(case, condensed(case, readings, free), free, exact_model)
     index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()
     return ParameterSamples(tuple(free), found.sample.u[index], weights, found.noise_scale)

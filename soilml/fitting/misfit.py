@@ -64,8 +64,8 @@ class WeightedRows:
         )
 
     @cached_property
-    def problem(self) -> LeastSquaresProblem:
-        """The problem, weighted by noise, model discrepancy and shared errors."""
+    def columns(self) -> Floats:
+        """Columns (m, q) of the model discrepancy and of errors that act on the readings alone."""
         process = discrepancy_process(
             self.readings,
             self.case.discrepancy,
@@ -73,8 +73,12 @@ class WeightedRows:
             LEAST_EIGENVALUE,
             self.case.remainder,
         )
-        columns = np.hstack([process.columns, self.shared])
-        whiten = Whitening.of(self.readings.std, columns)
+        return np.hstack([process.columns, self.shared])
+
+    @cached_property
+    def problem(self) -> LeastSquaresProblem:
+        """The problem, weighted by noise, model discrepancy and shared errors."""
+        whiten = Whitening.of(self.readings.std, self.columns)
         return LeastSquaresProblem(self.case, self.unknown, self.readings, whiten)
 
     def of_few_rows(self) -> WeightedRows:

@@ -16,9 +16,10 @@ from soilml.errors import FitError, InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
 from soilml.fitting.readings import Readings
-from soilml.fitting.shared_errors import included_bias, usual_errors
+from soilml.fitting.shared_errors import included_bias
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import condensing
+from soilml.identification.averaged_fit import averaged
 from soilml.identification.fit import Fit, disagreeing_soil_tests
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton
@@ -32,6 +33,7 @@ Method = Callable[[Case, Readings, Sequence[Coordinate]], Fit]
 
 #: Identification method by the name that `--method` takes.
 METHODS: dict[str, Method] = {
+    "averaged": averaged,
     "nonlinear": nonlinear,
     "linear": linear,
     "newton": newton,
@@ -49,9 +51,7 @@ def identify(
     case: Case,
     table: Rows,
     free: Sequence[str] | None = None,
-    method: str = "nonlinear",
-    *,
-    as_usual: bool = False,
+    method: str = "averaged",
 ) -> Fit:
     """Identify parameters of a case from measured rows.
 
@@ -66,12 +66,9 @@ def identify(
         Paths of the free parameters (`cohesion`, `kphi`, `slip-sinkage.n1`); by default those with
         a prior.
     method
-        A key of `METHODS`: `nonlinear`, `linear`, `newton` or `posterior`.
-    as_usual
-        Whether sensors and model have their typical errors
-        (`soilml.fitting.shared_errors`), beside those that the case declares; for
-        `nonlinear` and `posterior`. Otherwise the model is right, but for its [discrepancy], and
-        sensors have the errors of [noise] and [bias] alone.
+        A key of `METHODS`: `averaged` over explanations of the rows, by their evidence; the others,
+        `nonlinear`, `linear`, `newton` and `posterior`, take the model as exact, but for its
+        [discrepancy], and sensors to have the errors of [noise] and [bias] alone.
 
     Returns
     -------
@@ -122,14 +119,7 @@ def identify(
             f"{table.source}: {len(table)} rows in one fit; the {method} method takes at most "
             f"{MOST_ROWS}: take nonlinear, or fit each run by itself"
         )
-    if as_usual and method in CLOSED_FORM:
-        raise InputError(
-            f"the {method} method takes the model as right; take nonlinear or posterior"
-        )
     readings, selected = usable_readings(case, table), select_free(case, free)
-    if as_usual:
-        errors = usual_errors(case, readings.row_load, [c.path for c in selected])
-        readings = replace(readings, shared_errors=errors)
     if method not in CLOSED_FORM and len(readings.row_slip) > condensing.MOST_ROWS:
         readings = condensing.condensed(case, readings, selected)
     fit = METHODS[method](case, readings, selected)

@@ -33,6 +33,10 @@ STRONG_CORRELATION = 0.95
 BOUND_TOLERANCE = 1e-3
 
 
+#: Codes of the remarks by which rows speak against the model taken as exact.
+AGAINST_EXACT = ("excess-residuals", "unlikely")
+
+
 @dataclass(frozen=True)
 class Fit:
     """Estimates of p parameters with their covariance and warnings.
@@ -69,6 +73,10 @@ class Fit:
     samples
         Weighted samples of the posterior (`soilml.identification.posterior.PosteriorSamples`),
         where the method drew them.
+    explanations
+        Of an averaged fit, the probability of each explanation of the rows, the likeliest first.
+    exact_model
+        Of an averaged fit, the one that takes model and sensors to be exactly as in the file.
     """
 
     method: str
@@ -84,6 +92,8 @@ class Fit:
     low: Floats | None = None
     high: Floats | None = None
     samples: Any = field(default=None, repr=False, compare=False)
+    explanations: Mapping[str, float] = field(default_factory=dict)
+    exact_model: Fit | None = None
 
     @property
     def interval(self) -> tuple[Floats, Floats]:
@@ -132,16 +142,10 @@ class Fit:
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
-        rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
-        remaining, correlation = self.remaining_fraction, self.correlation
-        return {
+        correlation = self.correlation
+        content = {
             "method": self.method,
-            "parameters": {
-                name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
-                | {"unit": unit}
-                | ({"remaining_fraction": remaining[name]} if name in remaining else {})
-                for name, v, s, low, high, unit in rows
-            },
+            "parameters": self._parameters(),
             "correlation": {
                 a: {b: float(correlation[i, j]) for j, b in enumerate(self.names) if j != i}
                 for i, a in enumerate(self.names)
@@ -150,6 +154,38 @@ class Fit:
             "rows_used": self.rows_used,
             "channels_used": list(self.channels),
             "misfit": None if np.isnan(self.misfit) else float(self.misfit),
+        }
+        if self.explanations:
+            content["explanations"] = dict(self.explanations)
+        if self.exact_model is not None:
+            exact = self.exact_model.as_json()
+            kept = ("method", "parameters", "warnings", "misfit")
+            content["exact_model"] = {key: exact[key] for key in kept} | {
+                "use": self.exact_model.use_of_exact.as_json()
+            }
+        return content
+
+    @property
+    def use_of_exact(self) -> Remark:
+        """When to use this fit, which takes model and sensors as exact, in place of the average."""
+        if any(remark.code in AGAINST_EXACT for remark in self.warnings):
+            text = "the rows speak against exact_model: do not use it"
+        else:
+            text = (
+                "use exact_model only where this model and these sensors were verified on a known "
+                "soil: it takes both to be exactly as in the model file"
+            )
+        return Remark("exact-model", text, severity="note")
+
+    def _parameters(self) -> dict[str, Any]:
+        """Each parameter with its value, standard deviation and interval."""
+        rows = zip(self.names, self.values, self.std, *self.interval, self.units, strict=True)
+        remaining = self.remaining_fraction
+        return {
+            name: {"value": float(v), "std": float(s), "p05": float(low), "p95": float(high)}
+            | {"unit": unit}
+            | ({"remaining_fraction": remaining[name]} if name in remaining else {})
+            for name, v, s, low, high, unit in rows
         }
 
 

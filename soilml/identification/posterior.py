@@ -113,6 +113,16 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     39(4), 2012, for the sampling.
     """
     found = posterior_samples(case, readings, free)
+    fit, mean_u = fit_of_samples("posterior", found, readings, free)
+    return with_warnings(
+        fit, case, readings, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False
+    )
+
+
+def fit_of_samples(
+    method: str, found: PosteriorSamples, readings: Readings, free: Sequence[Coordinate]
+) -> tuple[Fit, Floats]:
+    """Mean, covariance and 90 % interval of samples, and the mean (p,) as fractions of priors."""
     sample = found.sample
     values = np.stack([f.prior.at(sample.u[:, i]) for i, f in enumerate(free)], axis=1)
     mean = sample.mean(values)
@@ -121,7 +131,7 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     low, high = sample.quantiles(values, INTERVAL)
     mean_u = np.asarray([f.prior.fraction(float(m)) for f, m in zip(free, mean, strict=True)])
     fit = Fit(
-        method="posterior",
+        method=method,
         names=tuple(f.path for f in free),
         units=tuple(f.unit for f in free),
         values=mean,
@@ -137,9 +147,7 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         high=high,
         samples=found,
     )
-    return with_warnings(
-        fit, case, readings, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False
-    )
+    return fit, mean_u
 
 
 def posterior_samples(

@@ -59,12 +59,7 @@ class PosteriorDensity:
     def __init__(
         self, case: Case, readings: Readings, free: Sequence[Coordinate], noise_scale: float = 1.0
     ) -> None:
-        if undeclared := readings.undeclared:
-            lines = ", ".join(f"{name} = '3 %'" for name in undeclared)
-            raise FitError(
-                f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
-                f"[noise] of the model file, such as {lines}"
-            )
+        check_declared(readings)
         self.case, self.free = with_modelled_errors(
             case, readings.shared_errors, readings.row_load, free
         )
@@ -166,6 +161,16 @@ class PosteriorDensity:
     def _linearise(self, u: Floats) -> None:
         """Take changes of the readings with slip and load at fractions (p,)."""
         self.input_std = noise_of_operation(self.case, self.readings, self.free, u)
+
+
+def check_declared(readings: Readings) -> None:
+    """Raise `FitError` where the noise of a channel is not declared, with what to write."""
+    if undeclared := readings.undeclared:
+        lines = ", ".join(f"{name} = '3 %'" for name in undeclared)
+        raise FitError(
+            f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
+            f"[noise] of the model file, such as {lines}"
+        )
 
 
 def _by_channel(case: Case, readings: Readings) -> tuple[Floats, ...]:

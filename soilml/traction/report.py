@@ -80,7 +80,7 @@ def pull_report(
     loads: Sequence[float] | None = None,
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
-    as_usual: bool = False,
+    exact_model: bool = False,
 ) -> PullReport:
     """Pull and slope of a gear on the soil that the rows were measured on.
 
@@ -99,9 +99,9 @@ def pull_report(
         Highest slip, in (0, 1); by default the highest measured one, at least 0.6.
     estimator
         Trained estimator whose estimate replaces the posterior.
-    as_usual
-        Whether sensors and model have their typical errors, as in `identify`; not
-        with an estimator.
+    exact_model
+        Whether the soil is that of the model taken as exact, and not averaged over explanations as
+        in `identify`; not with an estimator.
 
     Returns
     -------
@@ -114,10 +114,10 @@ def pull_report(
         For a load that the soil does not carry, a slip limit outside (0, 1), or an estimator for
         another gear.
     FitError, TableError
-        As `identify` with the posterior method.
+        As `identify`.
     """
     table = as_table(table)
-    soil = measured_soil(case, table, free, estimator, as_usual)
+    soil = measured_soil(case, table, free, estimator, exact_model)
     draws, unknown, warnings = soil.draws, soil.unknown, [*soil.warnings, *excluded_effects(case)]
     table = table.rows(table.answered)
     at = operating_points(table)

@@ -61,7 +61,7 @@ def rover_report(
     slopes: Floats | None = None,
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
-    as_usual: bool = False,
+    exact_model: bool = False,
 ) -> RoverReport:
     """Performance of the case's rover on the soil that the rows were measured on.
 
@@ -73,11 +73,11 @@ def rover_report(
         stay on the ground.
     slip_limit: Highest slip; by default the highest measured one, at least 0.6.
     estimator: Trained estimator whose estimate replaces the posterior.
-    as_usual: Whether sensors and model have their typical errors, as in `identify`; not with an
-        estimator.
+    exact_model: Whether the soil is that of the model taken as exact, and not averaged over
+        explanations as in `identify`; not with an estimator.
 
     Raises `InputError` as `rover_performance` does, or for a slip limit outside (0, 1); `FitError`,
-    `TableError` as `identify` with the posterior method.
+    `TableError` as `identify`.
     """
     if case.rover is None:
         raise InputError("the model file has no [rover]")
@@ -85,7 +85,7 @@ def rover_report(
         tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
         slopes = SLOPES[tipping >= SLOPES]
     table = with_rover_columns(case, as_table(table))
-    soil = measured_soil(case, table, free, estimator, as_usual)
+    soil = measured_soil(case, table, free, estimator, exact_model)
     table = table.rows(table.answered)
     measured = MeasuredRange.of(table["slip"], table["load_N"])
     slip = slip_grid(slip_limit, measured)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,8 +20,8 @@ from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
-from soilml.fitting.shared_errors import usual_errors
 from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.averaged_fit import soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
@@ -173,21 +173,20 @@ def measured_soil(
     table: Table,
     free: Sequence[str] | None = None,
     estimator: Estimator | None = None,
-    as_usual: bool = False,
+    exact_model: bool = False,
 ) -> MeasuredSoil:
     """The soil of the rows of a table; raises as `pull_report` does.
 
-    With `as_usual`, sensors and model have their typical errors.
+    With `exact_model`, model and sensors are exactly as the case has them.
     """
     if estimator is not None:
         check_wheel_size(case, table)
         return estimated_soil(estimator, case, table.rows(table.answered))
     unknown = select_free(case, free)
     readings = usable_readings(case, table)
-    if as_usual:
-        errors = usual_errors(case, readings.row_load, [f.path for f in unknown])
-        readings = replace(readings, shared_errors=errors)
-    draws, samples = posterior_draws(case, readings, unknown)
+    readings = condensed(case, readings, unknown)
+    samples = soil_samples(case, readings, unknown, exact_model)
+    draws = _soil_draws(unknown, samples.sample.u[samples.equally_weighted(DRAWS)])
     warnings = list(readings.notes)
     if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"

@@ -69,7 +69,7 @@ def test_simulated_rows_can_be_identified(model_file, tmp_path, capsys):
     out = str(tmp_path / "sim.csv")
     command = ["simulate", str(model_file), "--slip", "0.1:0.6:6", "--load", "40,90"]
     assert main([*command, "--run", "sim", "--out", out]) == 0
-    assert main(["identify", str(model_file), out]) == 0
+    assert main(["identify", str(model_file), out, "--method", "nonlinear"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["parameters"]["shear_modulus"]["value"] == pytest.approx(0.025, rel=1e-3)
 
@@ -93,7 +93,8 @@ def test_simulate_takes_braking_slip(model_file, capsys):
 def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, capsys):
     out = tmp_path / "found.json"
     free = "cohesion,friction_angle,shear_modulus"
-    command = ["identify", str(model_file), str(runs_file), "--free", free, "--out", str(out)]
+    command = ["identify", str(model_file), str(runs_file), "--free", free]
+    command += ["--method", "nonlinear", "--out", str(out)]
     assert main(command) == 0
     content = json.loads(out.read_text())
     assert content["method"] == "nonlinear" and content["rows_used"] == 15

@@ -28,7 +28,7 @@ SHOWN = {"identify": "excess-residuals", "estimate": "no-interval-explains"}
 REPORTS = {
     "identify": ["model.toml", "runs.csv", "--by", "run", "--free", "cohesion,n"],
     "estimate": [str(ROOT / "exported/wheel.onnx"), "runs.csv", "--by", "run"],
-    "pull": ["model.toml", "runs.csv", "--as-usual", "--load", "60", "--free", "cohesion"],
+    "pull": ["model.toml", "runs.csv", "--exact-model", "--load", "60", "--free", "cohesion"],
 }
 
 

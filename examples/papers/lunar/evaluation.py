@@ -113,7 +113,7 @@ def _fits(case: Case, truth: Case, load: float, rng: np.random.Generator) -> lis
     torque = add_torque_noise(
         truth, wheel_forces(truth, values[:, None, :], slip, loads).torque, rng
     )
-    fits = [identify(case, table(slip, row, loads)) for row in torque]
+    fits = [identify(case, table(slip, row, loads), method="nonlinear") for row in torque]
     mean = np.stack([fit.values for fit in fits])
     covariance = np.stack([fit.covariance for fit in fits])
     off, std = mean - values, np.stack([fit.std for fit in fits])

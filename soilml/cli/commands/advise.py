@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     add_effects_option,
+    add_exact_model_option,
     add_gear_option,
     add_model_and_runs,
     add_output,
@@ -32,11 +33,12 @@ MODEL.toml.
   soilml advise MODEL.toml RUNS.csv --slips 0.1,0.3,0.5 --loads 30:120:4
   soilml advise MODEL.toml --loads 30:120:4 --picture map.png
 
-For each candidate, readings are simulated for samples of the posterior (of the
-prior without RUNS.csv), and the standard deviation of the exact posterior is
-averaged over them. <parameter>_left is this expected standard deviation
-divided by that of the prior (1: nothing learned). The rows of the table are:
-the best candidate for all parameters together and for each parameter, the best
+For each candidate, readings are simulated for samples of the soil, averaged
+over explanations of the rows as by soilml identify (of the prior without
+RUNS.csv), and the standard deviation that is left is averaged over them.
+<parameter>_left is this expected standard deviation divided by that of the
+prior (1: nothing learned). The rows of the table are: the best candidate for
+all parameters together and for each parameter, the best
 repetition of a measured row, and the best sequence of --count rows, whose
 widths are those after all rows up to it. --all lists every candidate instead.
 
@@ -68,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="list every candidate, best first")
     add_effects_option(parser)
+    add_exact_model_option(parser)
     add_gear_option(parser)
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
@@ -138,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
         if at is None:
             samples = samples_of_prior(free, case=case)
         else:
-            samples = samples_of_rows(case, readings, free)
+            samples = samples_of_rows(case, readings, free, exact_model=args.exact_model)
         known = {} if at is None else mean_covariates(at)
         advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
     if args.picture is not None:

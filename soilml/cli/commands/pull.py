@@ -11,6 +11,7 @@ from soilml.cli.options import (
     InputFile,
     add_by_option,
     add_effects_option,
+    add_exact_model_option,
     add_gear_option,
     add_model_and_runs,
     add_output,
@@ -92,11 +93,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_gear_option(parser)
     add_by_option(parser)
     add_row_options(parser)
-    parser.add_argument(
-        "--as-usual",
-        action="store_true",
-        help="allow for typical errors of sensors and model, as in identify",
-    )
+    add_exact_model_option(parser)
+    parser.add_argument("--as-usual", action="store_true", help=argparse.SUPPRESS)
     add_output(parser, "--out", "FILE.csv", "write the curves to this file")
     add_output(parser, "--picture", "FILE.png", "draw the curves and bands")
     add_report_option(parser)
@@ -116,7 +114,7 @@ def run(args: argparse.Namespace) -> int:
     options: dict[str, Any] = {
         "slip_limit": args.slip_limit,
         "free": parse_names(args.free),
-        "as_usual": args.as_usual,
+        "exact_model": args.exact_model,
     }
     if args.load is None and args.gear is None:
         whole = read_case(args.model, available_effects(args), with_bias=True)
@@ -185,8 +183,13 @@ def _check(args: argparse.Namespace) -> None:
             raise InputError(
                 "--picture draws one soil; select it with --where run=NAME instead of --by"
             )
-    if args.trained is not None and args.as_usual:
-        raise InputError("--as-usual applies to the posterior, not to the file of --from")
+    if args.as_usual:
+        raise InputError(
+            "--as-usual is gone: the soil is averaged over typical errors, unless --exact-model "
+            "asks for the model as it is"
+        )
+    if args.trained is not None and args.exact_model:
+        raise InputError("--exact-model applies to the rows, not to the file of --from")
     if args.trained is not None and args.free is not None:
         raise InputError(
             "--free applies to the posterior; the parameters of --from are those of the model file"

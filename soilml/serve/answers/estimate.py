@@ -14,7 +14,6 @@ from soilml.experiment_design.advice_after_results import advice_after_fit
 from soilml.experiment_design.presentation import abstention_message, next_row_remarks, row_message
 from soilml.fitting.coordinates import select_free
 from soilml.identification import Fit, identify
-from soilml.identification.presentation import fit_with_typical_errors
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_remarks
@@ -40,7 +39,7 @@ _ENDS = np.asarray([0.05, 0.5, 0.95])
 def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """Estimates with their bands, drawbar pull, advice, warnings and the written files.
 
-    Raises `SoilmlError` as `soilml identify --method posterior` does; where only the pull or the
+    Raises `SoilmlError` as `soilml identify` does; where only the pull or the
     advice cannot be had, the answer says why.
     """
     model = setting_file("MODEL.toml", request.get("model"))
@@ -49,30 +48,25 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     table = read_rows(request)
     remarks = table_remarks(table, case)
     tell(f"estimating the soil from {len(table)} rows")
-    fit = identify(case, table, None, "posterior")
-    tell("allowing for typical errors of model and sensors")
-    both = fit_with_typical_errors(case, table, None, "posterior", fit)
-    typical = None if both is None else both.typical
+    fit = identify(case, table)
+    exact = fit.exact_model
     tell("looking for the next measurement")
-    advice = advice_after_fit(case, table, None, fit)
+    advice = None if fit.samples is None else advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
-    pull = _pull(case, table, as_usual=both is not None)
-    pull["as_usual"] = both is not None
+    pull = _pull(case, table)
     pull["warnings"] = texts(w for w in pull.get("warnings", []) if w not in fit.warnings)
-    best = fit if typical is None else typical
-    found = case.with_values(dict(zip(best.names, map(float, best.values), strict=True)))
+    found = case.with_values(dict(zip(fit.names, map(float, fit.values), strict=True)))
     rows = f"{fit.rows_used} rows of {table.source}"
     written = {
-        "identify.json": json_text(
-            fit.as_json() | ({} if both is None else {"as_usual": both.as_json()})
-        ),
+        "identify.json": json_text(fit.as_json()),
         "model.toml": case_as_toml(found, [f"Soil as estimated from {rows}; priors unchanged."]),
     }
     return {
         **table_summary(table),
         "remarks": texts(remarks),
-        "parameters": parameters(case, fit, typical),
-        "use": "" if both is None else both.remark().text,
+        "parameters": parameters(case, fit, exact),
+        "explanations": dict(fit.explanations),
+        "use": "" if exact is None else exact.use_of_exact.text,
         "words": words(fit, advice),
         "warnings": texts(r for r in fit.warnings if r.code not in STATED_BESIDE),
         "next": "" if advice is None else row_message(advice, advice.best()),
@@ -90,10 +84,10 @@ def read_rows(request: dict[str, Any]) -> Table:
     return table if not run else table.where("run", str(run))
 
 
-def parameters(case: Case, fit: Fit, usual: Fit | None = None) -> list[dict[str, Any]]:
-    """Each parameter with its posterior, that with typical errors, and its prior.
+def parameters(case: Case, fit: Fit, exact: Fit | None = None) -> list[dict[str, Any]]:
+    """Each parameter averaged over explanations, by the model taken as exact, and its prior.
 
-    In shown units; `si` and `usual_si` are the values in SI units.
+    In shown units; `si` is the value in the SI unit.
     """
     priors = {free.path: free.prior for free in select_free(case, None)}
     found = []
@@ -119,21 +113,16 @@ def parameters(case: Case, fit: Fit, usual: Fit | None = None) -> list[dict[str,
                 "weak": WEAKLY_IDENTIFIED_ABOVE < left <= NOT_IDENTIFIED_ABOVE,
                 "si": float(fit.values[i]),
             }
-            | ({} if usual is None else _usual(usual, i, factor))
+            | ({} if exact is None else _of_exact(exact, i, factor))
         )
     return found
 
 
-def _usual(usual: Fit, i: int, factor: float) -> dict[str, Any]:
-    """Parameter `i` with typical errors."""
-    left = usual.remaining_fraction.get(usual.names[i], float("nan"))
+def _of_exact(exact: Fit, i: int, factor: float) -> dict[str, Any]:
+    """Parameter `i` by the model taken as exact."""
     return {
-        "usual": factor * float(usual.values[i]),
-        "usual_band": [factor * float(end[i]) for end in usual.interval],
-        "usual_identified": not left > NOT_IDENTIFIED_ABOVE,
-        "usual_left": left,
-        "usual_weak": WEAKLY_IDENTIFIED_ABOVE < left <= NOT_IDENTIFIED_ABOVE,
-        "usual_si": float(usual.values[i]),
+        "exact": factor * float(exact.values[i]),
+        "exact_band": [factor * float(end[i]) for end in exact.interval],
     }
 
 
@@ -145,14 +134,14 @@ def words(fit: Fit, advice: Advice | None) -> list[str]:
     return [abstention_message(name, part) for name, part in left if part > NOT_IDENTIFIED_ABOVE]
 
 
-def _pull(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
+def _pull(case: Case, table: Table) -> dict[str, Any]:
     """Drawbar pull and slope, of the rover in words; the reason where there is none."""
     try:
         if case.rover is not None:
-            return {"text": rover_text(case.rover, rover_report(case, table, as_usual=as_usual))}
+            return {"text": rover_text(case.rover, rover_report(case, table))}
         if case.gears:
-            return pull_of_gears(case, table, as_usual)
-        return pull_curves(pull_report(case, table, as_usual=as_usual))
+            return pull_of_gears(case, table)
+        return pull_curves(pull_report(case, table))
     except SoilmlError as error:
         return {"reason": " ".join(str(error).split())}
 
@@ -167,7 +156,7 @@ def pull_curves(report: PullReport) -> dict[str, Any]:
     }
 
 
-def pull_of_gears(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
+def pull_of_gears(case: Case, table: Table) -> dict[str, Any]:
     """The curves of each gear that was driven, on the soil that its own rows show.
 
     Raises `InputError` where rows do not name their gear.
@@ -180,7 +169,7 @@ def pull_of_gears(case: Case, table: Table, as_usual: bool) -> dict[str, Any]:
     for name in case.gears:
         rows = table.rows(table["gear"] == name)
         if len(rows):
-            own = pull_curves(pull_report(case.of_gear(name), rows, as_usual=as_usual))
+            own = pull_curves(pull_report(case.of_gear(name), rows))
             loads += [one | {"gear": name, "measured": own["measured"]} for one in own["loads"]]
             warnings += own["warnings"]
     if not loads:

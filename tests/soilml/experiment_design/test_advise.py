@@ -40,7 +40,7 @@ def after(case, slip, load, **options):
     run = np.full(len(slip), "a")
     table = Table({"run": run, "slip": at.slip, "load_N": at.load, "torque_Nm": torque})
     data = usable_readings(case, table)
-    samples = samples_of_rows(case, data, select_free(case, None), 1024)
+    samples = samples_of_rows(case, data, select_free(case, None), 1024, exact_model=True)
     return advise(case, samples, GRID, measured=data.at, outcome_count=200, **options)
 
 

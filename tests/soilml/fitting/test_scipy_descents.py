@@ -65,13 +65,13 @@ def test_sixty_four_rows_take_few_linearisations(tmp_path, monkeypatch):
         "predict",
         lambda c, f, x, rows: sets.append(len(x) * rows.row_count) or predict(c, f, x, rows),
     )
-    identify(case, table)
+    identify(case, table, method="nonlinear")
     few = len(calls)
     assert sum(sets) <= 65 * 3 * FEW
     calls.clear()
     monkeypatch.setattr(scipy_descents, "NEARLY_SAME", 0.0)
     monkeypatch.setattr(scipy_descents, "START_TOLERANCE", scipy_descents.TOLERANCE)
-    identify(case, table)
+    identify(case, table, method="nonlinear")
     assert few <= len(calls) - 3
 
 

@@ -1,5 +1,6 @@
 """Identification where all rows share errors of the sensors and of the model."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,12 +11,11 @@ from scipy.optimize import least_squares
 from soilml import Operating, identify, read_case
 from soilml.cli import main
 from soilml.config.measurement_noise import Noise
-from soilml.errors import InputError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.covariance import sensor_columns
 from soilml.fitting.shared_errors import ModelledErrors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification import posterior_density
+from soilml.identification import METHODS, posterior_density
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.identification.posterior_density import PosteriorDensity
@@ -151,6 +151,13 @@ def test_gains_offsets_and_errors_that_grow_with_slip_are_columns(case):
     assert sensor_columns(replace(data, shared_errors={"bearing": 0.4}), prediction) is None
 
 
+def rows_of(case, table, usual):
+    """Readings, with typical errors or without, and the free parameters."""
+    readings, free = usable_readings(case, table), select_free(case, None)
+    errors = usual_errors(case, readings.row_load, [c.path for c in free]) if usual else {}
+    return replace(readings, shared_errors=errors), free
+
+
 @pytest.mark.slow
 def test_usual_errors_hold_the_truth_where_the_model_is_wrong(case):
     rng, held, before = np.random.default_rng(3), [], []
@@ -158,7 +165,7 @@ def test_usual_errors_hold_the_truth_where_the_model_is_wrong(case):
     for _ in range(12):
         table = measured(case, rng, CHANNELS, slip_offset=0.02, bearing=1.4, torque_gain=-0.03)
         for answers, usual in ((held, True), (before, False)):
-            fit = identify(case, table, as_usual=usual)
+            fit = METHODS["nonlinear"](case, *rows_of(case, table, usual))
             answers.append((fit.interval[0] <= truth) & (truth <= fit.interval[1]))
     assert np.mean(held) >= 0.8
     assert np.mean(before) < np.mean(held)
@@ -170,7 +177,7 @@ def test_the_misfit_counts_the_errors_that_rows_share(case):
     other = case.with_values(TRUTH)
     true = other.model(other.soil, Operating(slip=SLIPS - 0.03, load=LOADS)).torque
     table = Table({"slip": SLIPS, "load_N": LOADS, "torque_Nm": np.asarray(true)})
-    fit = identify(replace(case, bias={"slip": Noise(constant=0.005)}), table)
+    fit = identify(replace(case, bias={"slip": Noise(constant=0.005)}), table, method="nonlinear")
 
     def residuals(x):
         soil = case.with_values(dict(zip(TRUTH, x[:3] * list(TRUTH.values()), strict=True))).soil
@@ -188,7 +195,7 @@ def test_the_misfit_of_soil_and_errors_is_that_of_the_best_fit(case):
     for _ in range(3):
         table = measured(case, rng, slip_offset=0.01, bearing=1.3)
         sampled, fitted = (
-            identify(case, table, method=method, as_usual=True)
+            METHODS[method](case, *rows_of(case, table, True))
             for method in ("posterior", "nonlinear")
         )
         assert sampled.misfit == pytest.approx(fitted.misfit, rel=0.1)
@@ -208,14 +215,12 @@ def test_what_is_declared_or_unknown_is_no_usual_error(case):
 
 def test_a_closed_form_takes_the_model_as_right(case):
     table = measured(case, np.random.default_rng(4))
-    with pytest.raises(InputError, match="nonlinear or posterior"):
-        identify(case, table, method="newton", as_usual=True)
     biased = replace(case, bias={"slip": Noise(constant=0.01)})
     fit = identify(biased, table, method="newton")
     assert "bias-ignored" in {remark.code for remark in fit.warnings}
 
 
-def test_the_command_gives_both_intervals_and_says_which_one_to_use(
+def test_the_command_states_one_answer_and_when_to_use_the_exact_model(
     case, model_file, tmp_path, capsys
 ):
     text = model_file.read_text() + "\n[bias]\nslip = 0.01\n"
@@ -229,9 +234,13 @@ def test_the_command_gives_both_intervals_and_says_which_one_to_use(
     assert main(["identify", *files, "--out", str(out)]) == 0
     shown = capsys.readouterr().out
     assert "errors that all rows share are included in std: slip 0.01" in shown
-    assert "with typical model and sensor errors" in shown
-    assert "use the interval that includes typical errors" in shown
-    assert '"as_usual"' in out.read_text()
+    assert shown.startswith("averaged, ") and "explained by: " in shown
+    assert shown.index("exact_model, posterior") > shown.index("explained by: ")
+    assert "use exact_model only where this model and these sensors were verified" in shown
+    content = json.loads(out.read_text())
+    first, exact = content["parameters"], content["exact_model"]["parameters"]
+    assert all(first[name]["std"] > exact[name]["std"] for name in exact)
+    assert sum(content["explanations"].values()) == pytest.approx(1.0)
 
 
 @pytest.mark.slow
@@ -247,7 +256,8 @@ def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, mon
 
     monkeypatch.setattr(PosteriorDensity, "predict", counted)
     monkeypatch.setattr(posterior_density, "MOST_SOLUTIONS", 150_000)
-    fit = identify(case, Table(columns | {"torque_Nm": torque}), None, "posterior", as_usual=True)
+    rows = rows_of(case, Table(columns | {"torque_Nm": torque}), True)
+    fit = METHODS["posterior"](case, *rows)
     assert fit.misfit > 20.0 and "excess-residuals" in {r.code for r in fit.warnings}
     # a single search, with the noise that the residuals ask for
     assert sum(solved) < 150_000 + 2048 * len(table)

@@ -36,16 +36,16 @@ def changed(table, **columns):
 
 
 def test_noise_of_slip_and_load_is_read_from_their_own_columns(case, table):
-    plain = identify(case, table, SHEAR)
+    plain = identify(case, table, SHEAR, method="nonlinear")
     std = np.full(12, 0.05)
     std[0] = np.nan
     shaky = changed(table, slip_std=std, load_N_std=0.2 * table["load_N"])
     data = usable_readings(case, shaky)
     assert data.slip_std.tolist() == [0.0, *[0.05] * 11]
     assert (data.load_std > 0).all()
-    assert (identify(case, shaky, SHEAR).std > 1.5 * plain.std).all()
+    assert (identify(case, shaky, SHEAR, method="nonlinear").std > 1.5 * plain.std).all()
     huge = changed(table, load_N_std=np.full(12, 1e300), slip_std=np.full(12, 1e300))
-    assert np.isfinite(identify(case, huge, SHEAR).std).all()
+    assert np.isfinite(identify(case, huge, SHEAR, method="nonlinear").std).all()
 
 
 @pytest.mark.parametrize("column, std", [("slip_std", 0.05), ("load_N_std", 4.0)])
@@ -89,31 +89,34 @@ def test_a_reading_of_zero_with_relative_noise_has_finite_weight(case, table, me
 def test_a_standard_deviation_of_almost_zero_is_replaced(case, table):
     std = np.full(12, 0.05)
     std[[2, 5]] = 1e-300
-    fit = identify(case, changed(table, torque_Nm_std=std), SHEAR)
+    fit = identify(case, changed(table, torque_Nm_std=std), SHEAR, method="nonlinear")
     assert (
         "line 4, column torque_Nm: standard deviation 1e-300 replaced by the column's median 0.05; "
         "1 more rows likewise" in (" ".join(texts(fit.warnings)))
     )
     np.testing.assert_allclose(
-        fit.std, identify(case, changed(table, torque_Nm_std=np.full(12, 0.05)), SHEAR).std
+        fit.std,
+        identify(
+            case, changed(table, torque_Nm_std=np.full(12, 0.05)), SHEAR, method="nonlinear"
+        ).std,
     )
     for bad in (
         changed(table, torque_Nm_std=np.full(12, 1e-300)),
         changed(table, torque_Nm=np.zeros(12)),
     ):
         with pytest.raises(FitError, match="line 2, column torque_Nm: standard deviation"):
-            identify(case, bad, SHEAR)
+            identify(case, bad, SHEAR, method="nonlinear")
 
 
 def test_rows_whose_status_is_not_ok_are_excluded_and_counted(case, table):
     torque, status = table["torque_Nm"].copy(), np.full(12, "ok", dtype="<U20")
     torque[[3, 7]], status[[3, 7]], status[0] = 99.0, "no equilibrium", ""
-    fit = identify(case, changed(table, torque_Nm=torque, status=status), SHEAR)
+    fit = identify(case, changed(table, torque_Nm=torque, status=status), SHEAR, method="nonlinear")
     assert fit.rows_used == 10
     assert fit["friction_angle"] == pytest.approx(float(case.soil.friction_angle), rel=1e-4)
     assert "2 rows are excluded: the status is not ok" in texts(fit.warnings)
     with pytest.raises(InputError, match=r"log\.csv: no row has the status ok"):
-        identify(case, changed(table, status=np.full(12, "no peak")), SHEAR)
+        identify(case, changed(table, status=np.full(12, "no peak")), SHEAR, method="nonlinear")
 
 
 def test_a_method_of_fixed_unknowns_reports_parameters_not_requested(case, table):

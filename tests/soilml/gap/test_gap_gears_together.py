@@ -132,8 +132,8 @@ def test_identification_beside_a_discrepancy_of_each_gear():
     smooth = (table["gear"] == "smooth")[readings.row]
     covariance = process.columns @ process.columns.T
     assert np.any(covariance != 0.0) and np.all(covariance[np.ix_(smooth, ~smooth)] == 0.0)
-    plain = identify(replace(case, discrepancy={}), table)
-    assert np.all(identify(case, table).std > plain.std)
+    plain = identify(replace(case, discrepancy={}), table, method="nonlinear")
+    assert np.all(identify(case, table, method="nonlinear").std > plain.std)
 
 
 def test_runs_to_add_name_the_gear_to_drive():

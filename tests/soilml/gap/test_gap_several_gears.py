@@ -144,7 +144,7 @@ def test_one_soil_is_identified_from_two_wheels(method):
 def test_an_effect_of_one_gear_can_be_identified():
     prior = "[gears.lugged.effect.prior]\nheight = [0.0, 0.03]\n"
     case = case_of(WHEELS + LUGS + prior + REST)
-    fit = identify(case, rows(case))
+    fit = identify(case, rows(case), method="nonlinear")
     position = fit.names.index("grousers@lugged.height")
     assert abs(fit.values[position] - 0.012) < 3.5 * fit.std[position] < 0.006
 
@@ -157,7 +157,7 @@ def test_tables_that_do_not_fit_the_gears_are_refused():
         gap(case, wrong)
     blank = Table({**table.columns, "gear": np.where(table["gear"] == "smooth", "", "lugged")})
     with pytest.raises(TableError, match="the cell is blank"):
-        identify(case, blank)
+        identify(case, blank, method="nonlinear")
     none = Table({k: v for k, v in table.columns.items() if k != "gear"})
     with pytest.raises(TableError, match="column gear is missing"):
         gap(case, none)
@@ -174,7 +174,10 @@ def test_rows_without_a_name_are_of_the_unnamed_gear():
     case = case_of(WHEELS.replace("gears.smooth", "gear") + LUGS + REST)
     table = rows(case, gears=("gear", "lugged"))
     blank = Table({**table.columns, "gear": np.where(table["gear"] == "gear", "", "lugged")})
-    first, second = identify(case, table), identify(case, blank)
+    first, second = (
+        identify(case, table, method="nonlinear"),
+        identify(case, blank, method="nonlinear"),
+    )
     np.testing.assert_array_equal(first.values, second.values)
 
 

@@ -51,19 +51,23 @@ def measured(case, truth, rng, error=0.02, noise=0.01):
 
 def test_a_declared_error_widens_the_intervals_and_explains_the_residuals(case):
     case, table = measured(case, TRUTH, np.random.default_rng(4))
-    assert remarked(identify(case, table).warnings, "times the declared noise")
-    fit = identify(replace(case, discrepancy=USUAL), table)
+    assert remarked(identify(case, table, method="nonlinear").warnings, "times the declared noise")
+    fit = identify(replace(case, discrepancy=USUAL), table, method="nonlinear")
     assert not remarked(fit.warnings, "times the declared noise")
     assert remarked(fit.warnings, "errors of the model are included in std: torque")
-    noise_only = identify(*measured(case, TRUTH, np.random.default_rng(4), error=0.0))
+    noise_only = identify(
+        *measured(case, TRUTH, np.random.default_rng(4), error=0.0), method="nonlinear"
+    )
     assert (fit.std > 1.5 * noise_only.std).all()
     assert (np.abs(fit.values - list(TRUTH.values())) < 3.0 * fit.std).all()
 
 
 def test_no_discrepancy_and_one_of_zero_give_the_same_fit(case):
     case, table = measured(case, TRUTH, np.random.default_rng(5), error=0.0)
-    plain = identify(case, table)
-    zero = identify(replace(case, discrepancy=dict.fromkeys(COLUMNS, Discrepancy())), table)
+    plain = identify(case, table, method="nonlinear")
+    zero = identify(
+        replace(case, discrepancy=dict.fromkeys(COLUMNS, Discrepancy())), table, method="nonlinear"
+    )
     assert zero.values == pytest.approx(plain.values)
     assert zero.std == pytest.approx(plain.std)
     assert zero.warnings == plain.warnings
@@ -152,7 +156,10 @@ def test_readings_of_a_next_row_have_the_error_of_a_remainder(case):
 def test_methods_agree_where_the_model_has_an_error(case):
     case, table = measured(case, TRUTH, np.random.default_rng(7))
     case = replace(case, discrepancy=USUAL)
-    least_squares, exact = identify(case, table), identify(case, table, method="posterior")
+    least_squares, exact = (
+        identify(case, table, method="nonlinear"),
+        identify(case, table, method="posterior"),
+    )
     assert (np.abs(least_squares.values - exact.values) < 0.5 * exact.std).all()
     assert least_squares.std == pytest.approx(exact.std, rel=0.3)
 
@@ -165,7 +172,9 @@ def test_intervals_hold_the_truth_although_the_error_has_other_lengths(case):
         truth = {n: float(p.at(rng.random())) for n, p in case.prior.items()}
         noisy, table = measured(case, truth, rng)
         for name, discrepancy in (("with", USUAL), ("without", {})):
-            low, high = identify(replace(noisy, discrepancy=discrepancy), table).interval
+            low, high = identify(
+                replace(noisy, discrepancy=discrepancy), table, method="nonlinear"
+            ).interval
             inside[name].append((low <= list(truth.values())) & (high >= list(truth.values())))
     # 0.90 expected of 72 intervals, which are correlated in threes: 0.78 is two sigma below
     assert np.mean(inside["with"]) > 0.78

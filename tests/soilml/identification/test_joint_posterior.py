@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from datagen.recipe import read_recipe
-from soilml import Operating, Table, identify
+from soilml import Operating, Table
 from soilml.fitting.shared_errors import usual_errors
 from soilml.identification import select_free, usable_readings
+from soilml.identification.posterior import posterior
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.quantities import SHEAR
 
@@ -51,11 +52,9 @@ def test_soil_and_usual_errors_are_sampled_as_by_a_markov_chain(channels):
         y = getattr(force, name)
         rows[columns[name]] = y + case.noise[columns[name]].std(y) * rng.standard_normal(16)
     table = Table(rows)
-    fit = identify(case, table, SHEAR, "posterior", as_usual=True)
-
     data, free = usable_readings(case, table), select_free(case, SHEAR)
     data = replace(data, shared_errors=usual_errors(case, data.load, [f.path for f in free]))
-    density = PosteriorDensity(case, data, free)
+    density, fit = PosteriorDensity(case, data, free), posterior(case, data, free)
 
     def log_density(u):
         inside = np.all((u > 0.0) & (u < 1.0), axis=1)

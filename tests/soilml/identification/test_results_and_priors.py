@@ -295,7 +295,7 @@ def test_the_misfit_counts_squares_within_condensed_rows():
 
 def test_methods_are_checked_before_anything_is_read(case):
     table = Table({"slip": np.zeros(1), "load_N": np.ones(1), "torque_Nm": np.ones(1)})
-    with pytest.raises(InputError, match="no method 'bayes'; there are: nonlinear, linear, newton"):
+    with pytest.raises(InputError, match="no method 'bayes'; there are: averaged, nonlinear"):
         identify(case, table, method="bayes")
     several = replace(case, gears={"a": case.model})
     with pytest.raises(InputError, match="newton method is for one gear"):

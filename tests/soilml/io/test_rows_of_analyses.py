@@ -43,7 +43,7 @@ class Frame:
 @pytest.mark.parametrize(
     "answer",
     [
-        lambda rows: identify(CASE, rows).values,
+        lambda rows: identify(CASE, rows, method="nonlinear").values,
         lambda rows: gap(CASE, rows).as_json()["gap"],
         lambda rows: audit(CASE, rows, effects={}).as_json(),
         lambda rows: pull_report(CASE, rows, slip_limit=0.3).by_load[0].posterior.pull,

@@ -74,7 +74,7 @@ def test_rows_are_a_table_of_runs_that_identify_takes(tmp_path, model_file):
     table = read_table(tmp_path / "runs.csv", ("run", "slip", "load_N", "torque_Nm"))
     assert list(table["run"]) == ["log"] * 4 and set(table["source"]) == {"log.csv"}
     assert np.all(table["torque_Nm_std"] > 0) and np.all(np.diff(table["time_s"]) > 0)
-    assert identify(read_case(model_file), table).rows_used == 4
+    assert identify(read_case(model_file), table, method="nonlinear").rows_used == 4
 
 
 @pytest.mark.slow
@@ -233,7 +233,7 @@ def test_a_model_file_of_another_wheel_is_refused(tmp_path, model_file):
     (tmp_path / "map.toml").write_text(text.replace('# radius = "0.15 m', 'radius = "0.11 m'))
     found = import_log(tmp_path / "a.csv", tmp_path / "map.toml")
     with pytest.raises(TableError, match=r"radius_m: 0\.11 given, the model's wheel has 0\.15"):
-        identify(read_case(model_file), found.table)
+        identify(read_case(model_file), found.table, method="nonlinear")
 
 
 def test_a_clock_of_huge_numbers_is_no_time(tmp_path):

@@ -64,10 +64,10 @@ async function estimate() {
 }
 
 function show({ id, result }) {
-  const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.usual_si ?? p.si]));
+  const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.si]));
   const place = byId("estimate-result");
   place.replaceChildren(
-    element("p", { class: "soft" }, `Posterior of ${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, with the model file taken as exact. Brown: the 90 % interval with typical errors of model and sensors; the large figures and the pull below are from it, where there is one.`),
+    element("p", { class: "soft" }, `${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, averaged over explanations of the rows${explained(result.explanations)}. Brown: that of exact_model, the model file taken as exact.`),
     ...(result.use ? [element("p", { class: "next" }, `${result.use[0].toUpperCase()}${result.use.slice(1)}.`)] : []),
     element("div", { class: "bands" }, ...result.parameters.map(band)),
     ...[wordList(result.words.slice(0, -1)), result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
@@ -86,8 +86,7 @@ function show({ id, result }) {
 
 /** One parameter: value, band, what it leaves of the prior, and a picture of both. */
 function band(parameter) {
-  const { label, symbol, unit } = parameter;
-  const { value, band: [low, high], left, identified, weak } = deserved(parameter);
+  const { label, symbol, unit, value, band: [low, high], left, identified, weak } = parameter;
   const state = !identified
     ? `not identified: ${percent(left)} of the prior's width remains`
     : `${weak ? "weakly identified" : "identified"}: ${percent(left)} of the prior's width remains`;
@@ -96,27 +95,26 @@ function band(parameter) {
       element("span", { class: "value" }, identified ? `${withUnit(value, unit)} ` : "not known ",
         element("span", { class: "unit" }, `90 %: ${range(low, high, unit)}`))),
     picture(parameter),
-    element("p", { class: `state ${identified ? "yes" : "no"}` }, state), firstWords(parameter));
+    element("p", { class: `state ${identified ? "yes" : "no"}` }, state), exactWords(parameter));
 }
 
-/** The interval to act on: the one with typical errors of model and sensors. */
-function deserved(parameter) {
-  if (!parameter.usual_band) return parameter;
-  return { value: parameter.usual, band: parameter.usual_band, left: parameter.usual_left,
-    identified: parameter.usual_identified, weak: parameter.usual_weak };
+/** The interval of the model file taken as exact, beside a value that is known. */
+function exactWords({ exact, exact_band: ends, identified, unit }) {
+  if (!ends) return null;
+  const value = identified ? `${withUnit(exact, unit)} ` : "";
+  return element("p", { class: "state second" }, `exact_model: ${value}(90 %: ${range(...ends, unit)})`);
 }
 
-/** The interval of the exact model, where the other one is the large figure. */
-function firstWords({ usual_band: usual, value, band: ends, identified: known, left, unit }) {
-  if (!usual) return null;
-  const shown = known ? `${withUnit(value, unit)} (90 %: ${range(...ends, unit)})` : `not known (90 %: ${range(...ends, unit)})`;
-  return element("p", { class: "state first" }, `with the model file taken as exact: ${shown}, ${percent(left)} of the prior's width remains`);
+/** The explanations with their probabilities, in words. */
+function explained(shares) {
+  const named = Object.entries(shares ?? {}).map(([label, share]) => `${label} ${percent(share)}`);
+  return named.length ? ` (${named.join(", ")})` : "";
 }
 
 const SYMBOLS = { phi: "φ", k_phi: "kφ", k_c: "kc", a_0: "a₀", a_1: "a₁", gamma: "γ" };
 const symbolText = (symbol) => SYMBOLS[symbol] ?? symbol;
 
-function picture({ range: [low, high], prior, band: [from, to], usual_band: usual, value, log, identified, unit, label }) {
+function picture({ range: [low, high], prior, band: [from, to], exact_band: exact, value, log, identified, unit, label }) {
   const place = log
     ? (x) => (100 * Math.log(Math.max(x, low) / low)) / Math.log(high / low)
     : (x) => (100 * (x - low)) / (high - low);
@@ -132,7 +130,7 @@ function picture({ range: [low, high], prior, band: [from, to], usual_band: usua
     drawn("line", { class: "b-range", x1: "0%", x2: "100%", y1: 15, y2: 15 }),
     bar(prior[0], prior[2], 5, 20, "b-prior"),
     bar(from, to, 7, 10, `b-post${known}`),
-    ...(usual ? [bar(usual[0], usual[1], 19, 4, "b-usual")] : []),
+    ...(exact ? [bar(exact[0], exact[1], 19, 4, "b-exact")] : []),
     drawn("line", { class: `b-mid${known}`, x1: `${within(value)}%`, x2: `${within(value)}%`, y1: 7, y2: 17 }),
     words("0%", "start", low), words("100%", "end", high));
 }

@@ -13,7 +13,6 @@ export function pullPlots(place, pull) {
     ...pull.loads.map((one, i) => element("option", { value: String(i) }, `${one.gear ? `${one.gear}, ` : ""}${number(one.load)} N`)));
   place.replaceChildren(
     element("div", { class: "buttons" }, element("label", { for: "pull-load" }, pull.loads[0].gear ? "Wheel and load" : "Load"), choose),
-    ...(pull.as_usual ? [element("p", { class: "soft" }, "With typical errors of model and sensors.")] : []),
     view, ...[wordList(pull.warnings, "soft")].filter(Boolean));
   return draw(view, pull, 0);
 }
