@@ -10,9 +10,10 @@ from conftest import THREE_CHANNEL_MODEL
 import soilml
 from soilml import SlipSinkage, read_case, simulate
 from soilml.cli import main
+from soilml.gap.presentation import SUSPECTED_FILE
 from soilml.io.text_tables import csv_text
 from training.adaptation import board_file
-from training.adaptation.workflow import GAP_FILES
+from training.adaptation.workflow import GAP_FILES, _read_gap
 from training.commands.adapt import FILES
 
 #: The packaged spec with a response that is learned in seconds.
@@ -50,9 +51,7 @@ def error_of(capsys, words):
 
 
 def test_errors_are_one_line_and_leave_nothing(tmp_path, capsys):
-    words = [*write_log(tmp_path, loads=(40.0, 60.0, 80.0)), "--out", str(tmp_path / "out")]
-    assert "3 runs; needed are 4 or more" in error_of(capsys, words)
-    write_log(tmp_path)
+    words = [*write_log(tmp_path), "--out", str(tmp_path / "out")]
     missing = str(tmp_path / "none.onnx")
     assert "none.onnx" in error_of(capsys, [*words, "--against", missing])
     (tmp_path / "soil.toml").write_text("[gear]\n")
@@ -110,3 +109,38 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monke
     assert capsys.readouterr().out == shown
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert (out / "adapted.h").is_file()
+
+
+@pytest.mark.slow
+def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys, monkeypatch):
+    spec = tmp_path / "small.toml"
+    spec.write_text(SMALL_SPEC)
+    monkeypatch.setattr(board_file, "SPEC", str(spec))
+    out = tmp_path / "out"
+    words = write_log(tmp_path, SlipSinkage(n1=0.5), loads=(40.0, 70.0, 110.0))
+    assert main([*words, "--out", str(out), "--rows", "3000"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("A file was trained and not judged, with slip-sinkage.")
+    content = json.loads((out / "adapt.json").read_text())
+    assert content["status"] == "not-judged" and content["kept_back"] == []
+    assert "few-runs" in [r["code"] for r in content["remarks"]]
+    assert "judgement" not in content
+    assert all((out / name).is_file() for name in content["files"])
+    assert (out / "adapted.onnx").is_file() and not (out / "kept_back.csv").exists()
+    assert not (out / "before.onnx").exists()
+
+
+def test_a_gap_that_needs_other_priors_trains_nothing(tmp_path):
+    model = tmp_path / "model.toml"
+    model.write_text(THREE_CHANNEL_MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n')
+    reason = {"code": "prior-opened", "about": ["kphi"], "severity": "warning", "text": ""}
+    content = {
+        "status": "suspected", "sentence": "", "reasons": [reason], "soil_before": {},
+    }  # fmt: skip
+    (tmp_path / "gap.json").write_text(json.dumps(content))
+    model.rename(tmp_path / SUSPECTED_FILE)
+    (tmp_path / "model.toml").write_text(THREE_CHANNEL_MODEL)
+    case = read_case(tmp_path / "model.toml")
+    found = _read_gap(tmp_path, case, suspected=True)
+    assert found.effects == ("slip-sinkage",)
+    assert found.refusal is not None and found.refusal.code == "prior-opened"

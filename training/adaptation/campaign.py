@@ -59,31 +59,27 @@ steady = ["slip", "load_N"]
 
 @dataclass(frozen=True)
 class SplitRuns:
-    """The rows of a log: those that are analysed, and those of whole runs that are kept back."""
+    """The rows of a log: those that are analysed, and those of whole runs that are kept back.
+
+    None are kept back of a campaign of few runs.
+    """
 
     campaign: Table
-    kept_back: Table
+    kept_back: Table | None
 
     @property
     def runs(self) -> tuple[str, ...]:
         """Names of the runs that are kept back, in the order of the table."""
+        if self.kept_back is None:
+            return ()
         return tuple(dict.fromkeys(str(name) for name in self.kept_back["run"]))
 
 
 def split_runs(table: Table, seed: int) -> SplitRuns:
-    """Keep back a quarter of the runs, drawn with this seed; one at least.
-
-    Raises `InputError` for fewer than four runs.
-    """
-    runs = np.unique(table["run"])
-    if runs.size < RUNS_PER_HELD_OUT:
-        raise InputError(
-            f"{table.source}: {runs.size} run{'s' * (runs.size != 1)}; needed are "
-            f"{RUNS_PER_HELD_OUT} or more, of which a quarter is kept back to judge the file on; "
-            "soilml gap takes fewer"
-        )
+    """Keep back a quarter of the runs, drawn with this seed; none of fewer than four."""
+    if np.unique(table["run"]).size < RUNS_PER_HELD_OUT:
+        return SplitRuns(table, None)
     parts = split_holdout(table, "run", seed)
-    assert parts.held_out is not None
     return SplitRuns(parts.analysed, parts.held_out)
 
 

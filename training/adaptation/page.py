@@ -30,6 +30,7 @@ from training.adaptation.result import AdaptReport
 TONES = {
     "adapted": ("named", "adapted"),
     "not-better": ("suspected", "old file stays"),
+    "not-judged": ("suspected", "not judged"),
     "not-supported": ("no-gap", "old file stays"),
 }
 MOST_RUNS = 4  # Most runs in the picture
@@ -43,7 +44,9 @@ def adapt_page(report: AdaptReport) -> Report:
     judgement = report.judgement
     answer = [report.sentence]
     if judgement is None:
-        meaning = "no file was trained"
+        trained = report.status == "not-judged"
+        meaning = "no run was kept back" if trained else "no file was trained"
+        answer += [report.gap_sentence] if trained else []
         pictures: Sequence[ReportPicture] = ()
         tables: Sequence[ReportTable] = ()
     else:
@@ -70,8 +73,12 @@ def adapt_page(report: AdaptReport) -> Report:
 
 def next_steps(report: AdaptReport) -> list[str]:
     """What to do with the result."""
+    if report.status == "not-judged":
+        return [f"measure the runs of gap/next_runs.csv before {report.files[0]} flies"]
     if report.status == "adapted":
         return [f"put {report.files[0]} on the board, or compile {report.files[2]}"]
+    if any(remark.code == "prior-opened" for remark in report.remarks):
+        return ["change the priors in [soil.prior] of the model file, and run this again"]
     if report.gap_status == "suspected" and report.judgement is None:
         return ["see gap/report.html; --suspected tries the first suspect all the same"]
     if report.gap_status == "no-gap":
@@ -82,8 +89,9 @@ def next_steps(report: AdaptReport) -> list[str]:
 def adapt_text(report: AdaptReport) -> str:
     """The verdict and its tables, for the terminal."""
     parts = [report.sentence]
-    if report.judgement is not None:
+    if report.status != "not-supported":
         parts.append(f"{report.gap_status}: {report.gap_sentence}")
+    if report.judgement is not None:
         parts.append(f"judged on {_runs(report.kept_back)}")
         for table in judgement_tables(report.judgement):
             parts.append(format_table(table.header, table.rows, text_columns=table.text_columns))

@@ -16,6 +16,7 @@ from training.adaptation.judgement import ChannelScore, Judgement
 ADAPTATION_STATUSES = {
     "adapted": "the adapted file predicts the runs that were kept back better than the old one",
     "not-better": "an adapted file was trained, and the old one predicts those runs no worse",
+    "not-judged": "an adapted file was trained, and the campaign has too few runs to judge it",
     "not-supported": "the gap analysis does not support a change of the model",
 }
 
@@ -27,7 +28,7 @@ class AdaptReport:
     Attributes
     ----------
     status : str
-        One of `ADAPTATION_STATUSES`; with any but `adapted` the old file stays the better one.
+        One of `ADAPTATION_STATUSES`; with `not-better` and `not-supported` the old file stays.
     gap_status, gap_sentence : str
         Verdict of the gap analysis of the campaign.
     effects : tuple of str
@@ -35,7 +36,7 @@ class AdaptReport:
     kept_back : tuple of str
         The runs on which both files were judged.
     judgement : Judgement or None
-        None where the analysis does not support a change.
+        None where the analysis does not support a change, and where no run was kept back.
     files : tuple of str
         The files of the folder, the adapted model file first.
     remarks : tuple of Remark
@@ -58,6 +59,8 @@ class AdaptReport:
     @property
     def sentence(self) -> str:
         """The verdict in one sentence."""
+        if self.status == "not-judged":
+            return f"A file was trained and not judged, with {' + '.join(self.effects)}."
         if self.judgement is None:
             return f"The old file stays: {self.gap_sentence}"
         ratio = format_number(self.judgement.ratio, 2)
@@ -76,12 +79,12 @@ class AdaptReport:
 
         `ax`: axes of matplotlib, two for each row of panels: a panel for each channel and one of
         the errors; a new figure where None. Returns the axes. Raises `InputError` where no file was
-        trained, and for another number of axes.
+        judged, and for another number of axes.
         """
         from training.adaptation.page import plot_judgement
 
         if self.judgement is None:
-            raise InputError("no file was trained, so that nothing can be drawn")
+            raise InputError("no file was judged, so that nothing can be drawn")
         return plot_judgement(self.judgement, ax)
 
     def as_json(self) -> dict[str, Any]:

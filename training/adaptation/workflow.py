@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from soilml.config.case import Case, read_case
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import gap
+from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
 from soilml.gap.presentation import SUSPECTED_FILE, gap_files
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
 from soilml.io.atomic_files import create_folder, write_files
@@ -78,6 +81,9 @@ def adapt(
     pull and sinkage of the later rows. What a file does not estimate has the value of the fit to
     the campaign, in both models.
 
+    Of fewer than four runs none is kept back: a file is then trained and not judged, and what the
+    gap analysis says of rows that it kept back itself is all that speaks for it.
+
     A call that was interrupted, or is repeated, keeps the steps whose inputs are the same.
 
     Parameters
@@ -115,7 +121,7 @@ def adapt(
     Raises
     ------
     InputError
-        For fewer than four runs, several gears, no row with slip above 0, noise of torque that is
+        For several gears, no row with slip above 0, noise of torque that is
         not known, no prior of cohesion, friction angle and shear modulus, or a recipe whose rows
         have no equilibrium.
     TableError
@@ -142,8 +148,9 @@ def adapt(
     earlier = _check_earlier(against, case, model_name)
     target = Path(folder)
     with create_folder(target), create_folder(target / "gap"):
-        texts = (csv_text(split.campaign.columns), csv_text(split.kept_back.columns))
-        write_files(dict(zip((target / name for name in SPLIT_FILES), texts, strict=True)))
+        tables = [one for one in (split.campaign, split.kept_back) if one is not None]
+        texts = [csv_text(one.columns) for one in tables]
+        write_files({target / name: text for name, text in zip(SPLIT_FILES, texts, strict=False)})
         steps = ResumableSteps(target)
         steps.run(
             "gap",
@@ -155,12 +162,16 @@ def adapt(
         if found.refusal is not None:
             report = found.report(split.runs, None, (), rows, seed)
             return _finish(report, target, origin)
-        check_lengths(split.kept_back)
+        if split.kept_back is not None:
+            check_lengths(split.kept_back)
         new, remarks = board_unknowns(with_noise_of_log(found.case, table))
         own = [f"With {' + '.join(found.effects)}. {found.sentence}"]
         write_files({target / ADAPTED_MODEL: case_as_toml(found.case, own)})
         make = partial(make_file, steps, seed=seed, workers=workers, progress=progress)
         file = make(ADAPTED, recipe_text(new, driven, rows, seed), as_c=True)
+        if split.kept_back is None:
+            report = found.report((), None, [*remarks, _unjudged(table)], rows, seed)
+            return _finish(report, target, origin)
         if earlier is None:
             before = make(BEFORE, recipe_text(old, driven, rows, seed))
             earlier = with_sensors_of(Estimator.load(before), old)
@@ -202,13 +213,15 @@ class AnalysedCampaign:
     ) -> AdaptReport:
         """The result of the adaptation, whose files are not written yet."""
         notes = list(remarks) + ([self.refusal] if self.refusal else [])
-        if judgement is None:
-            status = "not-supported"
-        else:
-            status = "adapted" if judgement.ratio < 1.0 else "not-better"
+        effects: tuple[str, ...] = ()
+        status = "not-supported"
+        if self.refusal is None:
+            effects, status = self.effects, "not-judged"
             notes += _sensor_remark(self.case)
+        if judgement is not None:
+            status = "adapted" if judgement.ratio < 1.0 else "not-better"
         return AdaptReport(
-            status, self.status, self.sentence, self.effects if judgement else (), kept_back,
+            status, self.status, self.sentence, effects, kept_back,
             judgement, (), tuple(notes), rows, seed,
         )  # fmt: skip
 
@@ -255,6 +268,12 @@ def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
     if not (status in CLAIMED or (status == "suspected" and suspected)) or not effects:
         text = f"the gap analysis ends with {status}, which supports no change of the model"
         refusal = Remark(f"gap-{status}", text, severity="note")
+    elif any(one["code"] == "prior-opened" for one in content["reasons"]):
+        text = (
+            "the gap is explained by soils outside of [soil.prior] alone; give priors in which the "
+            "soils to come lie, and in which gap/report.html finds that of the campaign"
+        )
+        refusal = Remark("prior-opened", text)
     elif needed := untrainable_effects(found):
         parts = [f"{effect} needs {', '.join(columns)}" for effect, columns in needed.items()]
         text = f"{'; '.join(parts)}, which a file for the board is not given: none can be trained"
@@ -275,6 +294,16 @@ def _sensor_remark(case: Case) -> list[Remark]:
     return [Remark("sensor-error-trained", text, names)]
 
 
+def _unjudged(table: Table) -> Remark:
+    """A remark on a campaign of which no run was kept back."""
+    count = np.unique(table["run"]).size
+    text = (
+        f"{count} run{'s' * (count != 1)}: of {RUNS_PER_HELD_OUT} or more, a quarter is kept back "
+        "and judges both files; here gap/report.html alone says how well rows are predicted"
+    )
+    return Remark("few-runs", text)
+
+
 def _finish(
     report: AdaptReport, folder: Path, origin: Provenance | None, with_before: bool = False
 ) -> AdaptReport:
@@ -282,14 +311,15 @@ def _finish(
     made: tuple[str, ...] = ()
     adapted = (*ADAPTED.model, *ADAPTED.code, ADAPTED_MODEL, ADAPTED.recipe, ADAPTED.rows)
     before = (*BEFORE.model, BEFORE.recipe, BEFORE.rows)
-    if report.judgement is not None:
+    if report.status != "not-supported":
         made = (*adapted, *(before if with_before else ()))
-    report = replace(report, files=(*made, *SPLIT_FILES, *GAP_FILES[:4]))
+    parts = SPLIT_FILES if report.kept_back else SPLIT_FILES[:1]
+    report = replace(report, files=(*made, *parts, *GAP_FILES[:4]))
     if origin is None:
         origin = Provenance.of(["adapt"], [])
     shown = adapt_page(report)
     content = report.as_json() | {"report": shown.as_json(origin)}
-    stale = [name for name in (*adapted, *before) if name not in made]
+    stale = [n for n in (*adapted, *before, *SPLIT_FILES) if n not in (*made, *parts)]
     write_files(
         {
             folder / RESULT_FILES[0]: page(shown, origin),

@@ -28,7 +28,8 @@ kept back, beside one trained on the model as it was.
 A quarter of the runs is kept back (--seed). From the torque of their first rows
 each file estimates the soil, and its model predicts torque, drawbar pull and
 sinkage of the later rows. The verdict comes first: by how much the error falls,
-or why the old file stays.
+or why the old file stays. Of fewer than four runs none is kept back: the file
+is then trained and not judged.
 
 DIR receives report.html (start here), adapt.json, adapted.onnx with its card
 adapted.md, adapted.c and adapted.h, adapted.toml (the model with the effect),

@@ -54,9 +54,10 @@ def test_whole_runs_are_kept_back_by_the_seed():
     assert len({split_runs(table, seed).runs for seed in range(20)}) > 5
 
 
-def test_too_few_runs_are_refused():
-    with pytest.raises(InputError, match="3 runs; needed are 4 or more"):
-        split_runs(log(runs=3), 0)
+def test_of_few_runs_none_is_kept_back():
+    table = log(runs=3)
+    split = split_runs(table, 0)
+    assert split.kept_back is None and split.runs == () and len(split.campaign) == len(table)
 
 
 def test_ranges_have_a_margin_and_leave_braking_out():
