@@ -82,3 +82,13 @@ def test_the_error_does_not_depend_on_how_the_rows_are_divided(recipe):
     whole = simulate_rows(recipe, 0, 0, 64)["torque_Nm"]
     parts = [simulate_rows(recipe, 0, a, b)["torque_Nm"] for a, b in ((0, 5), (5, 37), (37, 64))]
     np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12)
+
+
+def test_far_from_the_learned_range_the_error_of_rows_is_a_usual_one(recipe):
+    (own,) = recipe.case.remainder.parts
+    light = replace(own, usual=0.4, load=(2.0, 3.0), points=((0.2, 2.5), (0.5, 2.5)))
+    case = replace(recipe.case, remainder=Remainder((light,)))
+    error = model_error(replace(recipe, case=case), 0, at(0.3))["torque_Nm"]
+    assert np.std(error) == pytest.approx(0.4, rel=0.06)
+    mean, _ = case.remainder.mean_and_std("torque", 0.3, 60.0)
+    assert abs(mean) < 1e-3

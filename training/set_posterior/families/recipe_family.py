@@ -69,13 +69,19 @@ class RecipeFamily:
     def of(recipe: Recipe, targets: Sequence[str]) -> RecipeFamily:
         """The family of a recipe.
 
-        Raises `InputError` if the recipe has braking, covariates, stick-slip, too many unknowns, or
-        no prior of a target.
+        Raises `InputError` if the recipe has braking, covariates, stick-slip, a remainder, too many
+        unknowns, or no prior of a target.
         """
         prior = recipe.case.prior
         names = [*targets, *(name for name in prior if name not in targets)]
         if missing := [name for name in targets if name not in prior]:
             raise InputError(f"set_posterior: the recipe has no prior of {missing[0]}")
+        if recipe.case.remainder is not None:
+            raise InputError(
+                "set_posterior: the recipe has [remainder], an error of its model that the graph "
+                "has no columns for; needed is a recipe without it, or a spec without "
+                "[set_posterior], whose regressors learn it from the rows"
+            )
         if len(names) > MOST_UNKNOWNS:
             raise InputError(
                 f"set_posterior: the recipe has {len(names)} unknowns; needed are {MOST_UNKNOWNS} "
