@@ -12,6 +12,7 @@ import numpy as np
 from soilml.arrays import Array, Floats, Real, namespace
 from soilml.config.case import Case
 from soilml.fitting.effect_signatures import effect_signatures
+from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings
 from soilml.parameters import Parameter
 from soilml.physics.contact import Stress, with_normal
@@ -154,7 +155,7 @@ _PLAIN = [
 
 def _along_contact(case: Case, readings: Readings) -> list[_Kind]:
     """Changes of the stresses by functions of depth and of shear displacement in the contact."""
-    soil, force = case.soil, case.model(case.soil, readings.at)
+    soil, force = case.soil, forces(case, readings.at)
     depth = float(np.nanmax(np.asarray(force.sinkage), initial=0.0))
     if not depth > 0.0:
         return []

@@ -12,7 +12,7 @@ from soilml.arrays import Floats
 from soilml.fitting.covariance import DiscrepancyProcess
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.held_out import Folds, held_out_folds
-from soilml.gap.evidence.linearised_fit import AMPLITUDES
+from soilml.gap.evidence.linearised_fit import AMPLITUDES, ProcessDivisions
 from soilml.gap.evidence.marginal_likelihood import TEMPERING, DiscrepancyModel, linearised
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.evidence.stage_changes import stage_changes
@@ -51,7 +51,6 @@ class Hypothesis:
     columns: Floats
     value: float = np.inf
     amplitude: tuple[float, ...] = ()
-    score: float = np.nan
 
 
 def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> RemainderCause | None:
@@ -72,7 +71,10 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
     Computation 4(3), 1992, section 2 (the evidence); Vehtari and Ojanen, Statistics Surveys 6,
     2012, section 2 (the log score).
     """
+    fit = marginal.fit
     if not marginal.evidence.amplitude.any() or len(problem.readings.channels) < 2:
+        return None
+    if not np.isfinite([*fit.prediction, *fit.linearisation.log_sinkage]).all():
         return None
     none, found = weighed(problem, marginal)
     stage, probability = likeliest_stage(none, found)
@@ -87,7 +89,7 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
         {v: [one.value for one in own if one.variable == v] for v in {o.variable for o in own}}
     )
     told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
-    channels = _changed_channels(problem, marginal.fit, best)
+    channels = _changed_channels(problem, fit, best)
     return RemainderCause(stage, variable if told else "", channels, probability, gain)
 
 
@@ -200,10 +202,19 @@ def weighed(problem: FitProblem, marginal: MarginalFit) -> tuple[float, list[Hyp
     patterns = [best, np.zeros(count), AMPLITUDES[np.searchsorted(AMPLITUDES, 0.4 * best)]]
     alone = linearised(base, fit, None)
     none = min(float(alone.along(p, i).min()) for p in patterns for i in range(count))
+    whiten = base.noise_whitening
+    block = whiten @ np.column_stack([fit.derivatives, fit.measured - fit.prediction])
     found = []
     for one in hypotheses(problem, fit):
-        model = with_change(problem, one)
-        local = linearised(model, fit, None)
+        own = np.asarray(whiten @ one.columns)
+        between = base.columns.T @ own
+        gram = np.block([[alone.divisions.gram, between], [between.T, own.T @ own]])
+        number = np.append(base.process.channel, np.full(own.shape[1], count))
+        local = replace(
+            alone,
+            divisions=ProcessDivisions(gram, number),
+            cross=np.vstack([alone.cross, own.T @ block]),
+        )
         trials = []
         for p in patterns:
             values = local.along(np.append(p, 0.0), count)
@@ -239,17 +250,22 @@ def log_score(
     tests = fit.soil_tests.rates(fit.x)
     prior = np.diag(fit.precision + UNIFORM_PRECISION) + tests.T @ tests
     matrix = model.matrix(amplitude) + fit.derivatives @ np.linalg.solve(prior, fit.derivatives.T)
-    residual = problem.readings.measured - fit.prediction
+    precision = np.asarray(np.linalg.inv(matrix), np.float64)
+    weighted = precision @ (problem.readings.measured - fit.prediction)
     return {
-        name: sum(_density(matrix, residual, folds.fold == k) for k in folds.predicted)
+        name: sum(_density(precision, weighted, folds.fold == k) for k in folds.predicted)
         for name, folds in parts.items()
     }
 
 
-def _density(matrix: Floats, residual: Floats, out: NDArray[np.bool_]) -> float:
-    """Log density of the residuals that are kept back, given the others, up to a constant."""
-    rest = ~out
-    order = np.concatenate([np.flatnonzero(rest), np.flatnonzero(out)])
-    factor = np.linalg.cholesky(matrix[np.ix_(order, order)])
-    white = np.linalg.solve(factor, residual[order])[rest.sum() :]
-    return float(-0.5 * white @ white - np.log(np.diag(factor)[rest.sum() :]).sum())
+def _density(precision: Floats, weighted: Floats, out: NDArray[np.bool_]) -> float:
+    r"""Log density of the residuals that are kept back, given the others, up to a constant.
+
+    .. math:: -\tfrac12 (P r)_o^T P_{oo}^{-1} (P r)_o + \tfrac12 \ln |P_{oo}|
+
+    with the precision P of all residuals r: one inverse serves all folds. References: Rasmussen and
+    Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.12, for several readings.
+    """
+    factor = np.linalg.cholesky(precision[np.ix_(out, out)])
+    white = np.linalg.solve(factor, weighted[out])
+    return float(-0.5 * white @ white + np.log(np.diag(factor)).sum())

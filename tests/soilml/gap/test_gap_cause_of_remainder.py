@@ -5,16 +5,24 @@ from typing import Annotated, ClassVar
 
 import numpy as np
 import pytest
-from gap_sets import case_of, driven
+from gap_sets import case_of, driven, fit_problem
+from scipy.stats import multivariate_normal
 
 from soilml import Model, Track
 from soilml.arrays import namespace
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
+from soilml.gap.evidence.held_out import held_out_folds
 from soilml.gap.evidence.stage_changes import stage_changes
 from soilml.gap.report.remainder_cause import RemainderCause
-from soilml.gap.verdict.cause_of_remainder import SEVERAL, Hypothesis, likeliest_stage
+from soilml.gap.verdict.cause_of_remainder import (
+    SEVERAL,
+    Hypothesis,
+    likeliest_stage,
+    log_score,
+)
+from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.parameters import Parameter
 from soilml.physics.effects import Effect, EffectCard
 
@@ -145,3 +153,24 @@ def test_the_sentence_names_stage_dependence_and_channels():
     )
     slip = RemainderCause("slip or load", "progress", ("torque",), 0.95, 2.0)
     assert "a slip or load other than the stated one that depends on time." in str(slip.remark())
+
+
+def test_rows_kept_back_have_their_conditional_density():
+    """By one inverse of the whole covariance, as by that of the rows that are left."""
+    case = case_of()
+    problem = fit_problem(case, driven(case, [Cable(size=6.0)]))
+    fit = problem.fit_soil([np.full(len(problem.soil), 0.5)])
+    amplitude = np.asarray([1.0, 2.5, 0.4])
+    (name, folds), *_ = held_out_folds(problem.readings, 0).items()
+    found = log_score(problem, fit, problem.discrepancy, amplitude, {name: folds})[name]
+    prior = np.diag(fit.precision + UNIFORM_PRECISION)
+    matrix = problem.discrepancy.matrix(amplitude)
+    matrix = matrix + fit.derivatives @ np.linalg.inv(prior) @ fit.derivatives.T
+    residual, total = problem.readings.measured - fit.prediction, 0.0
+    for k in folds.predicted:
+        out = folds.fold == k
+        gain = matrix[np.ix_(out, ~out)] @ np.linalg.inv(matrix[np.ix_(~out, ~out)])
+        left = matrix[np.ix_(out, out)] - gain @ matrix[np.ix_(~out, out)]
+        density = multivariate_normal(gain @ residual[~out], left)
+        total += density.logpdf(residual[out]) + 0.5 * out.sum() * np.log(2.0 * np.pi)
+    assert found == pytest.approx(total, rel=1e-6)
