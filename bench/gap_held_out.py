@@ -73,7 +73,7 @@ def _shown(s: Judged) -> tuple[dict[str, tuple[float, float]], ...]:
 def _figure(name: str, values: np.ndarray, gate: str = "", of=np.median) -> Figure:  # type: ignore[no-untyped-def]
     if not len(values):
         return Figure(name, "-", gate)
-    found = float(of(values))
+    found = round(float(of(values)), 3)  # as shown; values of a model file are rounded too
     return Figure(
         name, f"{found:.3f} ({len(values)} sets)", gate, reaches(found, gate) if gate else None
     )
