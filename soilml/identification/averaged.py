@@ -24,15 +24,17 @@ from soilml.physics.effects.base import Effect
 
 #: Probability that model and sensors are as in the model file, but for declared errors: a model is
 #: never quite right.
-EXACT = 0.04
+EXACT = 0.06
 #: Probabilities of errors of all kinds together, by their scale over the typical ones.
-ERRORS = {0.1: 0.15, 0.25: 0.2, 0.5: 0.25, 1.0: 0.2, 2.0: 0.02}
+ERRORS = {0.1: 0.21, 0.25: 0.17, 0.5: 0.13, 1.0: 0.13, 2.0: 0.02}
 #: Probability that one effect of the catalogue is missing, by the scale of errors beside it, and
 #: the standard deviations of its size, in reference sizes, each as likely.
-EFFECT, SIZES = {0.0: 0.055, 0.25: 0.055}, (1.0, 3.0)
-#: Probability that a law of the soil is another one of its family: rows may not tell the two apart,
-#: but the soil by them. `LAWS` are the effects by which it is.
-LAW, LAWS = 0.03, ("shear-softening", "hyperbolic-shear", "curved-envelope")
+EFFECT, SIZES = {0.0: 0.1, 0.25: 0.1}, (1.0, 3.0)
+#: Probability that a law of the soil is a little different, by one of these effects, and the
+#: standard deviation of its size, in reference sizes. Rows hardly tell the laws of a family apart,
+#: and the soil differs by them.
+LAW, LAW_SIZE = 0.08, 0.4
+LAWS = ("shear-softening", "hyperbolic-shear", "curved-envelope")
 #: Power of the evidence: Laplace's approximation, and errors that are not all as described,
 #: overstate its differences.
 TEMPERING = 0.5
@@ -162,10 +164,10 @@ def _promising(
     signatures, _ = effect_signatures(optimum.fitted(), optimum.problem.readings, effects)
     for signature in signatures:
         about = effects[signature.name].about
-        for size in SIZES:
-            own = prior / (len(signatures) * len(SIZES))
-            if signature.name in LAWS and size == SIZES[0] and scale == 0.0:
-                own = LAW / len(LAWS)
+        sizes = dict.fromkeys(SIZES, prior / (len(signatures) * len(SIZES)))
+        if signature.name in LAWS and scale == 0.0:
+            sizes[LAW_SIZE] = LAW / len(LAWS)
+        for size, own in sizes.items():
             gain, expected = base.gain(signature.column, size, signature.sign)
             path = f"{signature.name}.{about.size}"
             start = optimum.values() | {path: expected * about.reference[about.size]}

@@ -10,7 +10,7 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.report import numbers
 from soilml.report.page import ReportTable
 
-#: What the two intervals of `identify` and `estimate` are called on a page.
+#: What the two intervals of `estimate` are called on a page.
 MODEL_EXACT, TYPICAL_ERRORS = "model taken as exact", "with typical errors of model and sensors"
 
 
@@ -84,7 +84,7 @@ def parameter_table(lines: Mapping[str, list[ParameterLine]], by: str | None) ->
     for name, own in lines.items():
         for line in own:
             left = "" if line.left is None else f"{100.0 * line.left:.0f} %"
-            value = line.value if line.known else f"not determined ({line.value})"
+            value = line.value if line.known else "not determined"
             rows.append([*([name] if by else []), line.name, value, line.ends, line.unit, left])
     header = ["parameter", "value ± std", "90 % interval", "unit", "left of prior"]
     return ReportTable("Parameters", [*([by] if by else []), *header], rows, 1 + bool(by))

@@ -141,7 +141,7 @@ def test_what_rows_do_not_determine_is_said_and_not_given_as_a_result(folder, ca
     text = Seen((folder / "found/report.html").read_text()).text
     assert "one load only: cohesion is not identified" in text.lower()
     assert "Cohesion c is not determined by these rows" in text and "Cohesion c =" not in text
-    assert text.count("not determined (") == 2 and "partly identified" in text
+    assert "not determined (" not in text and "partly identified" in text
 
 
 @pytest.mark.slow
