@@ -62,7 +62,7 @@ def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) ->
         normal = rng.standard_normal(rows + 1)
         table = _measured(case, truth, [first] * rows, normal[:rows])
         data = usable_readings(case, table)
-        belief = samples_of_rows(case, data, free, samples)
+        belief = samples_of_rows(case, data, free, samples, exact_model=True)
         best = advise(case, belief, candidate_grid(SLIPS, LOADS), channels=("torque",)).best()
         points = {
             "repeat": first,
@@ -178,7 +178,11 @@ def from_file(soils: int = SOILS, seed: int = 5) -> str:
         told = estimator(**readings)
         moments = samples_of_moments(free, estimator.names, told.mean, told.covariance)
         theirs = advise(case, moments, ranges, channels=("torque",)).best().candidate
-        exact = advise(case, samples_of_rows(case, usable_readings(case, table), free), ranges)
+        exact = advise(
+            case,
+            samples_of_rows(case, usable_readings(case, table), free, exact_model=True),
+            ranges,
+        )
         torque = exact.with_channels(("torque",))
         left["the file's"] += [c.overall for c in torque if c.candidate == theirs]
         left["the posterior's"].append(exact.best().overall)

@@ -89,7 +89,9 @@ def advice_after_estimate(
         free = select_free(case, None)
         if slip.size <= MAX_EXACT_ROWS:
             rows = Table({column(n): np.atleast_1d(readings[n]) for n in estimator.inputs})
-            samples = samples_of_rows(case, usable_readings(case, rows), free, QUICK_SAMPLES)
+            samples = samples_of_rows(
+                case, usable_readings(case, rows), free, QUICK_SAMPLES, exact_model=True
+            )
         else:
             samples = samples_of_moments(free, estimator.names, mean, covariance, QUICK_SAMPLES)
         advice = _quick(

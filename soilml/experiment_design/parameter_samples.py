@@ -15,7 +15,6 @@ from soilml.fitting.readings import Readings
 from soilml.identification.averaged_fit import soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, prior_fractions
-from soilml.identification.posterior_density import check_declared
 from soilml.numerics.maximum_entropy import prior_quantiles
 from soilml.numerics.resampling import latin_hypercube
 
@@ -74,7 +73,6 @@ def samples_of_rows(
     Raises `FitError` as `identify` does, and where noise is not declared.
     """
     if found is None:
-        check_declared(readings)
         found = soil_samples(case, condensed(case, readings, free), free, exact_model)
     index, multiplicity = np.unique(found.equally_weighted(count), return_counts=True)
     weights = multiplicity / multiplicity.sum()

@@ -18,6 +18,7 @@ from soilml.identification.posterior import (
     posterior,
     posterior_samples,
 )
+from soilml.identification.posterior_density import check_declared
 from soilml.remarks import Remark
 
 
@@ -87,8 +88,9 @@ def soil_samples(
     """Samples of the soil over all explanations of the rows, as `averaged` takes them.
 
     With `exact_model`, and where the case states the error of its model, those of the exact
-    posterior. Raises `FitError` as `averaged`, or as the posterior method does.
+    posterior. Raises `FitError` as `averaged`, and where noise is not declared.
     """
+    check_declared(readings)
     if exact_model or case.discrepancy or case.remainder is not None:
         return posterior_samples(case, readings, free)
     return averaged_samples(case, readings, free)

@@ -58,7 +58,7 @@ def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
     ]  # fmt: skip
     by = {r["row"]: r for r in rows}
     assert (by["best repeat"]["slip"], by["best repeat"]["load_N"]) == ("0.2", "60")
-    assert float(by["best for cohesion"]["cohesion_left"]) < 0.6
+    assert float(by["best for cohesion"]["cohesion_left"]) < 0.7
     assert float(by["best repeat"]["cohesion_left"]) > 0.9
     assert float(by["row 2 of 2"]["all_left"]) < float(by["row 1 of 2"]["all_left"])
 
@@ -124,7 +124,9 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     said = capsys.readouterr().out
     assert "cohesion: not identified by these rows, 99% of the prior's width remains" in said
     assert "Most informative next: slip" in said
-    assert main([*command[:3], "--out", "o.json"]) == 0  # least squares: no samples, no advice
+    assert (
+        main([*command[:3], "--method", "nonlinear", "--out", "o.json"]) == 0
+    )  # least squares: no samples, no advice
     assert "identified" not in json.loads((folder / "o.json").read_text())
     capsys.readouterr()
     assert main([*command, "--by", "run"]) == 0

@@ -164,7 +164,7 @@ def test_runs_of_any_name_are_drawn_without_a_warning(folder, name, capsys):
     (page,) = (folder / "page").glob("*.html")
     images = re.findall(r"svg\+xml;base64,([\w+/=]+)", page.read_text(encoding="utf-8"))
     shown = html.unescape(b64decode(images[0]).decode())
-    assert f"run {name}, with" in shown or f"run {name[:16]}…" in shown
+    assert f"run {name}, exact" in shown or f"run {name[:16]}…" in shown
 
 
 def drawn_apart(folder, settings):

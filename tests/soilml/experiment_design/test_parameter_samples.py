@@ -57,7 +57,7 @@ def test_samples_of_rows_are_as_wide_and_as_correlated_as_the_posterior(model_fi
     table = rows(case, np.asarray([0.1, 0.5, 0.5]), np.asarray([60.0, 60.0, 110.0]))
     free = select_free(case, None)
     fit = identify(case, table, None, "posterior")
-    posterior = samples_of_rows(case, usable_readings(case, table), free)
+    posterior = samples_of_rows(case, usable_readings(case, table), free, exact_model=True)
     from_moments = samples_of_moments(free, fit.names, fit.values, fit.covariance)
     for found in (posterior, from_moments):
         np.testing.assert_allclose(
