@@ -28,7 +28,7 @@ from soilml.quantities import SHEAR, column
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Soils of each line, and the seed; half of the sets has the first number of rows, half the second.
-SETS, SEED, ROWS = 20, 8, (16, 48)
+SETS, SEED, ROWS = 10, 8, (16, 48)
 CHANNELS = {"torque": ("torque",), "all channels": ("torque", "sinkage", "drawbar_pull")}
 #: Width of the central 90 % of a uniform prior, in its standard deviations.
 PRIOR_WIDTH = 0.9 * np.sqrt(12.0)

@@ -20,13 +20,14 @@ def run() -> None:
         sys.exit("set SOILML_DATA to the folder that holds kls1_rashid1/single_wheel_tests.csv")
     Path("demo").mkdir(exist_ok=True)
     model, smooth = str(HERE / "model.toml"), ["--where", "run=kls1_smooth_w59"]
+    fit = [*smooth, "--method", "nonlinear"]
     sinking, published = str(HERE / "model_slip_sinkage.toml"), "demo/kls1_published.json"
     released = "exported/kls1_wheel.onnx"
     for command in (
         ["simulate", model, "--slip", "0.1:0.5:5", "--load", "58.86"],
-        ["identify", model, str(runs), *smooth, "--out", "demo/kls1.json"],
-        ["identify", model, str(runs), *smooth, "--free", "shear_modulus,kphi", "--out", published],
-        ["identify", sinking, str(runs), *smooth, "--out", "demo/kls1_slip_sinkage.json"],
+        ["identify", model, str(runs), *fit, "--out", "demo/kls1.json"],
+        ["identify", model, str(runs), *fit, "--free", "shear_modulus,kphi", "--out", published],
+        ["identify", sinking, str(runs), *fit, "--out", "demo/kls1_slip_sinkage.json"],
         ["estimate", released, str(runs), *smooth],
         ["estimate", released, str(runs), *smooth, "--by", "run"],
     ):

@@ -26,7 +26,7 @@ from soilml.physics.effects.base import Effect
 #: never quite right.
 EXACT = 0.06
 #: Probabilities of errors of all kinds together, by their scale over the typical ones.
-ERRORS = {0.1: 0.21, 0.25: 0.17, 0.5: 0.13, 1.0: 0.13, 2.0: 0.02}
+ERRORS = {0.1: 0.14, 0.25: 0.14, 0.5: 0.16, 1.0: 0.2, 2.0: 0.02}
 #: Probability that one effect of the catalogue is missing, by the scale of errors beside it, and
 #: the standard deviations of its size, in reference sizes, each as likely.
 EFFECT, SIZES = {0.0: 0.1, 0.25: 0.1}, (1.0, 3.0)
