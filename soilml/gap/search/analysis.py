@@ -44,7 +44,7 @@ from soilml.remarks import Remark
 #: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
 MAX_PASSES = 2
 #: Searches at most, each without the readings that strayed from the explanation of the last.
-OUTLIER_ROUNDS = 3
+OUTLIER_ROUNDS = 4
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the
