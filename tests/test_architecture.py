@@ -22,6 +22,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/fitting/scipy_descents.py": {"scipy"},
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},
+    "soilml/gap/workflow.py": {"threadpoolctl"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/evidence/repeats.py": {"scipy"},

@@ -160,6 +160,10 @@ def bounded_step(
 
     References: Nocedal and Wright, Numerical Optimization, 2006, section 16.5 (active sets).
     """
+    if free.all():  # most steps meet no bound
+        step = np.linalg.solve(normal, descent)
+        if ((step >= low) & (step <= high)).all():
+            return np.asarray(step)
     step, free = np.zeros(len(descent)), free.copy()
     while free.any():
         index = np.flatnonzero(free)

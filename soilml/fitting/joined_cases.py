@@ -36,7 +36,7 @@ class CaseSets:
 
 
 #: So few rows are solved in one call whatever the stresses: a call costs more than the rows.
-FEW_ROWS = 500
+FEW_ROWS = 1000
 
 
 def join_keys(parts: Sequence[CaseSets]) -> list[Hashable]:

@@ -97,6 +97,8 @@ from soilml.remarks import Remark
 #: Readings that an analysis may have. Its matrices are of this size squared, and many are held at
 #: a time: 1.1 GB in all.
 MOST_READINGS = 3600
+#: Readings up to which their matrices are so small that several threads only wait for each other.
+ONE_THREAD = 1000
 
 
 @solvable("the gap analysis")
@@ -198,17 +200,19 @@ def gap(
         return _bad_data_report(case, errors, checks.notes, seed)
     checks = replace(checks, notes=(*notes, *excluded_rows, *checks.notes))
 
-    place = split.analysed.place
-    analysis = analyse(
-        case,
-        soil,
-        readings,
-        effects=effects,
-        calibration=checked_sensors(case.bias) | dict(calibration or {}),
-        seed=seed,
-        place=place,
-        progress=progress or (lambda _: None),
-    )
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1 if len(readings) <= ONE_THREAD else None):
+        analysis = analyse(
+            case,
+            soil,
+            readings,
+            effects=effects,
+            calibration=checked_sensors(case.bias) | dict(calibration or {}),
+            seed=seed,
+            place=split.analysed.place,
+            progress=progress or (lambda _: None),
+        )
     if analysis.error:
         return _bad_data_report(case, (analysis.error,), checks.notes, seed)
     held_out = None
