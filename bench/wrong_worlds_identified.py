@@ -115,9 +115,9 @@ def _notes(found: Sequence[AnswerScores], columns: int) -> list[str]:
         own = found[2 * k + columns :: columns]
         quiet = np.concatenate([answer.covered[answer.flagged == 0.0] for answer in own])
         texts.append(
-            f"{name}: on sound sets the averaged interval is {ratio:.2f} times as wide as that of "
-            f"exact_model; in the other worlds it covers {100 * quiet.mean():.0f} % where nothing "
-            "is flagged."
+            f"With {name}, the averaged interval is {ratio:.2f} times as wide as that of "
+            "exact_model on sound sets. In the other worlds it covers "
+            f"{100 * quiet.mean():.0f} % where nothing is flagged."
         )
     return texts
 
