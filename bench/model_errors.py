@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from benchmarks_file import ROOT
 from wrong_worlds import (
+    LAW_WORLDS,
     NOISE_OF_LOAD,
     NOISE_OF_SLIP,
     WORLDS,
@@ -45,8 +46,8 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 SETS, ROWS, SEED = 100, 16, 1
 #: Sensors that are exact, as files took them before they knew of errors, and a right model.
 EXACT = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
-#: A model with its usual errors, beside those of the sensors.
-USUAL_MODEL = {MODEL_ERROR_INPUT: 1.0}
+#: A model that is right, and one with its usual errors, beside those of the sensors.
+RIGHT_MODEL, USUAL_MODEL = {MODEL_ERROR_INPUT: 0.0}, {MODEL_ERROR_INPUT: 1.0}
 #: Specs of files that pool the readings of a set as Gaussians.
 POOLED = ("linear", "mlp", "lssvm")
 #: Rows that those of the worlds are trained on.
@@ -111,28 +112,45 @@ def with_prior(estimates: Sequence[Estimate], estimator: Estimator) -> list[Esti
 
 
 def lines_of(estimator: Estimator, world: World, channels: Sequence[str]) -> tuple[Scores, ...]:
-    """Scores with exact sensors and the prior for refused sets, and of the file's two answers."""
+    """Scores with the model right, with its usual errors, and of the file's own answer.
+
+    Before them those with exact sensors and the prior for refused sets.
+    """
     drives = simulate(world, SETS, ROWS, SEED)
     before = with_prior(answers(estimator.on(**EXACT), drives, channels, None), estimator)
-    right = answers(estimator, drives, channels, world)
-    usual = answers(estimator.on(**USUAL_MODEL), drives, channels, world)
-    return tuple(Scores.of(found, drives.truth) for found in (before, right, usual))
+    right, usual, own = (
+        answers(given, drives, channels, world)
+        for given in (estimator.on(**RIGHT_MODEL), estimator.on(**USUAL_MODEL), estimator)
+    )
+    return tuple(Scores.of(found, drives.truth) for found in (before, right, usual, own))
 
 
 def coverage_table(estimator: Estimator, worlds: Sequence[World], channels: Sequence[str]) -> str:
     """A line for each world: coverage, refusals, interval score."""
     lines = [
         "| what is wrong | exact sensors: refused | 90 % of c, phi, K | score | typical errors "
-        "of sensors: refused | 90 % | score | and of the model: refused | 90 % | score |",
-        "|---|---:|---|---:|---:|---|---:|---:|---|---:|",
+        "of sensors: refused | 90 % | score | model_error 1: refused | 90 % | score | "
+        "inferred: refused | 90 % | score |",
+        "|---|" + "---:|---|---:|" * 4,
     ]
+    totals = []
     for world in worlds:
-        cells = []
-        for scores in lines_of(estimator, world, channels):
-            covered = " / ".join(f"{100 * share:.0f}" for share in scores.covered.mean(axis=0))
-            cells.append(f"{scores.refused.mean():.0%} | {covered} | {scores.score.mean():.2f}")
-        lines.append(f"| {world.name} | {' | '.join(cells)} |")
+        found = lines_of(estimator, world, channels)
+        totals.append([(s.refused.mean(), s.covered.mean(axis=0), s.score.mean()) for s in found])
+        lines.append(f"| {world.name} | {' | '.join(map(_cells, totals[-1]))} |")
+    means = [
+        tuple(np.mean(part, axis=0) for part in zip(*one, strict=True))
+        for one in zip(*totals, strict=True)
+    ]
+    lines.append(f"| **mean** | {' | '.join(map(_cells, means))} |")
     return "\n".join(lines)
+
+
+def _cells(found: tuple[Any, ...]) -> str:
+    """Refused sets, coverage and score of one answer."""
+    refused, covered, score = found
+    held = " / ".join(f"{100 * share:.0f}" for share in covered)
+    return f"{refused:.0%} | {held} | {score:.2f}"
 
 
 def pooled_table(folder: Path, worlds: Sequence[World] | None = None) -> str:
@@ -213,10 +231,12 @@ def price_table(estimator: Estimator) -> str:
     drives = simulate(WORLDS[0], SETS, ROWS, SEED)
     lines = ["| what may be wrong | torque: c, phi, K | all channels: c, phi, K |", "|---|---|---|"]
     usual = dict(estimator.sets.common_errors) if estimator.sets else {}
-    cases = {f"{name} {std:g}": EXACT | {name: std} for name, std in usual.items() if std}
-    cases |= {"all errors of sensors": usual}
+    sensors = {name: std for name, std in usual.items() if name != MODEL_ERROR_INPUT}
+    cases = {f"{name} {std:g}": EXACT | {name: std} for name, std in sensors.items() if std}
+    cases |= {"all errors of sensors": usual | RIGHT_MODEL}
     for size in (0.5, 1.0):
         cases[f"and model_error {size:g}"] = usual | {MODEL_ERROR_INPUT: size}
+    cases["and errors of the model whose size is inferred"] = usual
     known = {c: _widths(estimator.on(**EXACT), drives, CHANNELS[c]) for c in CHANNELS}
     for name, errors in cases.items():
         given = estimator.on(**errors)
@@ -252,9 +272,9 @@ def tables(folder: Path, file: Path = ROOT / "exported" / "wheel.onnx") -> str:
     for label, channels in CHANNELS.items():
         parts += [
             f"### Coverage and interval score, {label}",
-            coverage_table(estimator, WORLDS, channels),
-            f"### Refused sets, {label}",
-            refused_table(estimator, WORLDS[1:], channels),
+            coverage_table(estimator, (*WORLDS, *LAW_WORLDS), channels),
+            f"### Refused sets of a model that is taken as right, {label}",
+            refused_table(estimator.on(**RIGHT_MODEL), WORLDS[1:], channels),
         ]
     parts += [
         "### Noise of slip and load that is declared, torque",

@@ -142,11 +142,12 @@ PARTS = (
         f"`wheel.onnx` on {model_errors.SETS} soils a line, {model_errors.ROWS} rows each at three "
         "loads, 2 % torque noise (`python bench/model_errors.py`). Sets are simulated by the "
         "reference wheel of blind sets, which shares no code with `soilml`. First comes the "
-        "file with exact sensors and the prior for refused sets. Its two answers follow: with "
-        "typical errors of the sensors and an exact model, and with typical errors of the model "
-        "as well (`model_error` 1). Score: mean of the "
-        "interval score over parameters and sets, in standard deviations of the prior; the prior "
-        "has about 3.3. Last table: the averaged answer of `identify` and its `exact_model`, on "
+        "file with exact sensors and the prior for refused sets. Answers with typical errors of "
+        "the sensors follow: with an exact model (`model_error` 0), with typical errors of the "
+        "model (`model_error` 1), and the file's own answer, which infers their size. "
+        "Score: mean of the interval score over parameters and sets, in standard deviations of "
+        "the prior; the prior has about 3.3. Last table: the averaged answer "
+        "of `identify` and its `exact_model`, on "
         f"{wrong_worlds_identified.SETS} sets made in the same way.",
         lambda folder: f"{model_errors.tables(folder)}\n\n{wrong_worlds_identified.section()}",
     ),

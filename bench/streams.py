@@ -150,7 +150,7 @@ def _line(name: str, tally: Tally) -> str:
 def table(file: Path, days: int = DAYS) -> str:
     """The table of its page."""
     noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
-    estimator = Estimator.load(file).on(noise=noise)
+    estimator = Estimator.load(file).on(noise=noise, model_error=0.0)
     usual = estimator.on(model_error=1.0)
     edges = ("below 10 %", "10 to 20 %", "above 20 %")
     heads = (

@@ -1,6 +1,7 @@
 """Train the released models again: `make models`, or `python exported/make.py NAME ...`.
 
-The same tree on the same machine and library versions gives the same bytes.
+The same tree on the same machine and library versions gives the same bytes. With `--graphs`, only
+the graphs of set posteriors are written anew, around the response of the wheel that each file has.
 """
 
 from __future__ import annotations
@@ -34,6 +35,19 @@ RELEASED = {
 SIMULATED = {"any_wheel": "any_wheel"}
 
 
+#: Released files with a set posterior.
+WITH_SETS = ("wheel", "kls1_wheel", "any_wheel")
+
+
+def write_graphs(names: Sequence[str]) -> None:
+    """Write the set posteriors of all files, or of those named, around the response they have."""
+    from training.export.stored_response import write_anew
+
+    for name in names or WITH_SETS:
+        print(f"{name}.onnx", flush=True)
+        write_anew(HERE / f"{name}.onnx")
+
+
 def run(names: Sequence[str]) -> None:
     """Generate each recipe's data once, and train every spec on it; all files, or those named."""
     if unknown := set(names) - {*RELEASED, *SIMULATED}:
@@ -62,4 +76,7 @@ def _run_command(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    run(sys.argv[1:])
+    if sys.argv[1:2] == ["--graphs"]:
+        write_graphs(sys.argv[2:])
+    else:
+        run(sys.argv[1:])

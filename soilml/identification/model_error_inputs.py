@@ -13,8 +13,22 @@ from soilml.config.measurement_noise import Discrepancy, range_with_zero
 from soilml.config.remainder import Remainder
 from soilml.numerics.smooth_process import independent_bound, process_columns, slip_load_points
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
+
+
+def with_exact_model(estimator: Estimator) -> Estimator:
+    """The estimator with a model that has no errors, where it would infer their size."""
+    if estimator.sets is None or estimator.sets.common_errors.get(MODEL_ERROR_INPUT) != INFERRED:
+        return estimator
+    return estimator.on(model_error=0.0)
+
+
+def with_stated_model_error(estimator: Estimator, case: Case) -> Estimator:
+    """The estimator for a case: one that states the errors of its model has no others."""
+    stated = bool(case.discrepancy) or case.remainder is not None
+    return with_exact_model(estimator) if stated else estimator
 
 
 def readings_with_model_error(

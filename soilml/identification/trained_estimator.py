@@ -22,12 +22,22 @@ from soilml.config.compatibility import (
 )
 from soilml.config.measurement_noise import common_errors
 from soilml.errors import InputError, TableError
+from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS
 from soilml.identification.fit import ignored_soil_tests
-from soilml.identification.model_error_inputs import model_error_remarks
+from soilml.identification.model_error_inputs import (
+    model_error_remarks,
+    with_exact_model,
+    with_stated_model_error,
+)
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, OPERATING_NOISE
+from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    INFERRED,
+    MODEL_ERROR_INPUT,
+    OPERATING_NOISE,
+)
 from soilml.parameters import declared
 from soilml.physics.gears import Wheel
 from soilml.physics.soils import Soil
@@ -73,8 +83,16 @@ def condition_on_case(estimator: Estimator, case: Case) -> tuple[Estimator, list
             raise InputError(f"{name} has no prior; give its range in [soil.prior]")
         upper_bounds[f"{name}_max"] = own.upper
     bearing = float(soil.kc) / float(gear.width) + float(soil.kphi)
-    bearing_std = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
     widest = estimator.sets.context_ranges["bearing_std"][1] if estimator.sets else 0.0
+    bearing_std = _log_std(prior["kphi"], bearing) if "kphi" in prior else 0.0
+    infers = estimator.sets and estimator.sets.common_errors.get(MODEL_ERROR_INPUT) == INFERRED
+    if infers and "kphi" not in prior:
+        bearing_std = USUAL_MODEL_ERRORS["bearing"]
+        text = (
+            f"kphi has no prior: its logarithm is taken to be off by {bearing_std:g}, as is usual; "
+            "give its prior, or --exact-model where it is known"
+        )
+        warnings.append(Remark("bearing-assumed", text, ("kphi",), "note"))
     if bearing_std > widest:
         text = (
             f"the prior of kphi has a standard deviation of a factor {math.exp(bearing_std):.2g}, "
@@ -119,7 +137,7 @@ def for_simulated_case(estimator: Estimator, case: Case) -> Estimator:
     exact: dict[str, Any] = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
     if not estimator.sets.missing_context:
         return estimator.on(**exact)
-    conditioned = condition_on_case(estimator, case)[0]
+    conditioned = condition_on_case(with_exact_model(estimator), case)[0]
     return conditioned.on(noise={"torque_bias": (0.0, 0.0)}, **exact)
 
 
@@ -188,7 +206,8 @@ def estimators_for_case(
     effects of the case are not those of a file.
     """
     given, remarks = [], []
-    for estimator in estimators:
+    for loaded in estimators:
+        estimator = loaded if case is None else with_stated_model_error(loaded, case)
         if estimator.sets is not None and estimator.sets.missing_context:
             if case is None:
                 raise InputError(

@@ -42,7 +42,7 @@ class Reason(IntEnum):
 
 _WORDS = {
     Reason.ESTIMATED: "estimated from the readings",
-    Reason.OUT_OF_RANGE: "the readings, or more than a tenth of the rows, are out of range",
+    Reason.OUT_OF_RANGE: "the readings, or too many of the rows, are out of range",
     Reason.INCONSISTENT: "no soil of the prior explains all rows",
     Reason.NO_INFORMATION: "no reading has so little noise that it is used",
     Reason.CONTRADICTORY: "the files contradict each other",

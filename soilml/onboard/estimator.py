@@ -166,10 +166,10 @@ class Estimator:
 
         Uses the set posterior where the file has one. Other files pool their estimates of single
         rows as Gaussians, which is far less certain than the joint likelihood of many rows. Rows
-        that repeat another in every reading count once. Rows out of range are left out, up to a
-        tenth of them; where there are more, `in_range` is false and the estimate is the prior. It
-        is false also where no soil of the prior is consistent with all rows; the estimate is then
-        widened.
+        that repeat another in every reading count once. Rows out of range are set aside
+        (`rows_set_aside`); where they are more than half of the rows, `in_range` is false and the
+        estimate is the prior. It is false also where no soil of the prior is consistent with all
+        rows; the estimate is then widened.
 
         Parameters
         ----------
@@ -273,8 +273,10 @@ class Estimator:
 
     def _set_estimate(self, rows: Mapping[str, Floats], memory: Memory) -> tuple[Estimate, Memory]:
         """Estimate and memory after these rows (m,)."""
-        found, memory = self._configured_sets.update(self.session, rows, memory)
-        return estimate_of_set(self.names, self.units, self.prior, found, memory), memory
+        sets = self._configured_sets
+        found, memory = sets.update(self.session, rows, memory)
+        head = self.names, self.units, self.prior
+        return estimate_of_set(*head, found, memory, sets.least_share_in_range), memory
 
     def __deepcopy__(self, memo: object = None) -> Estimator:
         """The estimator itself, which nothing changes."""

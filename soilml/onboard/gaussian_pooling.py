@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import READABLE
 from soilml.onboard.held_out_errors import HeldOutErrors
-from soilml.onboard.set_contract import Floats
+from soilml.onboard.set_contract import LEAST_SHARE_IN_RANGE, Floats
 
 #: Least ratio of a row's standard deviation to the prior's, along any direction.
 LEAST_STD_RATIO = 1e-3
@@ -25,8 +25,6 @@ LEAST_STD_RATIO = 1e-3
 BINS = 50
 #: Information, relative to the prior's, below which a row cannot disagree with the pooled mean.
 LEAST_INFORMATION = 0.05
-#: A run of which a smaller share of rows lies in the training domain is not estimated.
-LEAST_SHARE_IN_RANGE = 0.9
 
 #: Metadata key of each array of `RunConditions`, and of `RunPattern`.
 CONDITION_KEYS = {"lower": "lower", "upper": "upper", "std": "std"}
@@ -254,7 +252,7 @@ def pool_run(
     measured (m,): The readings, among them the operating conditions of the calibration.
     calibration: Calibration from held-out runs.
 
-    Returns: The prior, with the reason, where more than a tenth of the rows are out of range, or
+    Returns: The prior, with the reason, where more than half of the rows are out of range, or
     where the rows are less consistent with each other than rows of one soil hardly ever are.
     """
     valid = single.in_range

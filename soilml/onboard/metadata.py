@@ -17,6 +17,7 @@ import numpy as np
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.features import READABLE
 from soilml.onboard.gaussian_pooling import read_pooling
+from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import QUANTITIES
 
@@ -108,7 +109,9 @@ def _check_prior(outputs: list[dict[str, Any]]) -> None:
 
 
 def _check_set(sets: SetPosterior) -> None:
-    parts = [*sets.noise.values(), *((size, 0.0) for size in sets.common_errors.values())]
+    errors = sets.common_errors.items()
+    sizes = [size for name, size in errors if (name, size) != (MODEL_ERROR_INPUT, INFERRED)]
+    parts = [*sets.noise.values(), *((size, 0.0) for size in sizes)]
     if not all(math.isfinite(part) and part >= 0.0 for pair in parts for part in pair):
         raise ValueError("set: noise or an error that is no number, zero or more")
     ranges = sets.context_ranges.items()

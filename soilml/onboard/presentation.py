@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,21 +14,14 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.parameter_lines import (
-    MODEL_EXACT,
-    TYPICAL_ERRORS,
-    parameter_lines,
-    parameter_table,
-)
+from soilml.report.parameter_lines import parameter_lines, parameter_table
 from soilml.report.terminal import shown_unit, significant
 
-TYPICAL = "usual"  # Ending of the columns of the estimate with typical model errors
 #: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
 MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
 #: Runs with the same remark have a line each up to this number, and one together beyond it.
@@ -131,20 +124,26 @@ def refusal_remarks(
     rows: NDArray[np.int64],
     estimate: Estimate,
 ) -> list[Remark]:
-    """Why runs (n,) are not in range, and what their estimate is then.
+    """Why runs (n,) are not in range, and what their estimate is then; rows that were set aside.
 
     `outside` and `rows` are the rows out of range, and all rows, of each.
     """
     found = []
-    for i in map(int, np.flatnonzero(~estimate.in_range)):
-        reason, what = Reason(int(estimate.reason[i])), "the estimate is the prior"
-        why = reason.words
+    for i, name in enumerate(names):
+        reason, aside = Reason(int(estimate.reason[i])), bool(outside[i])
+        of_rows = f"{outside[i]} of {rows[i]} rows are out of range"
+        if reason == Reason.ESTIMATED and aside:
+            text = f"{of_rows}; they are set aside, and the estimate is that of the others"
+            found.append((name, Remark("rows-set-aside", text, severity="note")))
+        if reason == Reason.ESTIMATED:
+            continue
+        why, what = reason.words, "the estimate is the prior"
         if reason == Reason.OUT_OF_RANGE:
-            why = f"{outside[i]} of {rows[i]} rows are out of range"
+            why = of_rows
         if reason == Reason.INCONSISTENT:
             what = "the estimate is widened as far as the misfit says"
         code = reason.name.lower().replace("_", "-")
-        found.append((names[i], Remark(code, f"{why}; {what}")))
+        found.append((name, Remark(code, f"{why}; {what}")))
     return remarks_on_runs(by, found)
 
 
@@ -162,54 +161,6 @@ def remarks_on_runs(by: str, found: Sequence[tuple[Any, Remark]]) -> list[Remark
             replace(remark.under(f"{by} {head}: "), about=about) for head, about in heads.items()
         ]
     return remarks
-
-
-def typical_columns(estimate: Estimate) -> dict[str, NDArray[Any]]:
-    """Columns (runs,) of the estimate with typical model errors: `cohesion_Pa_usual_std`, ..."""
-    columns: dict[str, NDArray[Any]] = {}
-    for key, values in estimate_columns(estimate).items():
-        name, dash, part = key.rpartition("_")
-        statistic = part in ("std", "p05", "p95")
-        columns[f"{name}_{TYPICAL}{dash}{part}" if statistic else f"{key}_{TYPICAL}"] = values
-    columns[f"in_range_{TYPICAL}"] = estimate.in_range.astype(float)
-    return columns
-
-
-def is_typical_column(name: str) -> bool:
-    """Whether a column is one of `typical_columns`."""
-    return name.endswith((f"_{TYPICAL}", *(f"_{TYPICAL}_{part}" for part in ("std", "p05", "p95"))))
-
-
-def typical_remarks(
-    by: str, names: Sequence[Any], exact: Estimate, typical: Estimate
-) -> list[Remark]:
-    """What the two intervals are, how they differ, and which one to use."""
-    text = (
-        f"two intervals: columns without _{TYPICAL} take the model of wheel and soil as exact; "
-        f"columns with _{TYPICAL} include typical model errors, in the bearing of the soil, its "
-        "contact behind the axle, sinkage and drawbar pull"
-    )
-    remarks = [Remark("two-intervals", text, severity="note")]
-    both = exact.in_range & typical.in_range
-    if both.any():
-        ratio = np.median(typical.std[both] / exact.std[both], axis=0)
-        widths = ", ".join(
-            f"{_words(name)} {value:.1f}" for name, value in zip(exact.names, ratio, strict=True)
-        )
-        text = (
-            f"use the intervals that include model errors (_{TYPICAL}), unless this model was "
-            f"verified on a known soil; they are wider by factors of {widths}"
-        )
-        remarks.append(Remark("use-typical-errors", text, exact.names))
-    found = []
-    for i in map(int, np.flatnonzero(exact.reason == Reason.INCONSISTENT)):
-        code, rest = "no-interval-explains", "nor does it with typical errors; use neither interval"
-        if typical.in_range[i]:
-            code = "use-typical-errors"
-            rest = f"with typical errors it does; use the columns with _{TYPICAL}"
-        text = f"the model taken as exact does not explain the rows, {rest}"
-        found.append((names[i], Remark(code, text)))
-    return remarks + remarks_on_runs(by, found)
 
 
 def check_size(rows: int) -> None:
@@ -231,15 +182,12 @@ def estimate_report(
     """The page of estimates in columns (n,): model file and table that they are of."""
     names, units, prior = estimator.names, estimator.units, estimator.prior
     group = by or "row"
-    answers = [_answer(columns, names, by, "")]
-    if f"in_range_{TYPICAL}" in columns:
-        answers.insert(0, _answer(columns, names, by, f"_{TYPICAL}"))
-    labels = np.concatenate([a.labels for a in answers])
     values, std, low, high = (
-        np.concatenate([getattr(a, key) for a in answers])
-        for key in ("values", "std", "low", "high")
+        np.stack([np.asarray(columns[column(n) + part], float) for n in names], axis=1)
+        for part in ("", "_std", "_p05", "_p95")
     )
-    inside = np.concatenate([a.inside for a in answers])
+    labels = np.asarray(columns[by] if by else np.arange(1, len(values) + 1)).astype(np.str_)
+    inside = np.nan_to_num(np.asarray(columns["in_range"], float)) > 0.5
     answered = np.isfinite(values).any(axis=1)
     lines = {
         str(labels[i]): parameter_lines(
@@ -309,32 +257,6 @@ def estimate_report(
             ),
             ("left of prior", "width of the estimate over that of the prior."),
         ],
-    )
-
-
-@dataclass(frozen=True)
-class _Answer:
-    labels: NDArray[np.str_]
-    values: Floats
-    std: Floats
-    low: Floats
-    high: Floats
-    inside: NDArray[np.bool_]
-
-
-def _answer(columns: Mapping[str, Any], names: Sequence[str], by: str | None, end: str) -> _Answer:
-    """Estimates (n, q) of the columns that end so: `_usual` for those with typical errors."""
-    values, std, low, high = (
-        np.stack([np.asarray(columns[column(n) + end + part], float) for n in names], axis=1)
-        for part in ("", "_std", "_p05", "_p95")
-    )
-    own = columns[by] if by else np.arange(1, len(values) + 1)
-    said = {"": "" if f"in_range_{TYPICAL}" not in columns else f", {MODEL_EXACT}"}
-    text = said.get(end, f", {TYPICAL_ERRORS}")
-    labels = np.asarray([f"{name}{text}" for name in own], dtype=np.str_)
-    inside = np.nan_to_num(np.asarray(columns[f"in_range{end}"], float)) > 0.5
-    return _Answer(
-        labels=labels, values=values, std=std, low=low, high=high, inside=np.asarray(inside)
     )
 
 

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]  # the board does without soilml.arrays
 
 #: Version of what a caller of the graph may feed and reads, in the metadata as `soilml_interface`;
 #: files without that entry have version 1. docs/onnx-interface.md lists the changes.
-INTERFACE = "4"
+INTERFACE = "5"
 
 #: Readings that every row must have, and readings that a row may lack.
 REQUIRED_READINGS = ("slip", "torque", "load")
@@ -34,9 +34,11 @@ OPERATING_NOISE = ("slip", "load")  # Names under which that noise is declared
 #: Standard deviations of errors of the sensors that all rows of a set share: offset of slip,
 #: relative errors of load and torque, offsets of sinkage and drawbar pull.
 SENSOR_ERROR_INPUTS = ("slip_bias", "load_gain", "torque_gain", "sinkage_bias", "drawbar_pull_bias")
-#: Size of the errors of the model, as a multiple of their usual size; 0: the model is right. Files
-#: of interface 2 and earlier lack it.
+#: Size of the errors of the model, as a multiple of their usual size; 0: the model is right; below
+#: zero, which is the default: inferred from the readings. Files of interface 2 and earlier lack it;
+#: those of interfaces 3 and 4 infer nothing.
 MODEL_ERROR_INPUT = "model_error"
+INFERRED = -1.0
 COMMON_ERROR_INPUTS = (*SENSOR_ERROR_INPUTS, MODEL_ERROR_INPUT)  # All errors that a set shares
 #: Errors of the sensors that all rows share, in the order of their columns of the residual system,
 #: after those of the monomials. Files without `COMMON_ERROR_INPUTS` have the first only.
@@ -48,6 +50,10 @@ SENSOR_ERROR_COLUMNS = (
     "slip_bias",
     "load_gain",
 )
+#: Errors of the laws of the soil, the last columns, which files of interface 4 lack: logarithm of
+#: the strength, its change with the logarithm of load, and logarithm of the shear modulus. No
+#: reading tells them from other values of the parameters.
+LAW_ERROR_COLUMNS = ("strength", "strength_by_load", "shear_modulus")
 #: Errors of the model, in the order of their columns, after those of the sensors: logarithm of the
 #: bearing modulus, its changes with slip and with the logarithm of load, contact behind the axle
 #: as a multiple of `exit-angle` at its usual size, logarithm of sinkage, drawbar pull over load;
@@ -63,6 +69,7 @@ MODEL_ERROR_COLUMNS = (
     "torque_by_slip",
     "sinkage_by_slip",
     "drawbar_pull_by_slip",
+    *LAW_ERROR_COLUMNS,
 )
 ERROR_COLUMNS = (*SENSOR_ERROR_COLUMNS, *MODEL_ERROR_COLUMNS)  # All columns of errors
 #: Channels in the order in which a response surface predicts them.
@@ -90,6 +97,9 @@ ABSENT_STD = 1e6
 #: standard deviation is that of the file's noise. They are the defaults of the inputs.
 NOT_MEASURED = -1e30
 NOISE_OF_FILE = -1.0
+#: A set is estimated if at least this share of its rows is in range; the others are set aside.
+#: Files of interface 4 and earlier, whose metadata do not state it, refuse more sets.
+LEAST_SHARE_IN_RANGE, FORMER_SHARE_IN_RANGE = 0.5, 0.9
 #: Counts in the place of a memory that is not finite: so many rows out of range that every further
 #: set is refused.
 DAMAGED_COUNTS = (0.0, 1e9, 0.0)

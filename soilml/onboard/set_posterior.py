@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings, parts_of_rows
-from soilml.onboard.gaussian_pooling import LEAST_SHARE_IN_RANGE
 from soilml.onboard.memory import Memory
 from soilml.onboard.model_file import Session
 from soilml.onboard.set_contract import (
     ABSENT_READING,
     ABSENT_STD,
     COMMON_ERROR_INPUTS,
+    FORMER_SHARE_IN_RANGE,
+    INFERRED,
     LEAST_STD,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
@@ -68,6 +69,7 @@ class SetPosterior:
     sets_only: Whether the file has no regressors of single rows.
     common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`; none
         in a file of an earlier version. They have `error_columns` columns in the residual system.
+    least_share_in_range: Share of a set's rows that must be in range; the others are set aside.
     """
 
     terms: int
@@ -77,6 +79,7 @@ class SetPosterior:
     sets_only: bool
     common_errors: dict[str, float] = field(default_factory=dict)
     error_columns: int = 1
+    least_share_in_range: float = FORMER_SHARE_IN_RANGE
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
@@ -90,6 +93,7 @@ class SetPosterior:
             common_errors=read_common_errors(metadata),
             error_columns=error_columns(metadata),
             sets_only=bool(metadata["alone"]),
+            least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
         )
 
     @property
@@ -290,7 +294,8 @@ def with_common_errors(usual: Mapping[str, float], given: Mapping[str, Any]) -> 
     """
     own = {name: float(given[name]) for name in COMMON_ERROR_INPUTS if name in given}
     for name, value in own.items():
-        if not 0.0 <= value < np.inf:
+        inferred = name == MODEL_ERROR_INPUT and value == usual.get(name) == INFERRED
+        if not (0.0 <= value < np.inf or inferred):
             raise InputError(f"{name} is {value:g}; needed is a standard deviation, zero or more")
         check_takes_errors(usual, name, value)
     return {name: own.get(name, value) for name, value in usual.items()}
@@ -316,12 +321,14 @@ def estimate_of_set(
     prior: PriorSummary,
     outputs: Sequence[Any],
     memory: Memory,
+    least_share: float,
 ) -> Estimate:
     """The estimate with its reason.
 
     names, units, prior: As in `Estimate`.
     outputs: Outputs of the graph in the order of `SET_OUTPUTS`.
     memory: The memory with these rows.
+    least_share: Share of the rows that must be in range, `SetPosterior.least_share_in_range`.
     """
     mean, std, covariance, low, high = (x.astype(np.float64) for x in outputs[:5])
     in_range, (_, rows, rows_used) = bool(outputs[5][0]), memory.counts.tolist()
@@ -338,15 +345,15 @@ def estimate_of_set(
         misfit=np.asarray(float(outputs[6][0])),
         rows_used=np.asarray(int(rows_used)),
         rows_set_aside=np.asarray(int(rows - rows_used)),
-        reason=np.asarray(int(_reason(in_range, memory))),
+        reason=np.asarray(int(_reason(in_range, memory, least_share))),
     )
 
 
-def _reason(in_range: bool, memory: Memory) -> Reason:
+def _reason(in_range: bool, memory: Memory, least_share: float) -> Reason:
     """Why a set has the estimate that it has, as its graph decides."""
     if in_range:
         return Reason.ESTIMATED
     readings, rows, rows_in_range = memory.counts
-    if not rows_in_range >= rows * np.float32(LEAST_SHARE_IN_RANGE):
+    if not rows_in_range >= rows * np.float32(least_share):
         return Reason.OUT_OF_RANGE
     return Reason.INCONSISTENT if readings > 0.5 else Reason.NO_INFORMATION

@@ -14,7 +14,13 @@ from soilml.io.table import Table
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import ROWS_PER_CALL, Estimator
 from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
-from soilml.onboard.set_contract import OPERATING_NOISE, OPERATING_STD_INPUTS, OPTIONAL_READINGS
+from soilml.onboard.set_contract import (
+    INFERRED,
+    MODEL_ERROR_INPUT,
+    OPERATING_NOISE,
+    OPERATING_STD_INPUTS,
+    OPTIONAL_READINGS,
+)
 from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
@@ -88,19 +94,16 @@ def estimates_of_runs(
     estimator: Estimator,
     readings: Sequence[Mapping[str, Any]],
     box: Mapping[str, tuple[float, float]],
-    *,
-    count: bool,
 ) -> tuple[NDArray[np.int64], Estimate]:
     """Estimates (runs,) from the readings of each run, within a narrower prior if there is one.
 
-    Before them the numbers of rows in range (runs,), which are zero unless they are to `count`.
+    Before them the numbers of rows in range (runs,).
     """
     in_range = np.zeros(len(readings), dtype=np.int64)
 
     def estimates() -> Iterator[Estimate]:
         for i, one in enumerate(readings):
-            if count:
-                in_range[i] = estimator.rows_in_range(**one).sum()
+            in_range[i] = estimator.rows_in_range(**one).sum()
             found = estimator.run(**one)
             yield found.within(**box) if box else found
 
@@ -149,7 +152,15 @@ def channel_remarks(estimator: Estimator, readings: dict[str, Any]) -> list[Rema
     used = {name: count for name, count in rows.items() if count}
     said = ", ".join(f"{name.replace('_', ' ')} ({count} rows)" for name, count in used.items())
     first = Remark("channels-used", f"uses slip, load and {said}", tuple(used), "note")
-    return [first, *_common_error_remarks(estimator.sets)]
+    remarks = [first, *_common_error_remarks(estimator.sets)]
+    size = estimator.sets.common_errors.get(MODEL_ERROR_INPUT, 0.0)
+    if size == INFERRED:
+        text = "errors of the model are included, of a size that follows from the residuals"
+    elif size:
+        text = f"errors of the model are included, {size:g} times the usual ones"
+    else:
+        text = "the model is taken as exact, or its errors as those of the case"
+    return [*remarks, Remark("model-errors", text, severity="note")]
 
 
 def _common_error_remarks(sets: SetPosterior) -> list[Remark]:

@@ -27,6 +27,7 @@ from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
     model_error_remarks,
     readings_with_model_error,
+    with_stated_model_error,
 )
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
 from soilml.io.table import Table
@@ -139,7 +140,10 @@ def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSo
     readings = readings_with_model_error(estimator, readings, case, together=True)
     warnings += model_error_remarks(estimator, case, pooled=True)
     warnings += ignored_soil_tests(case)
-    estimate = estimator.run(**readings)
+    estimate = with_stated_model_error(estimator, case).run(**readings)
+    if estimate.in_range and (aside := int(estimate.rows_set_aside)):
+        text = f"{aside} of {aside + int(estimate.rows_used)} rows are out of range; they are set "
+        warnings.append(Remark("rows-set-aside", f"{text}aside", severity="note"))
     if not estimate.in_range:
         text = (
             f"the rows are outside the training domain of {estimator.path}, which returns the "

@@ -41,7 +41,7 @@ def table(captured):
 
 def test_estimates_of_a_model_file_for_many_wheels_are_wider(folder, capsys):
     command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
-    plain = spoken(capsys, *command, "plain.toml")
+    plain = spoken(capsys, *command, "plain.toml", "--exact-model")
     wide = spoken(capsys, *command, "model.toml")
     assert "[discrepancy] of torque_Nm, drawbar_pull_N is included" in wide.err
     assert "discrepancy" not in plain.err
@@ -116,7 +116,9 @@ def test_an_estimate_has_the_mean_and_the_error_of_a_remainder(folder, capsys):
     lines = [",".join(str(v) for v in row.values()) for row in rows]
     Path("shifted.csv").write_text("\n".join([",".join(rows[0]), *lines]))
     command = ("--by", "run", "--case")
-    plain = spoken(capsys, "estimate", ANY_WHEEL, "runs.csv", *command, "plain.toml")
+    plain = spoken(
+        capsys, "estimate", ANY_WHEEL, "runs.csv", *command, "plain.toml", "--exact-model"
+    )
     wide = spoken(capsys, "estimate", ANY_WHEEL, "shifted.csv", *command, "learned.toml")
     said = "[remainder] of torque_Nm: its mean is taken from the readings, its error is included"
     assert said in wide.err

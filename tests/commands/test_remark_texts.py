@@ -24,7 +24,7 @@ RUNS = (
     "b,0.1,40,1.6\nb,0.3,80,2.0\nb,0.5,40,1.2\nb,0.2,60,3.0\nb,0.4,60,1.5\nb,0.3,40,2.0\n"
 )
 #: A remark without which the runs would not show what they are for.
-SHOWN = {"identify": "excess-residuals", "estimate": "no-interval-explains"}
+SHOWN = {"identify": "excess-residuals", "estimate": "inconsistent"}
 REPORTS = {
     "identify": ["model.toml", "runs.csv", "--by", "run", "--free", "cohesion,n"],
     "estimate": [str(ROOT / "exported/wheel.onnx"), "runs.csv", "--by", "run"],

@@ -143,7 +143,9 @@ def any_wheel_card(
         "On fresh simulated sets: wheels, loads, soils and bearing values over their whole ranges, "
         "torque noise from 1 to 8 %; a third of the sets with a bias of the torque sensor, a third "
         "with a known bearing curve, a third with sinkage and drawbar pull. Error is RMSE / prior "
-        "std; 90 % is the coverage of the 90 % interval; refused sets count with the prior.",
+        "std; 90 % is the coverage of the 90 % interval; refused sets count with the prior. The "
+        "model is taken as right there (`model_error` 0), as it is in the simulation; the file's "
+        "own answer has errors of the model.",
         "",
         *table_of(figures, list(SHEAR)),
         "## Made by",

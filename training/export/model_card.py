@@ -40,7 +40,8 @@ SET_POSTERIOR = (
     "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
     "all readings under a learned response of the wheel, sampled in the graph. On fresh simulated "
     "sets with free, three-level or steady operating conditions; a third of them with sinkage and "
-    "drawbar pull. Refused sets count with the prior."
+    "drawbar pull. Refused sets count with the prior. The model is taken as right there "
+    "(`model_error` 0), as it is in the simulation; the file's own answer has errors of the model."
 )
 
 

@@ -101,8 +101,9 @@ def read_interface(model: Any, metadata: Mapping[str, str]) -> Interface:
         if isinstance(dims[0], str):
             rows.append(_row_field(name, measured, sets["noise"] if sets else {}, number))
         else:
-            # what need not be given is the standard deviation of an error that all rows share
-            free = (-np.inf if number is None else 0.0, np.inf)
+            # what need not be given is the standard deviation of an error that all rows share, or
+            # below zero by default: the size of the model's errors, which is then inferred
+            free = (-np.inf if number is None else min(number, 0.0), np.inf)
             ends = sets["context"].get(name, free) if sets else free
             context.append(ContextField(name, float(ends[0]), float(ends[1]), number))
     rows.sort(key=lambda field: (not field.required, bool(field.reading)))

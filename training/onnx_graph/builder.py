@@ -164,8 +164,8 @@ class Graph:
             "If",
             0,
             condition,
-            then_branch=first._branch(outputs),
-            else_branch=second._branch(outputs),
+            then_branch=first.as_branch(outputs),
+            else_branch=second.as_branch(outputs),
             outs=list(outputs),
         )
 
@@ -194,7 +194,8 @@ class Graph:
         info = helper.make_tensor_value_info(name, FLOAT, None)
         return helper.make_graph(nodes, f"{self._prefix}branch", [], [info], constants)
 
-    def _branch(self, outputs: Mapping[str, Output]) -> Any:
+    def as_branch(self, outputs: Mapping[str, Output]) -> Any:
+        """This graph as a branch whose outputs are named `<prefix><output>`; others are empty."""
         from onnx import helper
 
         computed = {name for node in self._nodes for name in node.output}

@@ -13,6 +13,7 @@ from soilml.onboard.set_contract import (
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
     MODEL_ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
     OPERATING_STD_INPUTS,
     READING_INPUTS,
     ROW_IN_RANGE,
@@ -30,7 +31,8 @@ from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
-from training.set_posterior.sensor_errors import integrate_out_if_any, integrate_out_sensor_errors
+from training.set_posterior.scale_mixture import ScaleMixture, add_scale_mixture
+from training.set_posterior.sensor_errors import integrate_out_sensor_errors
 
 #: Inputs of the graph with a value for each row.
 ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
@@ -107,17 +109,24 @@ class SetPosteriorGraph:
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
         terms, of_sensors = len(self.response.terms), len(SENSOR_ERROR_COLUMNS)
-        of_model = len(MODEL_ERROR_COLUMNS)
+        of_model, size = len(MODEL_ERROR_COLUMNS), inputs[MODEL_ERROR_INPUT]
+        earlier, _ = state.split([terms + of_sensors, of_model], axis=1)
+        start = concat([earlier, rows.system_at(None)], axis=0)
 
-        def system_at(basis: Value | None) -> Value:
-            if basis is None:  # the first round is but a start: it takes the model as right
-                earlier, _ = state.split([terms + of_sensors, of_model], axis=1)
-                system = concat([earlier, rows.system_at(basis)], axis=0)
-                return integrate_out_sensor_errors(system, terms)
+        def mixture_at(basis: Value) -> ScaleMixture:
             system = concat([state, rows.system_at(basis)], axis=0).named(outputs[0])
-            system = integrate_out_if_any(system, terms + of_sensors, of_model)
-            return integrate_out_sensor_errors(system, terms)
+            whole, sensors, model = system.split([terms, of_sensors, of_model], axis=1)
+            system = concat([whole, model, sensors], axis=1)
+            system = integrate_out_sensor_errors(system, terms + of_model)
+            return add_scale_mixture(system, size, terms)
 
         consistency = add_consistency(counts, self.limits, self.family.targets)
-        sample = add_importance_sampler(self.family, self.response, context, system_at, consistency)
+        sample = add_importance_sampler(
+            self.family,
+            self.response,
+            context,
+            integrate_out_sensor_errors(start, terms),
+            mixture_at,
+            consistency,
+        )
         add_posterior_outputs(self.family, context, sample, consistency, prefix)

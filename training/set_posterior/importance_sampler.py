@@ -43,6 +43,7 @@ from training.set_posterior.sampling_rounds import (
     sample_sizes,
     weights_by_effective_size,
 )
+from training.set_posterior.scale_mixture import ScaledMisfit, ScaleMixture
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
 #: the other coordinates in adapted rounds, which is closer.
@@ -53,9 +54,9 @@ LARGEST_TANH = 1.0 - 1e-6
 VARIANCE_FLOOR = 1e-6
 
 
-#: The system (m, terms) of residuals whose errors in slip and load are linear at a soil, given by
-#: its monomials (terms, 1), or at the middle of the prior's range.
-SystemAt = Callable[[Value | None], Value]
+#: The likelihood whose errors of sensors and model are linear at a soil, given by its monomials
+#: (terms, 1).
+MixtureAt = Callable[[Value], ScaleMixture]
 
 
 @dataclass(frozen=True)
@@ -76,24 +77,28 @@ def add_importance_sampler(
     family: WheelFamily,
     response: Response,
     context: ContextValues,
-    system_at: SystemAt,
+    start: Value,
+    mixture_at: MixtureAt,
     consistency: Consistency,
 ) -> WeightedSample:
-    r"""Weighted samples of the posterior of a system (m, terms) of residuals.
+    r"""Weighted samples of the posterior of residuals that are averaged over scales k.
 
-    .. math:: \log p(x | y) = \sum_i \lambda_i x_i - \tfrac12 |A b(x)|^2 + const
+    .. math:: \log p(x | y) = \sum_i \lambda_i x_i
+        + \log \sum_k w_k \exp\left(-\tfrac12 |A_k b(x)|^2\right) + const
 
     Rows at one operating condition constrain the unknowns to a thin sheet, which points spread over
     the whole space would miss. Therefore all unknowns but one are drawn, and that one, the friction
     angle, is solved for: Gauss-Newton steps move it onto the sheet, and it is drawn around this
     conditional mode with the width of its conditional posterior.
 
-    1. In the first round the other unknowns are drawn from the prior.
+    1. In the first round the other unknowns are drawn from the prior, and the model is taken as
+       right: it is but a start. Its mean is the soil at which errors are linear.
     2. In each adapted round their inverse hyperbolic tangents, which are unbounded, are drawn from
        a t distribution with the mean and covariance of the previous round. These moments are those
        of the highest power of the density that enough samples share (`tempering_power`). Before
        the last round, the noise is enlarged if no soil explains the readings (`excess_variance`),
-       and the moments are then those of the first round.
+       and the moments are then those of the first round. The friction angle is solved for with the
+       mean of the systems by the evidence of their scales.
     3. Rounds are pooled in proportion to their effective sample sizes.
 
     All draws are constants of the graph that are shifted and scaled: the same set gives the same
@@ -101,7 +106,8 @@ def add_importance_sampler(
 
     family, response: Axes with their priors, and the monomials of the system.
     context: Standard deviations of nearly known axes.
-    system_at: Residuals (m, terms) with errors of sensors integrated out.
+    start: Residuals (m, terms) of a model without errors, errors of sensors integrated out.
+    mixture_at: The likelihood, at a soil.
 
     References: Cornuet et al., Scandinavian J. Statistics 39(4), 2012 (adaptive rounds); Robert and
     Casella, Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the
@@ -110,15 +116,15 @@ def add_importance_sampler(
     unknowns = len(family.axes)
     sizes = sample_sizes(unknowns)
     nearly_known = NearlyKnown.of(family, response, context)
-    residuals = PolynomialResiduals.of(family, response, nearly_known, system_at(None))
+    residuals = PolynomialResiduals.of(family, response, nearly_known, start)
     graph = residuals.system.graph
     draws = adapted_draws(unknowns, sizes.adapted)
     prior = prior_draws(family, residuals.order, sizes.prior)
     current = _prior_round(family, residuals, prior)
     basis = _mean_basis(residuals, current)
     soil = basis if nearly_known is None else basis * nearly_known.factors.node("Transpose")
-    residuals = PolynomialResiduals.of(family, response, nearly_known, system_at(soil))
-    current = current.reweighed(residuals)
+    mixture = mixture_at(soil).standardised(nearly_known)
+    current = current.reweighed(mixture)
     bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
     unbounded = constant(graph, np.arctanh(bounded))
     rounds, count = [current], sizes.prior
@@ -126,18 +132,21 @@ def add_importance_sampler(
     variance = one = constant(graph, np.ones(1))
     samples = first_samples = _with_ones(unbounded, current, unknowns, count)
     for number in range(sizes.rounds):
-        moments = _moments(samples, rounds[-1].tempered_weights()[0], least)
+        weights = rounds[-1].tempered_weights()[0]
+        moments = _moments(samples, weights, least)
+        residuals = mixture.proposal(residuals, found_at(rounds[-1]), weights)
         if number == sizes.rounds - 1:
             variance = excess_variance(least_misfit(rounds), consistency, family.targets)
-            residuals = residuals.divided_by(sqrt(variance))
+            mixture = mixture.divided_by(sqrt(variance))
+            residuals = residuals.with_system(residuals.system / sqrt(variance))
             moments = shortcut(
                 variance <= 1.0,
                 lambda found, *_: found,
                 partial(_moments_of_likelihood, least=least),
-                *(moments, first_samples, rounds[0].misfit, variance),
+                *(moments, first_samples, found_at(rounds[0]).least, variance),
             )
         proposal = cholesky_columns(moments, unknowns) @ draws.others
-        unbounded, current = _adapted_round(family, residuals, proposal, draws)
+        unbounded, current = _adapted_round(family, residuals, mixture, proposal, draws)
         rounds.append(current)
         samples = _with_ones(unbounded, current, unknowns, sizes.adapted)
         count += sizes.adapted
@@ -183,9 +192,15 @@ def pooled_weights(rounds: list[WeightedRound], of_earlier: Value) -> Value:
     return pooled / pooled.sum(keepdims=True)
 
 
+def found_at(weighted: WeightedRound) -> ScaledMisfit:
+    """The misfits of a round that a mixture has weighed."""
+    assert weighted.misfit is not None
+    return weighted.misfit
+
+
 def least_misfit(rounds: list[WeightedRound]) -> Value:
     """The least sum of squared residuals of all points, (1,)."""
-    misfits = concat([r.misfit for r in rounds], axis=1)
+    misfits = concat([found_at(r).least for r in rounds], axis=1)
     return misfits.reduce("ReduceMin", keepdims=False).reshape(1)
 
 
@@ -222,7 +237,11 @@ def _mean_basis(residuals: PolynomialResiduals, first: WeightedRound) -> Value:
 
 
 def _adapted_round(
-    family: WheelFamily, residuals: PolynomialResiduals, proposal: Value, draws: ProposalDraws
+    family: WheelFamily,
+    residuals: PolynomialResiduals,
+    mixture: ScaleMixture,
+    proposal: Value,
+    draws: ProposalDraws,
 ) -> tuple[Value, WeightedRound]:
     """The unbounded other coordinates (p - 1, n), and the round drawn from them.
 
@@ -236,6 +255,6 @@ def _adapted_round(
     for _ in range(ADAPTED_STEPS):
         mode, precision = residuals.step(concat([others, within_box(mode)], axis=0), mode)
     current = sample_round(
-        residuals, family.axes, others, (mode, precision), draws, log_jacobian=log_jacobian
+        residuals, family.axes, others, (mode, precision), draws, log_jacobian, mixture
     )
     return unbounded, current

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.onboard.set_contract import LEAST_SHARE_IN_RANGE
 from training.onnx_graph.value import Value, log, maximum, minimum
 
-#: A set is estimated only if at least this share of its rows is in range; the other rows are left
-#: out.
-LEAST_SHARE_IN_RANGE = 0.9
 #: The limit beyond the largest calibrated number of readings n grows by 1 + 3 / sqrt(n) a reading:
 #: that of a chi-squared distribution with n degrees of freedom is n + 3 sqrt(n) to 3 standard
 #: deviations, roughly, and a straight line through it lies above it.
@@ -32,7 +30,7 @@ class Consistency:
 
     limit: Value  # largest misfit of sound sets
     degrees: Value  # degrees of freedom of the misfit
-    enough: Value  # bool: whether there are readings, and few rows out of range
+    enough: Value  # bool: whether there are readings, and at least half of the rows in range
 
 
 def add_consistency(counts: Value, limits: MisfitLimits, unknowns: int) -> Consistency:

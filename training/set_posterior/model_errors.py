@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
+from soilml.onboard.set_contract import (
+    LAW_ERROR_COLUMNS,
+    MODEL_ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
+    RESPONSE_CHANNELS,
+)
 from training.onnx_graph.value import Value, concat, exp, gemm, log, maximum, shortcut, stack_rows
 from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.response_surface import Response
 
-COHESION = "cohesion"  # The unknown that is a strength, beside the bearing modulus
+FRICTION = "friction_angle"
+STRENGTH, MODULUS = ("cohesion", FRICTION), ("shear_modulus",)  # Unknowns of the shear strength
 #: Place of the first error that one channel has alone, and how those that grow with slip are named.
 OF_CHANNELS, GROWS = MODEL_ERROR_COLUMNS.index("sinkage"), "_by_slip"
 
@@ -42,7 +48,8 @@ class ModelErrors:
             - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
 
         A scale of torque without load changes with the logarithm of torque itself in addition.
-        They are zero where the model is right, and then not computed.
+        The strength is cohesion and the tangent of the friction angle. They are of usual size, zero
+        where the model is right, and then not computed.
 
         slopes: Derivatives of the channels by log slip and log load, at the same soil, (2,
             channels, rows).
@@ -52,10 +59,9 @@ class ModelErrors:
         size, errors = self.readings[MODEL_ERROR_INPUT], len(MODEL_ERROR_COLUMNS)
         row = coefficients.split([1, len(self.response.terms) - 1], axis=0)[0]
         return shortcut(
-            size <= 0.0,
-            lambda _, first, *others: first * np.zeros((errors, 1)),
+            size * size <= 0.0,
+            lambda first, *others: first * np.zeros((errors, 1)),
             self._columns,
-            size,
             row,
             *(slopes, coefficients, basis, self.slope, self.context.features),
             *(self.readings[name] for name in ("slip", "load", "torque")),
@@ -63,7 +69,6 @@ class ModelErrors:
 
     def _columns(
         self,
-        size: Value,
         _: Value,
         slopes: Value,
         coefficients: Value,
@@ -86,23 +91,39 @@ class ModelErrors:
         first[0] = 1.0
         of_torque = first * (1.0 - self.context.torque_by_load)
         change = slope * torque * of_torque - slopes.take([1], axis=0)  # (1, channels, rows)
-        names = [axis.name for axis in self.family.axes]
-        if COHESION in names:
-            number = names.index(COHESION)
-            by_log = _by_log_value(basis, self.response.terms, number + 1, self.family.axes[number])
-            of_cohesion = gemm(by_log, coefficients, transpose_a=True)
-            change = change - of_cohesion.reshape(1, channels, -1)
+        of_strength = self._by_logarithms(STRENGTH, coefficients, basis)
+        of_modulus = self._by_logarithms(MODULUS, coefficients, basis)
+        change = change - self._by_logarithms(STRENGTH[:1], coefficients, basis)
         contact = change * 0.0
         if self.response.contact is not None:
             at_soil = self.response.contact.add_at_soil(features).at(basis)
             contact = at_soil.reshape(1, channels, -1) * stds["contact"]
         own = (slope * torque * first + (1.0 - first)) * self._own_errors(slip)
-        columns = concat([change * profile, contact, own], axis=0) * size
+        laws = [
+            of_strength * stds["strength"],
+            of_strength * (log_load * stds["strength_by_load"]).reshape(1, 1, -1),
+            of_modulus * stds["shear_modulus"],
+        ]
+        columns = concat([change * profile, contact, own, *laws], axis=0)
         return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
+
+    def _by_logarithms(self, names: Sequence[str], coefficients: Value, basis: Value) -> Value:
+        """Sum (1, channels, rows) of the changes with the logarithms of these unknowns.
+
+        Nil where the family has none of them.
+        """
+        axes = [axis.name for axis in self.family.axes]
+        by_log = basis * 0.0
+        for number in (axes.index(name) for name in names if name in axes):
+            axis = self.family.axes[number]
+            by_log = by_log + _by_log_value(basis, self.response.terms, number + 1, axis)
+        change = gemm(by_log, coefficients, transpose_a=True)
+        return change.reshape(1, len(RESPONSE_CHANNELS), -1)
 
     def _own_errors(self, slip: Value) -> Value:
         """Relative errors (errors, channels, rows) of single channels; of pull, over load."""
-        stds, names = self.family.model_errors(), MODEL_ERROR_COLUMNS[OF_CHANNELS:]
+        stds = self.family.model_errors()
+        names = MODEL_ERROR_COLUMNS[OF_CHANNELS : -len(LAW_ERROR_COLUMNS)]
         constant, growing = np.zeros((2, len(names), len(RESPONSE_CHANNELS), 1))
         for number, name in enumerate(names):
             part = growing if name.endswith(GROWS) else constant
@@ -114,10 +135,14 @@ def _by_log_value(basis: Value, terms: Terms, number: int, axis: PriorAxis) -> V
     r"""Derivatives (terms, 1) of the monomials by the logarithm of one unknown, at a soil.
 
     .. math:: \frac{\partial b}{\partial \ln \theta} = D b \, \frac{\theta}{d\theta / dx}
+
+    Of a friction angle it is the logarithm of its tangent, with sin(theta) cos(theta) for theta.
     """
     linear = terms.index((*(ONE,) * (len(terms[0]) - 1), number))
     x = basis.take([linear], axis=0)
     growth = exp(x * axis.rate) * axis.factor
     value = growth + x * axis.slope + axis.shift
     by_x = growth * axis.rate + axis.slope
+    if axis.name == FRICTION:
+        value = value.node("Sin") * value.node("Cos")
     return (derivative(terms, number) @ basis) * (value / by_x)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import reduce
 from operator import mul
 
@@ -49,15 +49,20 @@ class PolynomialResiduals:
         names = [axis.name for axis in family.axes]
         solved = names.index("friction_angle") if "friction_angle" in names else 0
         order = (*(i for i in range(len(names)) if i != solved), solved)
-        # each monomial's derivative is a multiple of one other monomial
-        rows, columns = np.nonzero(derivative(response.terms, solved + 1))
-        powers = derivative(response.terms, solved + 1)[rows, columns]
-        slope = system.take(rows.tolist(), axis=1) * powers
-        return PolynomialResiduals(system, slope, tuple(columns.tolist()), response.terms, order)
+        return PolynomialResiduals.solved_last(system, response.terms, order)
 
-    def divided_by(self, std: Value) -> PolynomialResiduals:
-        """The same residuals for noise whose standard deviation is larger by a factor (1,)."""
-        return replace(self, system=self.system / std, slope=self.slope / std)
+    @staticmethod
+    def solved_last(system: Value, terms: Terms, order: tuple[int, ...]) -> PolynomialResiduals:
+        """Of a system (m, terms) in an order of the axes whose last is solved for."""
+        # each monomial's derivative is a multiple of one other monomial
+        by_solved = derivative(terms, order[-1] + 1)
+        rows, columns = np.nonzero(by_solved)
+        slope = system.take(rows.tolist(), axis=1) * by_solved[rows, columns]
+        return PolynomialResiduals(system, slope, tuple(columns.tolist()), terms, order)
+
+    def with_system(self, system: Value) -> PolynomialResiduals:
+        """The residuals of another system (m, terms)."""
+        return PolynomialResiduals.solved_last(system, self.terms, self.order)
 
     def squared_norm(self, basis: Value) -> Value:
         """The misfit |A b|^2 (1, n), which is -2 log likelihood up to a constant."""

@@ -44,8 +44,9 @@ FileNoise = Mapping[str, Sequence[float]]
 #: it. Sums of context inputs, and of squares of a state, are far smaller than this, so that their
 #: products are finite too.
 LARGEST_SUM, LARGEST_CONTEXT, LARGEST_MEMORY = 3e38, 1e9, 1e30
-#: Readings of channels are limited to this: they are as impossible, and their squares are finite.
-LARGEST_READING = 1e12
+#: Readings of channels are limited to this: they are as impossible, and float32 tells them from an
+#: error that all readings share.
+LARGEST_READING = 1e8
 IMPOSSIBLE_SLIP = -1.0  # Slip of a row that is not finite: out of every range
 #: Values of a row that is not finite.
 HARMLESS = np.asarray([[IMPOSSIBLE_SLIP if name == "slip" else 1.0] for name in ROWS])

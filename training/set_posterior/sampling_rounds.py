@@ -30,6 +30,7 @@ from training.onnx_graph.value import (
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, PriorAxis
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
+from training.set_posterior.scale_mixture import ScaledMisfit, ScaleMixture
 
 #: Degrees of freedom of the t distributions: tails heavier than those of a normal distribution keep
 #: the importance weights bounded where the posterior has heavier tails than its normal
@@ -134,20 +135,21 @@ class WeightedRound:
     points: Value  # (1 + p, n) limited to the box
     boxed_log_weight: Value  # (1, n) of the points as limited to the box
     log_weight: Value  # (1, n) vanishing weight for samples outside of the box
-    misfit: Value  # (1, n) sum of squared residuals
+    surprise: Value  # (1, n) -2 log likelihood
     basis: Value  # (terms, n) monomials of the points
+    misfit: ScaledMisfit | None = None  # by scale of the model's errors, where they are known
 
     def tempered_weights(self) -> tuple[Value, Value]:
         """Weights (1, n) of a power of the density that several samples share, and that power."""
         power = tempering_power(self.boxed_log_weight)
         return tempered_weights(self.log_weight, power), power
 
-    def reweighed(self, residuals: PolynomialResiduals) -> WeightedRound:
-        """The same points with the weights of another system of residuals."""
-        misfit = residuals.squared_norm(self.basis)
-        change = (self.misfit - misfit) * 0.5
-        boxed = self.boxed_log_weight + change
-        return WeightedRound(self.points, boxed, self.log_weight + change, misfit, self.basis)
+    def reweighed(self, mixture: ScaleMixture) -> WeightedRound:
+        """The same points with the weights of a mixture in place of one system of residuals."""
+        misfit = mixture.misfit(self.basis)
+        change = (self.surprise - misfit.surprise) * 0.5
+        boxed, log_weight = self.boxed_log_weight + change, self.log_weight + change
+        return WeightedRound(self.points, boxed, log_weight, misfit.surprise, self.basis, misfit)
 
 
 def sample_round(
@@ -157,6 +159,7 @@ def sample_round(
     solved: tuple[Value, Value],
     draws: ProposalDraws,
     log_jacobian: Value | None = None,
+    mixture: ScaleMixture | None = None,
 ) -> WeightedRound:
     r"""Draw the solved coordinate around its conditional mode, and weigh the samples.
 
@@ -168,25 +171,27 @@ def sample_round(
     up to constants, with t a draw of the t distribution and c the scale of the proposal. The last
     sum is there if the other coordinates are hyperbolic tangents of the draws z.
 
-    residuals: The system of the set.
+    residuals: The system of the set, whose likelihood is that of the samples without a mixture.
     axes: The axes of the family, whose `tilt` is the lambda of their prior.
     others: 1, and the other coordinates, within the box (p, n).
     solved: Mode and precision of the solved coordinate given the others, (1, n) each.
     draws: The draws t of the round, and the log density of all draws.
     log_jacobian: log(1 - x_i^2) of the other coordinates (p - 1, n).
+    mixture: The likelihood, where it is averaged over scales of the model's errors.
     """
     mode, precision = solved
     proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)
     inside = within_box(proposed)
     points = concat([others, inside], axis=0)
     basis = residuals.basis(points)
-    misfit = residuals.squared_norm(basis)
+    misfit = None if mixture is None else mixture.misfit(basis)
+    surprise = residuals.squared_norm(basis) if misfit is None else misfit.surprise
     distance = absolute(proposed - inside)
     # one matrix product adds up the parts of the log weight, with these coefficients
     parts = [
         (points, [0.0, *[axes[i].tilt for i in residuals.order]]),
         (log(precision), [-0.5]),
-        (misfit, [-0.5]),
+        (surprise, [-0.5]),
     ]
     if log_jacobian is not None:
         parts.append((log_jacobian, [1.0] * (len(residuals.order) - 1)))
@@ -198,7 +203,7 @@ def sample_round(
         -draws.log_density,
     )
     boxed_log_weight, log_weight = both.split(2, axis=0)
-    return WeightedRound(points, boxed_log_weight, log_weight, misfit, basis)
+    return WeightedRound(points, boxed_log_weight, log_weight, surprise, basis, misfit)
 
 
 def tempering_power(log_weight: Value) -> Value:

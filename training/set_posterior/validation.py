@@ -16,6 +16,7 @@ from soilml.onboard.set_contract import (
     ABSENT_STD,
     COMMON_ERROR_INPUTS,
     ERROR_COLUMNS,
+    LEAST_SHARE_IN_RANGE,
     MEMORY_INPUTS,
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
@@ -191,6 +192,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
         "errors": posterior.family.typical_errors(),
         "model_errors": posterior.family.model_errors(),
         "alone": sets_only,
+        "least_share_in_range": LEAST_SHARE_IN_RANGE,
         "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),
         "interval": list(INTERVAL),
         "misfit": {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -57,11 +56,12 @@ One row gives one equation for three unknowns, so the estimate of a single row
 is close to the prior. --by run pools all rows of a run, which is far more
 accurate, and --by all those of all runs, which must then be on one soil.
 sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
-slip_std and load_N_std included. The estimate of a run is the prior where more
-than a tenth of its rows is out of range, and widened as far as the misfit says
-where no soil explains them all. A run gets two intervals: with the model of
-wheel and soil taken as exact, and, in columns with _usual, with typical model
-errors; a [discrepancy] of --case takes the place of the second. A row with a
+slip_std and load_N_std included. Rows out of range are set aside; the estimate
+of a run is the prior where they are more than half of its rows, and widened as
+far as the misfit says where no soil explains the others. The interval includes
+errors of the model of wheel and soil, whose size follows from the residuals of
+the run. --exact-model leaves them out, for a model that was checked on a known
+soil; a [discrepancy] or [remainder] of --case takes their place. A row with a
 blank reading, or whose status is not ok, gets a blank estimate. Slip differs
 from row to row and has no --by.
 
@@ -109,6 +109,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "for wheels of any size, also your soil, priors and noise",
     )
     parser.add_argument("--gear", metavar="NAME", help="which gear of --case, if it has several")
+    parser.add_argument(
+        "--exact-model",
+        action="store_true",
+        help="take the model of wheel and soil as exact, as for a model checked on a known soil",
+    )
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the estimates to this file")
     add_report_option(parser)
@@ -122,9 +127,10 @@ def run(args: argparse.Namespace) -> int:
     need_for_report(args, "estimate")
     import numpy as np
 
-    from soilml.cli.output import save_columns, show, tell, write_with_report
+    from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report
     from soilml.cli.tables import print_table_hints, read_rows
     from soilml.config.case import read_case_of_one_gear
+    from soilml.identification.model_error_inputs import with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.read_table import FILLED, RUNS
     from soilml.onboard import presentation, table_estimates
@@ -140,6 +146,8 @@ def run(args: argparse.Namespace) -> int:
     case = None
     if args.case is not None:
         case = read_case_of_one_gear(args.case, gear=args.gear, with_bias=True)
+    if args.exact_model:
+        estimators = [with_exact_model(estimator) for estimator in estimators]
     estimators, remarks = estimators_for_case(
         estimators, case, args.case, pooled=args.by is not None
     )
@@ -184,28 +192,9 @@ def run(args: argparse.Namespace) -> int:
     write_with_report(
         args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
     )
-    _tell_columns(columns, args.out)
+    tell_columns(columns, args.out)
     tell("\n".join(texts(remarks)))
     return 0
-
-
-def _tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
-    """Write or print the columns of both intervals; on a terminal, as two tables."""
-    import numpy as np
-
-    from soilml.cli.output import is_terminal, show, tell_columns
-    from soilml.onboard import presentation
-
-    second = [name for name in columns if presentation.is_typical_column(name)]
-    if not second or out is not None or not is_terminal():
-        tell_columns(columns, out)
-        return
-    tell_columns({name: columns[name] for name in columns if name not in second}, None)
-    show(f"\nwith typical errors of the model: columns with _{presentation.TYPICAL} in a file\n")
-    group = next(iter(columns))
-    typical = {name.replace(f"_{presentation.TYPICAL}", ""): columns[name] for name in second}
-    typical["in_range"] = np.asarray(typical["in_range"], dtype=bool)
-    tell_columns({group: columns[group]} | typical, None)
 
 
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
@@ -305,17 +294,14 @@ def _estimates_of_runs(
     readings: list[dict[str, Any]],
     by: str,
     box: dict[str, tuple[float, float]],
-    *,
-    typical: bool,
 ) -> tuple[NDArray[np.int64], Estimate]:
     """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
     from soilml.cli.progress import row_progress
     from soilml.onboard import table_estimates
 
     rows = sum(len(next(iter(one.values()))) for one in readings)
-    text = f"estimating by {by}{' with typical model errors' if typical else ''}"
-    with row_progress(text, estimator, rows if typical else 2 * rows) as counted:
-        return table_estimates.estimates_of_runs(counted, readings, box, count=not typical)
+    with row_progress(f"estimating by {by}", estimator, 2 * rows) as counted:
+        return table_estimates.estimates_of_runs(counted, readings, box)
 
 
 def _group_estimates(
@@ -329,7 +315,6 @@ def _group_estimates(
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL
     from soilml.onboard import presentation, table_estimates
-    from soilml.onboard.set_contract import MODEL_ERROR_INPUT
 
     order = [name for name, _ in table.groups(by)]
     groups = list(table.rows(usable).groups(by))
@@ -341,7 +326,7 @@ def _group_estimates(
         for _, rows in groups
     ]
     box = {} if case is None else narrower_priors(estimator, case)
-    in_range, estimate = _estimates_of_runs(estimator, readings, by, box, typical=False)
+    in_range, estimate = _estimates_of_runs(estimator, readings, by, box)
     position = {name: i for i, name in enumerate(names)}
     answered = np.asarray([name in position for name in order])
     index = np.asarray([position.get(name, 0) for name in order])
@@ -375,12 +360,4 @@ def _group_estimates(
             )
         ]
     remarks += presentation.refusal_remarks(by, names, counts - in_range, counts, estimate)
-    # a file that takes its model as exact, of which no case states the error
-    errors = {} if estimator.sets is None else estimator.sets.common_errors
-    if errors.get(MODEL_ERROR_INPUT) == 0.0 and not (case is not None and case.discrepancy):
-        with_error = estimator.on(model_error=1.0)
-        _, typical = _estimates_of_runs(with_error, readings, by, box, typical=True)
-        for key, values in presentation.typical_columns(typical).items():
-            columns[key] = np.where(answered, values[index], np.nan)
-        remarks += presentation.typical_remarks(by, names, estimate, typical)
     return columns, remarks

@@ -13,6 +13,7 @@ from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.memory import Memory
+from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.onboard.set_posterior import estimate_of_set
 
 QUANTILE = 3.72  # Standard normal quantile beyond which a misfit is not chance: 1 in 10 000
@@ -24,6 +25,8 @@ ASSUMED_READINGS, ASSUMED_ROWS = 8.0, 3
 ROWS_JUDGED = 16  # Rows from whose misfit the size of the model error is estimated
 #: Most variance of the residuals over that of the stated noise for which a model is still used.
 MOST_EXCESS = 10.0
+#: Size of the errors of a model that is all but right, whose memories have their columns.
+ALL_BUT_RIGHT = 1e-6
 Rows = dict[str, NDArray[np.float64]]  # Row inputs of the graph (m,) by name
 
 
@@ -45,13 +48,23 @@ class JointFit:
         return float(self.memory.counts[0])
 
 
+def judging(estimator: Estimator) -> Estimator:
+    """The estimator whose misfit tells rows of another soil: with a model that is all but right.
+
+    Errors of a size that is inferred would explain another soil. Memories are the same.
+    """
+    inferred = estimator.sets and estimator.sets.common_errors.get(MODEL_ERROR_INPUT) == INFERRED
+    return estimator.on(model_error=ALL_BUT_RIGHT) if inferred else estimator
+
+
 def fit_rows(estimator: Estimator, rows: Rows, memory: Memory) -> JointFit:
     """The fit to the rows of a packed memory and to further ones (m,); m may be 0."""
     if estimator.sets is None:
         raise InputError(f"{estimator.path} has no set posterior; train it with [set_posterior]")
     found, after = estimator.sets.update(estimator.session, rows, memory)
-    names, units, prior = estimator.names, estimator.units, estimator.prior
-    return JointFit(estimate_of_set(names, units, prior, found, after), after)
+    head, least = (estimator.names, estimator.units, estimator.prior), estimator.sets
+    share = least.least_share_in_range
+    return JointFit(estimate_of_set(*head, found, after, share), after)
 
 
 def fit_memory(estimator: Estimator, memory: Memory) -> JointFit:

@@ -24,6 +24,7 @@ from soilml.onboard.tracking.misfit import (
     excess_noise,
     fit_memory,
     fit_rows,
+    judging,
     over_median,
     usual_excess,
 )
@@ -93,8 +94,9 @@ class SoilTracker:
     agree with each other, the soil has changed, and the tracker begins anew with them; where the
     next rows agree with those before, it was a glitch. Rows that differ from earlier ones only
     taken together are a drift; the earlier ones are forgotten. Of the others, the last `length`
-    are remembered. Memory and time per row are bounded: at most three calls of the graph, and one
-    more where rows are forgotten.
+    are remembered. Memory and time per row are bounded: at most four calls of the graph, and one
+    more where rows are forgotten. Rows are judged with a model that is right but for more noise;
+    the estimate has the errors of the estimator's model.
 
     Parameters
     ----------
@@ -124,6 +126,8 @@ class SoilTracker:
     length: int
     state: TrackerState
     _empty: Memory
+    _judge: Estimator  # tells rows of another soil
+    _estimated: tuple[Memory, Estimate] | None  # the last estimate, and its memory
     _filter: FilterState
     _fit: JointFit
 
@@ -132,6 +136,8 @@ class SoilTracker:
             raise InputError(f"length is {length!r}; needed is a whole number of 16 or more rows")
         self.estimator = estimator
         self.length = int(length)
+        self._judge = judging(estimator)
+        self._estimated = None
         self._empty = estimator.start()
         self._begin(FilterState(RowWindow.empty(self._empty, self.length)))
 
@@ -201,7 +207,7 @@ class SoilTracker:
     def _begin(self, state: FilterState) -> None:
         """Continue from a state of the filter."""
         self._filter = state
-        self._fit = fit_memory(self.estimator, state.window.memory)
+        self._fit = fit_memory(self._judge, state.window.memory)
         self._answer(Event.ACCEPTED, "no row was read since the start")
 
     def _row(self, measured: Mapping[str, Any]) -> Rows | str:
@@ -221,7 +227,7 @@ class SoilTracker:
     def _check(self, row: Rows) -> TrackerState:
         """Compare a row with those remembered."""
         before, window = self._fit, self._filter.window
-        fit = fit_rows(self.estimator, row, window.memory)
+        fit = fit_rows(self._judge, row, window.memory)
         readings = fit.readings - before.readings
         if readings < 0.5:
             words = "slip, load or noise are out of the range of the file: not used"
@@ -249,7 +255,7 @@ class SoilTracker:
         """Whether the rows in question are of another soil."""
         question = self._filter.question
         for rows in question.candidates():
-            fit = fit_rows(self.estimator, rows, self._empty)
+            fit = fit_rows(self._judge, rows, self._empty)
             degrees = max(fit.readings - len(self.estimator.names), 1.0)
             excess = self._excess(self._fit.misfit, self._fit.readings)
             agree = fit.misfit <= excess * chi_squared_limit(degrees)
@@ -277,8 +283,8 @@ class SoilTracker:
         if splits and not state.question.rows:
             first = blocks - splits[state.rows_since_change % len(splits)]
             recent = window.since(first)
-            old = fit_memory(self.estimator, window.before(first))
-            new = fit_memory(self.estimator, recent.memory)
+            old = fit_memory(self._judge, window.before(first))
+            new = fit_memory(self._judge, recent.memory)
             apart = old.misfit + new.misfit
             unknowns = len(self.estimator.names)
             excess = self._excess(apart, self._fit.readings, 2 * unknowns)
@@ -293,7 +299,7 @@ class SoilTracker:
                 return self._answer(Event.DRIFT, words)
         if window.is_full:
             self._filter = replace(state, window=window.since(1))
-            self._fit = fit_memory(self.estimator, self._filter.window.memory)
+            self._fit = fit_memory(self._judge, self._filter.window.memory)
         return self._answer(Event.ACCEPTED, words)
 
     def _excess(self, misfit: float, readings: float, unknowns: int | None = None) -> float:
@@ -305,7 +311,7 @@ class SoilTracker:
     def _answer(self, event: Event, words: str) -> TrackerState:
         state = self._filter
         self.state = TrackerState(
-            estimate=self._fit.estimate,
+            estimate=self._estimate(),
             event=event,
             words=words,
             rows_since_change=state.rows_since_change,
@@ -314,3 +320,12 @@ class SoilTracker:
             drifting=state.rows_since_drift >= 0,
         )
         return self.state
+
+    def _estimate(self) -> Estimate:
+        """From the rows that are remembered, with errors of the model."""
+        if self._judge is self.estimator:
+            return self._fit.estimate
+        memory = self._filter.window.memory
+        if self._estimated is None or self._estimated[0] is not memory:
+            self._estimated = memory, fit_memory(self.estimator, memory).estimate
+        return self._estimated[1]

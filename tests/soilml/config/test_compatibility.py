@@ -15,6 +15,7 @@ from soilml.fitting.operating_points import gear_numbers, operating_points, rows
 from soilml.fitting.predictions import forces
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import trained_estimator as trained
+from soilml.identification.model_error_inputs import with_exact_model
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.remarks import texts
@@ -196,7 +197,9 @@ def fitting(case, estimator, **changes):
 def test_a_file_for_any_wheel_takes_wheel_and_soil_of_the_case(case, any_wheel):
     fitted = fitting(case, any_wheel)
     found, warnings = trained.condition_on_case(any_wheel, fitted)
-    assert not remarked(warnings, "kphi")
+    assert remarked(warnings, "kphi") and found.sets.context_values["bearing_std"] == 0.4
+    exact, warnings = trained.condition_on_case(with_exact_model(any_wheel), fitted)
+    assert not remarked(warnings, "kphi") and exact.sets.context_values["bearing_std"] == 0.0
     assert dict(zip(found.names, found.prior.upper, strict=True))["cohesion"] == pytest.approx(3e3)
     again, _ = trained.condition_on_case(any_wheel, wheel(fitted, radius=0.2))
     table = {"slip": [0.2, 0.4], "load": [60.0, 60.0], "torque": [1.5, 2.5]}
@@ -231,7 +234,7 @@ def test_a_prior_of_the_bearing_that_is_wider_than_the_file_allows_is_said(case,
 
 def test_priors_that_a_file_ignores_are_named_and_narrower_ones_are_used(case, any_wheel):
     fitted = fitting(case, any_wheel)
-    found, warnings = trained.condition_on_case(any_wheel, fitted)
+    found, warnings = trained.condition_on_case(with_exact_model(any_wheel), fitted)
     assert warnings == [] and trained.narrower_priors(found, fitted) == {}
     low, high = trained._ends(found, found.names.index("friction_angle"))
     width = high - low

@@ -11,6 +11,7 @@ from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
     ERROR_COLUMNS,
+    INFERRED,
     MODEL_ERROR_INPUT,
     SENSOR_ERROR_COLUMNS,
 )
@@ -73,8 +74,8 @@ def test_a_mean_next_to_an_end_of_the_prior_is_at_the_edge(estimator, wheel_post
     assert not estimator.on(**EXACT).run(**run).at_edge[1]
 
 
-def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 120):
-    """Runs (rows,) of torque on soils of the prior where the model is wrong, and the soils."""
+def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 120, channels=False):
+    """Runs (rows,) on soils of the prior where the model is wrong, and the soils."""
     family, rng = posterior.family, np.random.default_rng(4)
     case = family.recipe.case
     model = case.model if effect is None else case.model + effect
@@ -85,9 +86,13 @@ def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 120):
         values = {name: bearing * getattr(case.soil, name) for name in ("kc", "kphi")}
         soil = case.with_values(values | dict(zip(names, truth, strict=True))).soil
         slip, load = rng.uniform(0.06, 0.58, 16), rng.choice([40.0, 70.0, 100.0], 16)
-        torque = model(soil, Operating(slip=slip, load=load)).torque
-        noisy = torque * (1.0 + 0.02 * rng.standard_normal(16))
-        yield {"slip": slip, "load": load, "torque": noisy}, np.asarray(truth)
+        force = model(soil, Operating(slip=slip, load=load))
+        noisy = force.torque * (1.0 + 0.02 * rng.standard_normal(16))
+        run = {"slip": slip, "load": load, "torque": noisy}
+        if channels:
+            run |= {"sinkage": force.sinkage, "sinkage_std": 0.05 * force.sinkage}
+            run |= {"drawbar_pull": force.drawbar_pull, "drawbar_pull_std": np.full(16, 1.0)}
+        yield run, np.asarray(truth)
 
 
 def share_held(estimator, runs) -> np.ndarray:
@@ -125,11 +130,24 @@ def test_a_model_with_errors_increases_the_covariance(estimator, wheel_posterior
     assert areas[1] > 2.0 * areas[0] and areas[2] > 1.5 * areas[1]
 
 
-def test_the_model_is_taken_as_right_unless_told(estimator, wheel_posterior):
+def test_the_size_of_the_errors_of_the_model_is_inferred_unless_told(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 16)
-    assert estimator.sets.common_errors[MODEL_ERROR_INPUT] == 0.0
-    told = estimator.on(model_error=0.0).run(**run)
-    assert np.array_equal(estimator.run(**run).mean, told.mean)
+    assert estimator.sets.common_errors[MODEL_ERROR_INPUT] == INFERRED
+    told = estimator.on(model_error=INFERRED)
+    assert np.array_equal(estimator.run(**run).mean, told.run(**run).mean)
+    assert (estimator.run(**run).std > estimator.on(model_error=0.0).run(**run).std).all()
+
+
+@pytest.mark.slow
+def test_the_answer_widens_with_the_errors_that_the_readings_show(estimator, wheel_posterior):
+    """From all channels, which show how wrong a model is."""
+    widths = []
+    for bearing in (1.0, 0.4):
+        runs = wrong_runs(wheel_posterior, bearing=bearing, channels=True)
+        found = [estimator.run(**run) for run, _ in runs]
+        assert all(one.in_range for one in found)
+        widths.append(np.mean([one.std for one in found], axis=0))
+    assert (widths[1] > 1.1 * widths[0]).all()
 
 
 def test_a_stream_has_the_errors_of_its_model(estimator, wheel_posterior):
@@ -157,6 +175,6 @@ def test_a_file_of_an_earlier_version_says_that_its_model_is_right(estimator):
     assert error_columns({"errors": sensors}) == len(SENSOR_ERROR_COLUMNS)
     assert estimator.sets.error_columns == len(ERROR_COLUMNS)
     assert error_columns({}) == 1
-    for value in (-1.0, np.nan):
+    for value in (-0.5, np.nan):
         with pytest.raises(InputError, match=r"model_error is .*; needed is a standard deviation"):
             estimator.on(model_error=value)

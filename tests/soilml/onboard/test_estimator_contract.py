@@ -62,8 +62,10 @@ def test_an_estimate_of_a_set_counts_its_rows(whole):
 
 
 def test_the_reason_of_a_refused_set_is_told(whole):
-    out = whole.run(**many(20, load=[2000.0] * 3))
-    assert out.reason == Reason.OUT_OF_RANGE and (out.rows_used, out.rows_set_aside) == (17, 3)
+    some = whole.run(**many(20, load=[2000.0] * 10))
+    assert some.reason == Reason.ESTIMATED and (some.rows_used, some.rows_set_aside) == (10, 10)
+    out = whole.run(**many(20, load=[2000.0] * 11))
+    assert out.reason == Reason.OUT_OF_RANGE and (out.rows_used, out.rows_set_aside) == (9, 11)
     assert "out of range" in out.explanation
     falling = {"slip": [0.1, 0.3, 0.5], "torque": [5.0, 3.1, 1.5], "load": [60.0] * 3}
     wild = whole.on(**EXACT).run(**falling, torque_bias=0.0)
@@ -86,7 +88,7 @@ def test_single_readings_and_pooled_ones_have_their_reasons(whole, pooling):
     stray = pooling.run(**many(20, torque=[90.0]))
     assert (stray.rows_used, stray.rows_set_aside) == (19, 1)
     assert stray.reason == Reason.ESTIMATED
-    assert pooling.run(**many(20, torque=[90.0] * 5)).reason == Reason.OUT_OF_RANGE
+    assert pooling.run(**many(20, torque=[90.0] * 11)).reason == Reason.OUT_OF_RANGE
     slip, load = np.asarray([0.1, 0.3, 0.5] * 4), np.asarray([40.0, 60.0, 80.0] * 4)
     torque = load * 0.15 * np.asarray([0.45, 0.40, 0.35] * 4)
     wild = pooling.run(slip=slip, torque=torque, load=load)
@@ -94,9 +96,9 @@ def test_single_readings_and_pooled_ones_have_their_reasons(whole, pooling):
 
 
 def test_stacked_and_fused_estimates_keep_the_reasons(whole):
-    one, two = whole.run(**ROWS), whole.run(**many(20, load=[2000.0] * 3))
+    one, two = whole.run(**ROWS), whole.run(**many(20, load=[2000.0] * 11))
     both = Estimate.stack([one, two], (2,))
-    assert both.reason.tolist() == [0, 1] and both.rows_set_aside.tolist() == [0, 3]
+    assert both.reason.tolist() == [0, 1] and both.rows_set_aside.tolist() == [0, 11]
     far = replace(one, mean=one.mean + 50.0 * one.std)
     assert fuse_estimates([one, far]).estimate.reason == Reason.CONTRADICTORY
     assert fuse_estimates([two, two]).estimate.reason == Reason.OUT_OF_RANGE

@@ -238,10 +238,10 @@ def calibration(limit=9.0):
     return PoolingCalibration(CONDITIONS, (pattern, free), np.asarray([1.7, 1.8]), limits)
 
 
-def test_a_run_is_pooled_unless_more_than_a_tenth_is_out_of_range():
+def test_a_run_is_pooled_unless_more_than_half_is_out_of_range():
     slip = np.linspace(0.05, 0.45, 20)
     mean, std = np.tile([1.2, 9.0], (20, 1)), np.tile([0.2, 2.0], (20, 1))
-    for out, pooled in ((2, True), (3, False)):
+    for out, pooled in ((2, True), (10, True), (11, False)):
         single = estimates(mean, std, np.arange(20) >= out)
         found = pool_run(single, {"slip": slip}, calibration())
         assert (found.rows_used, found.rows_set_aside) == (20 - out, out)

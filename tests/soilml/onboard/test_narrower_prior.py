@@ -74,7 +74,7 @@ def test_it_is_nearly_the_posterior_with_that_prior(rover):
             low = float(np.clip(value - width * rng.random(), own.lower, own.upper - width))
             box[name] = (low, low + width)
         rows = readings(rng, truth, 16)
-        before = rover.run(**rows)
+        before = rover.on(model_error=0.0).run(**rows)
         found = before.within(**box)
         table = Table({"slip": rows["slip"], "load_N": rows["load"], "torque_Nm": rows["torque"]})
         narrow = replace(case, prior={name: Prior(*ends) for name, ends in box.items()})

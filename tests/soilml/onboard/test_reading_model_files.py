@@ -130,12 +130,12 @@ def test_what_is_no_model_is_an_error(content):
 
 
 @pytest.mark.parametrize(
-    ("interface", "refused"), [("1", False), ("4", False), ("5", True), ("4b", True)]
+    ("interface", "refused"), [("1", False), ("4", False), ("5", False), ("6", True), ("5b", True)]
 )
 def test_a_file_of_a_later_interface_is_refused(small_model, tmp_path, interface, refused):
     model = onnx.load(small_model)
     (entry,) = (e for e in model.metadata_props if e.key == "soilml_interface")
-    assert entry.value == INTERFACE == "4"
+    assert entry.value == INTERFACE == "5"
     entry.value = interface
     (tmp_path / "m.onnx").write_bytes(signed_again(model))
     if refused:

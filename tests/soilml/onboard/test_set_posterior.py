@@ -279,8 +279,11 @@ def test_a_probe_with_other_estimates_is_refused(wheel_set_file, tmp_path, name)
 
 def test_more_rows_than_one_call_takes_are_read_in_parts(estimator, wheel_posterior, monkeypatch):
     rows, _ = simulated_run(wheel_posterior, 60)
-    whole = estimator.run(**rows)
+    exact = estimator.on(model_error=0.0)
+    whole, averaged = exact.run(**rows), estimator.run(**rows)
     monkeypatch.setattr("soilml.onboard.set_posterior.ROWS_PER_CALL", 16)
-    parts = estimator.run(**rows)
+    parts = exact.run(**rows)
     assert_similar(parts, whole)
+    # errors of the model are linear at the soil that is known when a row arrives
+    assert (np.abs(estimator.run(**rows).mean - averaged.mean) < 0.5 * averaged.std).all()
     assert (parts.mean != whole.mean).any() and parts.rows_used == 60  # not the same computation

@@ -9,6 +9,7 @@ from datagen.recipe import read_recipe
 from soilml.config.measurement_noise import Noise
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
+    LAW_ERROR_COLUMNS,
     MEMORY_INPUTS,
     MODEL_ERROR_COLUMNS,
 )
@@ -22,6 +23,7 @@ from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value, constant
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import (
+    LAW_ERRORS,
     USUAL_MODEL_ERRORS,
     typical_model_errors,
 )
@@ -128,7 +130,7 @@ def test_columns_of_the_bearing_are_changes_with_its_logarithm(kind, request):
 def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
     posterior = request.getfixturevalue(kind)
     family, readings = posterior.family, true_readings(posterior.family)
-    found = model_columns(posterior, readings, 2.0)[:, :, 3]
+    found = model_columns(posterior, readings, -1.0)[:, :, 3]
     kappa = ExitAngle.about.reference["kappa"]
     case = family.recipe.case
     model = replace(case.model, effects=(ExitAngle(kappa=kappa),))
@@ -137,7 +139,7 @@ def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
     change = other.responses(designs, SOIL[None, None]) - family.responses(
         designs, SOIL[None, None]
     )
-    expected = 2.0 * change[:, 0].T
+    expected = change[:, 0].T
     for channel in range(3):
         tolerance = 0.1 * np.abs(expected[channel]).max()
         assert found[channel] == pytest.approx(expected[channel], abs=tolerance)
@@ -147,7 +149,7 @@ def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
 def test_channels_have_errors_of_their_own(kind, request):
     posterior = request.getfixturevalue(kind)
     readings = true_readings(posterior.family)
-    found = model_columns(posterior, readings, 0.5)[:, :, 4:]
+    found = model_columns(posterior, readings, 0.5)[:, :, 4:9]
     of_torque = readings["torque"] * posterior_slope(posterior, readings)
     expected = np.zeros((3, len(SLIP), 5))
     for number, (name, channel, factor) in enumerate(
@@ -159,14 +161,47 @@ def test_channels_have_errors_of_their_own(kind, request):
             ("drawbar_pull_by_slip", 2, SLIP),
         ]
     ):
-        expected[channel, :, number] = 0.5 * USUAL_MODEL_ERRORS[name] * factor
+        expected[channel, :, number] = USUAL_MODEL_ERRORS[name] * factor
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-7)
     assert not model_columns(posterior, readings, 0.0).any()
 
 
+@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
+def test_columns_of_the_laws_are_changes_with_strength_and_shear_modulus(kind, request):
+    posterior, step = request.getfixturevalue(kind), 1e-3
+    family, readings = posterior.family, true_readings(posterior.family)
+    found = model_columns(posterior, readings, -1.0)[:, :, -len(LAW_ERROR_COLUMNS) :]
+    designs = family.features(np.stack([SLIP, LOAD], axis=1))
+    ends = np.linspace(-1.0, 1.0, 20001)
+
+    def channels(factor, names):
+        """Channels (rows, 3) where these unknowns, or the tangent of the angle, are larger."""
+        x = SOIL.copy()
+        for i, axis in enumerate(family.axes):
+            if axis.name in names:
+                own = axis.value(SOIL[i])
+                is_angle = axis.name == "friction_angle"
+                larger = np.arctan(factor * np.tan(own)) if is_angle else factor * own
+                x[i] = np.interp(larger, axis.value(ends), ends)
+        return posterior.response.predict(designs, x)
+
+    def change(*names):
+        return (channels(1.0 + step, names) - channels(1.0 - step, names)) / (2.0 * step)
+
+    of_load = np.log(LOAD / float(family.recipe.load.at(np.asarray(0.5))))[:, None]
+    strength = change("cohesion", "friction_angle")
+    for name, expected in (
+        ("strength", strength),
+        ("strength_by_load", of_load * strength),
+        ("shear_modulus", change("shear_modulus")),
+    ):
+        own = found[:, :, LAW_ERROR_COLUMNS.index(name)].T / LAW_ERRORS[name]
+        assert own == pytest.approx(expected, abs=0.01 * np.abs(expected).max())
+
+
 def test_what_the_model_has_is_none_of_its_errors(any_posterior):
     wheel = Model(Wheel(radius=0.1, width=0.1))
-    assert typical_model_errors(SHEAR, wheel) == USUAL_MODEL_ERRORS
+    assert typical_model_errors(SHEAR, wheel) == USUAL_MODEL_ERRORS | LAW_ERRORS
 
     def nil(unknown, model=wheel):
         return {name for name, std in typical_model_errors(unknown, model).items() if std == 0.0}

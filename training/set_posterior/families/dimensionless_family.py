@@ -245,12 +245,17 @@ class DimensionlessFamily:
             torque=torque,
             torque_slope=torque_slope,
             torque_by_load=1.0,
-            reference_log_load=0.0,
+            reference_log_load=log(radius * readings["wheel_width"]) + self._middle_pressure,
             most_torque_noise=MOST_RELATIVE_NOISE,
             length=radius,
             target_scale=target_scale.reshape(-1, 1),
             axis_std=concat([one, one, one, normal_std, normal_std], axis=0).reshape(-1, 1),
         )
+
+    @property
+    def _middle_pressure(self) -> float:
+        """Logarithm of a ground pressure (Pa) in the middle of the range."""
+        return float(np.mean(np.log(self.pressure)))
 
     def metadata(self) -> dict[str, Any]:
         """See `WheelFamily`."""

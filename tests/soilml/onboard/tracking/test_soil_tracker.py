@@ -45,9 +45,15 @@ def settled(estimator, wheel_posterior):
 
 def test_sound_rows_give_the_estimate_of_a_run(settled, estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 40)
-    together = estimator.run(**run)
-    assert settled.state.estimate.mean == pytest.approx(together.mean, rel=0.02)
-    assert settled.state.estimate.std == pytest.approx(together.std, rel=0.1)
+    exact = estimator.on(model_error=0.0)
+    tracker, together = SoilTracker(exact), exact.run(**run)
+    driven(tracker, rows_of(wheel_posterior, 40))
+    assert tracker.state.estimate.mean == pytest.approx(together.mean, rel=0.02)
+    assert tracker.state.estimate.std == pytest.approx(together.std, rel=0.1)
+    # errors of the model are linear at the soil that is known when a row arrives
+    found, together = settled.state.estimate, estimator.run(**run)
+    assert (np.abs(found.mean - together.mean) < 0.6 * together.std).all()
+    assert found.std == pytest.approx(together.std, rel=0.25)
     assert (settled.state.rows_remembered, settled.state.rows_since_change) == (40, 40)
 
 

@@ -1,0 +1,79 @@
+"""The likelihood is averaged over scales of the model's errors, with their determinants."""
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_COLUMNS
+from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import Value
+from training.set_posterior.scale_mixture import (
+    GROUPS,
+    JUDGED,
+    PROBABILITIES,
+    SCALES,
+    add_scale_mixture,
+)
+
+TERMS, ERRORS, ROWS, POINTS = 5, len(MODEL_ERROR_COLUMNS), 14, 6
+
+
+@pytest.fixture(scope="module")
+def session():
+    graph = Graph()
+    inputs = {name: Value(graph, name) for name in ("system", "size", "basis")}
+    mixture = add_scale_mixture(inputs["system"], inputs["size"], TERMS)
+    found = mixture.misfit(inputs["basis"])
+    found.surprise.node("Identity").named("surprise")
+    found.least.node("Identity").named("least")
+    found.log_parts.node("Identity").named("log_parts")
+    shapes = {"system": ["m", TERMS + ERRORS], "size": [1], "basis": [TERMS, POINTS]}
+    outputs = {name: (1, ["k", POINTS]) for name in ("surprise", "least", "log_parts")}
+    return session_of(graph.model(shapes, outputs))
+
+
+@pytest.fixture
+def example():
+    rng = np.random.default_rng(0)
+    system = rng.normal(size=(ROWS, TERMS + ERRORS)) * ([2.0] * TERMS + [0.7] * ERRORS)
+    return system, rng.normal(size=(TERMS, POINTS))
+
+
+def dense(system, basis, scale) -> tuple[np.ndarray, float]:
+    """Misfit (points,) and logarithm of the determinant of the covariance."""
+    residual, errors = system[:, :TERMS] @ basis, system[:, TERMS:] * scale
+    covariance = np.eye(ROWS) + errors @ errors.T
+    misfit = (residual * np.linalg.solve(covariance, residual)).sum(axis=0)
+    return misfit, float(np.linalg.slogdet(covariance)[1])
+
+
+def run(session, system, basis, size) -> list[np.ndarray]:
+    feed = {"system": system, "size": np.full(1, size), "basis": basis}
+    return session.run(None, {name: np.asarray(v, np.float32) for name, v in feed.items()})
+
+
+def test_the_likelihood_is_the_average_over_scales(session, example):
+    surprise, least, log_parts = run(session, *example, INFERRED)
+    parts, misfits = [], []
+    for scales, probability in zip(SCALES, PROBABILITIES, strict=True):
+        misfit, log_determinant = dense(*example, np.repeat(scales, GROUPS))
+        misfits.append(misfit)
+        parts.append(np.log(probability) - 0.5 * (misfit + log_determinant))
+    expected = logsumexp(parts, axis=0)
+    assert surprise[0] == pytest.approx(-2.0 * expected, rel=1e-4)
+    assert log_parts == pytest.approx(np.asarray(parts) - expected, abs=1e-3)
+    assert least[0] == pytest.approx(misfits[JUDGED], rel=1e-4)
+
+
+@pytest.mark.parametrize("size", [0.0, 0.5, 1.0])
+def test_a_size_that_is_told_is_the_only_one(session, example, size):
+    surprise, least, log_parts = run(session, *example, size)
+    misfit, log_determinant = dense(*example, np.full(ERRORS, size))
+    assert least[0] == pytest.approx(misfit, rel=1e-4)
+    assert surprise[0] == pytest.approx(misfit + log_determinant, rel=1e-4)
+    assert np.exp(log_parts) == pytest.approx(np.outer(PROBABILITIES, np.ones(POINTS)), rel=1e-3)
+
+
+def test_scales_rise_and_their_probabilities_are_one_in_all():
+    assert (np.diff(SCALES, axis=0) >= 0.0).all() and sum(GROUPS) == ERRORS
+    assert sum(PROBABILITIES) == pytest.approx(1.0)
