@@ -65,7 +65,7 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
     effects x are fitted with it to first order. A stage is stated if its tempered probability
     is ten times that of all others and of several causes together, and if it predicts rows kept
     back better than a discrepancy of each channel alone does. Only one change is considered at a
-    time; with readings of one channel, no stage is told.
+    time; with readings of one channel, or at several slip angles, no stage is stated.
 
     References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2; MacKay, Neural
     Computation 4(3), 1992, section 2 (the evidence); Vehtari and Ojanen, Statistics Surveys 6,
@@ -73,6 +73,9 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
     """
     fit = marginal.fit
     if not marginal.evidence.amplitude.any() or len(problem.readings.channels) < 2:
+        return None
+    angle = problem.readings.at.slip_angle
+    if angle is not None and np.ptp(angle) > 0.0:  # no change here turns the shear stress aside
         return None
     if not np.isfinite([*fit.prediction, *fit.linearisation.log_sinkage]).all():
         return None
