@@ -128,6 +128,7 @@ def adapt_board(later: LaterSoils) -> None:
     """A campaign on a wheel with an effect that the model lacks: the gap, and a better board."""
     title("4  A campaign disagrees: the missing effect, the gap, and a better board")
     old = FILES["fused"]
+    command("identify", MODEL, CAMPAIGN, "--out", str(OUT / "campaign.json"))
     words = ("--against", old, "--rows", str(ROWS), "--out", ADAPTED)
     command("adapt", MODEL, CAMPAIGN, *words)
     lines = []

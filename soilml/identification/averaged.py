@@ -15,6 +15,7 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.misfit import fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
+from soilml.identification.fit import SoilExplanation
 from soilml.identification.hypotheses import ErrorHypothesis, fit_hypothesis
 from soilml.identification.posterior import PosteriorSamples
 from soilml.identification.soil_density import SoilDensity
@@ -41,14 +42,6 @@ TEMPERING = 0.5
 MOST_EFFECTS = 4  # Most effects that are fitted beside errors of one scale
 #: Ratio to the largest weight below which an explanation is not fitted, or not sampled.
 LEAST_WEIGHT = 0.01
-
-
-@dataclass(frozen=True)
-class SoilExplanation:
-    """An explanation of the rows and its probability."""
-
-    hypothesis: ErrorHypothesis
-    probability: float
 
 
 @dataclass(frozen=True)
@@ -195,9 +188,15 @@ def _mixture(
         np.concatenate([w * own.weights for w, own in zip(weights, samples, strict=True)]),
         float(np.logaddexp.reduce(logs)),
     )
-    stated = [SoilExplanation(h, float(w)) for (h, _), w in zip(kept, weights, strict=True)]
-    stated.sort(key=lambda e: -e.probability)
+    shares: dict[tuple[str, float], float] = {}
+    for (h, _), w in zip(kept, weights, strict=True):  # two sizes of one effect are one statement
+        shares[h.effect, h.scale] = shares.get((h.effect, h.scale), 0.0) + float(w)
+    stated = sorted((SoilExplanation(*of, w) for of, w in shares.items()), key=_improbability)
     return AveragedSamples(sample, misfit, scale, tuple(stated))
+
+
+def _improbability(one: SoilExplanation) -> float:
+    return -one.probability
 
 
 def _normalised(logs: Sequence[float]) -> Floats:

@@ -72,14 +72,10 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
             "of the catalogue explain: run soilml gap; std is multiplied by this factor"
         )
         fit = replace(fit, warnings=(*fit.warnings, Remark("excess-residuals", text)))
-    named: dict[str, float] = {}
-    for one in found.explanations:  # two sizes of one effect have one label
-        label = one.hypothesis.label
-        named[label] = named.get(label, 0.0) + one.probability
-    if not any(one.hypothesis.exact for one in found.explanations):
+    if not any(one.exact for one in found.explanations):
         text = "other explanations are a hundred times as likely as the model taken as exact"
         exact = replace(exact, warnings=(*exact.warnings, Remark("unlikely", text)))
-    return replace(fit, explanations=named, exact_model=replace(exact, samples=None))
+    return replace(fit, explanations=found.explanations, exact_model=replace(exact, samples=None))
 
 
 def soil_samples(

@@ -38,6 +38,48 @@ AGAINST_EXACT = ("excess-residuals", "unlikely")
 
 
 @dataclass(frozen=True)
+class SoilExplanation:
+    """One way in which sensors and model may differ from the model file.
+
+    Attributes
+    ----------
+    effect
+        Name of an effect of the catalogue that the model lacks; "" for none.
+    error_scale
+        Size of all errors of sensors and model over the typical ones; 0 for those declared alone.
+    probability
+        Its share in the averaged answer.
+    """
+
+    effect: str
+    error_scale: float
+    probability: float
+
+    @property
+    def exact(self) -> bool:
+        """Whether it takes model and sensors to be exactly as in the file."""
+        return not self.effect and self.error_scale == 0.0
+
+    def __str__(self) -> str:
+        """What it says, in words."""
+        if self.exact:
+            return "the model as in its file"
+        errors = f"typical errors x {self.error_scale:g}"
+        if not self.effect:
+            return errors
+        return f"{self.effect} and {errors}" if self.error_scale else self.effect
+
+    def as_json(self) -> dict[str, Any]:
+        """Its content in a report; `effect` is null for none."""
+        return {
+            "effect": self.effect or None,
+            "error_scale": self.error_scale,
+            "probability": self.probability,
+            "text": str(self),
+        }
+
+
+@dataclass(frozen=True)
 class Fit:
     """Estimates of p parameters with their covariance and warnings.
 
@@ -74,7 +116,7 @@ class Fit:
         Weighted samples of the posterior (`soilml.identification.posterior.PosteriorSamples`),
         where the method drew them.
     explanations
-        Of an averaged fit, the probability of each explanation of the rows, the likeliest first.
+        Of an averaged fit, the explanations of the rows, the likeliest first.
     exact_model
         Of an averaged fit, the one that takes model and sensors to be exactly as in the file.
     """
@@ -92,7 +134,7 @@ class Fit:
     low: Floats | None = None
     high: Floats | None = None
     samples: Any = field(default=None, repr=False, compare=False)
-    explanations: Mapping[str, float] = field(default_factory=dict)
+    explanations: tuple[SoilExplanation, ...] = ()
     exact_model: Fit | None = None
 
     @property
@@ -156,7 +198,7 @@ class Fit:
             "misfit": None if np.isnan(self.misfit) else float(self.misfit),
         }
         if self.explanations:
-            content["explanations"] = dict(self.explanations)
+            content["explanations"] = [one.as_json() for one in self.explanations]
         if self.exact_model is not None:
             exact = self.exact_model.as_json()
             kept = ("method", "parameters", "warnings", "misfit")

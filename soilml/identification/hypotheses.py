@@ -56,21 +56,6 @@ class ErrorHypothesis:
     effect: str = ""
     size: float = 0.0
 
-    @property
-    def label(self) -> str:
-        """What it says, in words."""
-        if self.exact:
-            return "the model as in its file"
-        errors = f"typical errors x {self.scale:g}"
-        if not self.effect:
-            return errors
-        return f"{self.effect} and {errors}" if self.scale else self.effect
-
-    @property
-    def exact(self) -> bool:
-        """Whether model and sensors are as in the model file."""
-        return self.scale == 0.0 and not self.effect
-
     def case_of(self, case: Case, effects: Mapping[str, type[Effect]]) -> Case:
         """The case with its effect and discrepancy."""
         if self.effect:

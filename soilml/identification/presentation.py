@@ -163,8 +163,8 @@ def _fit_text(found: Fit) -> str:
     first = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
     if len(unknown) == len(found.names):
         first = f"nothing is determined by these rows\n\n{first}"
-    shares = sorted(found.explanations.items(), key=lambda item: -item[1])[:_MOST_EXPLANATIONS]
-    parts = [f"{label} {share:.0%}" for label, share in shares]
+    shown = found.explanations[:_MOST_EXPLANATIONS]
+    parts = [f"{one} {one.probability:.0%}" for one in shown]
     by = f"\nexplained by: {', '.join(parts)}" if parts else ""
     warnings = "".join(f"\n! {text}" for text in found.warnings)
     return f"{first}\n\n{format_table(head, rows)}{by}{warnings}"

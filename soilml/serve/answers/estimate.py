@@ -65,7 +65,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         **table_summary(table),
         "remarks": texts(remarks),
         "parameters": parameters(case, fit, exact),
-        "explanations": dict(fit.explanations),
+        "explanations": [one.as_json() for one in fit.explanations],
         "use": "" if exact is None else exact.use_of_exact.text,
         "words": words(fit, advice),
         "warnings": texts(r for r in fit.warnings if r.code not in STATED_BESIDE),

@@ -106,8 +106,8 @@ function exactWords({ exact, exact_band: ends, identified, unit }) {
 }
 
 /** The explanations with their probabilities, in words. */
-function explained(shares) {
-  const named = Object.entries(shares ?? {}).map(([label, share]) => `${label} ${percent(share)}`);
+function explained(explanations) {
+  const named = (explanations ?? []).map((one) => `${one.text} ${percent(one.probability)}`);
   return named.length ? ` (${named.join(", ")})` : "";
 }
 
