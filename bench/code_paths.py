@@ -109,18 +109,25 @@ def counted_calls(folder: Path) -> list[CountedCall]:
 
     return [
         CountedCall("`Estimator.__call__`", lambda: estimator(slip=0.3, torque=4.2, load=60.0)),
-        CountedCall("`soilml identify`", command("identify"), 55),
+        CountedCall("`soilml identify --method nonlinear`", command("identify", *NONLINEAR), 55),
+        CountedCall(
+            "`soilml identify`, which weighs the catalogue, without the files of effects",
+            command("identify"),
+            75,
+            EFFECTS_FOLDER,
+        ),
         CountedCall("`soilml identify --method posterior`", command("identify", *POSTERIOR)),
         CountedCall(
             "`soilml gap`, without the files of effects",
             command("gap", "--out", str(folder / "gap")),
             130,
-            "soilml/physics/effects/",
+            EFFECTS_FOLDER,
         ),
     ]
 
 
-POSTERIOR = ("--method", "posterior")
+NONLINEAR, POSTERIOR = ("--method", "nonlinear"), ("--method", "posterior")
+EFFECTS_FOLDER = "soilml/physics/effects/"
 
 
 def _run(*words: str) -> None:

@@ -102,7 +102,7 @@ def identify(
     >>> rows = Table({"slip": slip, "load_N": load, "torque_Nm": torque})
     >>> fit = identify(case, rows)
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
-    0.489 +- 0.006 rad
+    0.494 +- 0.040 rad
     """
     table = as_table(table)
     if method not in METHODS:

@@ -280,7 +280,7 @@ class Estimate:
         >>> wide = estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0, 60.0])
         >>> narrow = wide.within(cohesion=(200.0, 800.0))
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
-        594 Pa, 195 Pa
+        771 Pa, 174 Pa
         """
         lower, upper = _box_ends(self, box)
         prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)

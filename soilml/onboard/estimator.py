@@ -192,7 +192,7 @@ class Estimator:
         ... )
         >>> mean, std = estimate["friction_angle"]
         >>> f"{mean:.2f} +- {std:.2f} rad"
-        '0.46 +- 0.02 rad'
+        '0.51 +- 0.07 rad'
         """
         if self.sets is not None:
             rows = without_copies(self._configured_sets.rows(measured))

@@ -139,7 +139,8 @@ def drive(
 
 def run_day(steps: int, per_soil: int, seed: int, show: bool = False) -> Result:
     """Drive `steps` readings over soils of `per_soil` readings each, with the released file."""
-    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
+    # errors of the model are linearised at the soil that is known when a row arrives
+    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx").on(model_error=0.0)
     rng, result, done = np.random.default_rng(seed), Result(), 0
     while done < steps:
         count = min(per_soil, steps - done)

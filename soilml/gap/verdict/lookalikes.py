@@ -38,12 +38,12 @@ def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]
         if float(np.linalg.norm(whole)) < VISIBLE or left >= UNSEEN:
             continue
         part = np.abs(change) * np.linalg.norm(soil.jacobian, axis=0)
-        told = [
+        taken = [
             c.name.replace("_", " ")
             for c, own in zip(soil.coordinates, part, strict=True)
             if own >= NOTABLE * part.max()
         ]
-        alike.setdefault(tuple(told), []).append(s.name)
+        alike.setdefault(tuple(taken), []).append(s.name)
     return [
         Remark(
             "like-another-soil",

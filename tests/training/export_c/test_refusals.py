@@ -96,12 +96,14 @@ def test_no_row_is_no_answer(wheel):
     assert wheel.answer(wheel.start())[0] == wheel.codes["NO_ROWS"]
 
 
-def test_rows_out_of_range_are_told_and_end_in_the_prior(wheel, memory):
+def test_rows_out_of_range_are_set_aside_and_end_in_the_prior_where_they_are_most(wheel, memory):
     before = list(memory.factor)
     rows = wheel.rows(slip=[0.7, 0.3], torque=[3.0, 3.0], load=[60.0, 500.0])
     assert wheel.step(memory, rows) == (0, [False, False])
     assert list(memory.factor) == before and list(memory.counted) == [3.0, 5.0, 3.0]
-    code, answer = wheel.answer(memory)
+    assert wheel.answer(memory)[0] == 0  # two of five rows are set aside
+    assert wheel.step(memory, rows) == (0, [False, False])
+    code, answer = wheel.answer(memory)  # four of seven are more than half
     assert code == wheel.codes["OUT_OF_RANGE"] and not answer["in_range"]
     assert answer["abstains"].all()
 
