@@ -76,6 +76,7 @@ bench-gap: $(VENV)/.ready ## 446 sets with hidden effects against gates and base
 	  --disable-pip-version-check --editable '.[bench]'
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 4 --write \
 	  --keep build/gap_records.json
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap_speed.py --write
 
 bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of seeds to tune on: nothing is written
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --seed 1 --every 20

@@ -46,10 +46,10 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
         "snr": 0.0,
     }
     try:
-        case = _case(drawn.model)
+        case = read_model(drawn.model)
         apart = separation(case, table, drawn.truth)
         record |= {"signal": apart.signal, "snr": apart.snr, "rival": apart.rival}
-        record["solves"] = _solutions_per_second(case)
+        record["solves"] = forward_speed(case)
         started = time.process_time()
         report = gap(case, table, seed=0)
     except Exception as error:  # a crash is a finding of the benchmark, not its end
@@ -70,7 +70,7 @@ def _relatives(tier: str, truth: tuple[str, ...]) -> list[str]:
     return [n for n, e in EFFECTS.items() if getattr(e.about, "family", "") in families]
 
 
-def _solutions_per_second(case: Case) -> float:
+def forward_speed(case: Case) -> float:
     """Forward solutions of the case's wheel in a second of one core."""
     model = next(iter(case.gears.values()), case.model)
     rng = np.random.default_rng(0)
@@ -80,7 +80,7 @@ def _solutions_per_second(case: Case) -> float:
     return SOLUTIONS / (time.process_time() - started)
 
 
-def _case(model: str) -> Case:
+def read_model(model: str) -> Case:
     """The case in the text of a model file."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "model.toml"

@@ -20,7 +20,7 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
-from gap_case import _case
+from gap_case import read_model
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan, benchmark_plans
@@ -51,7 +51,7 @@ def compared(plan: Plan) -> dict[str, Any]:
     """
     drawn = draw_blind_set(plan)
     runs, region = Table(dict(drawn.columns)), Table(dict(drawn.region))
-    case = _case(drawn.model)
+    case = read_model(drawn.model)
     kept = np.random.default_rng(plan.seed).permutation(len(runs)) < len(runs) // ONE_IN
     learned = runs.rows(~kept)
     report = gap(case, learned, seed=0)

@@ -31,6 +31,7 @@ from datagen.blind_sets.reference_wheel import (
 )
 from datagen.blind_sets.run_schedules import (
     COVARIATE_COLUMNS,
+    POINTS,
     RunSchedule,
     design_schedule,
     heavier_schedule,
@@ -83,11 +84,12 @@ class BlindSet:
     truth: dict[str, Any]
 
 
-def draw_blind_set(plan: Plan) -> BlindSet:
+def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
     """Simulate the blind set of a plan; the same plan gives the same set, bit by bit.
 
     plan: Mechanism, its size, noise, number of runs, soil family, number of free parameters, seed,
         size of the smooth discrepancy, and design.
+    rows: Number of rows in all, of designs that are not about operating points.
 
     Returns: Runs, held-out region, model text and truth. Every row has an equilibrium with and
     without the mechanism: soils without one are drawn again.
@@ -108,7 +110,7 @@ def draw_blind_set(plan: Plan) -> BlindSet:
         generator = np.random.default_rng((plan.seed, attempt))
         extras = np.random.default_rng((plan.seed, attempt, 1))
         needs = {mechanism.needs for mechanism, _ in active} - {""}
-        runs = design_schedule(plan.design, plan.runs, needs, generator)
+        runs = design_schedule(plan.design, plan.runs, needs, generator, rows)
         region = heavier_schedule(runs, generator, slip_range(plan.design))
         soil = FAMILIES[plan.soil_family].soil(generator)
         wheels: Wheels = ((RADIUS, WIDTH),)

@@ -64,13 +64,17 @@ class RunSchedule:
 
 
 def design_schedule(
-    design: str, runs: int, needs: set[str], generator: np.random.Generator
+    design: str,
+    runs: int,
+    needs: set[str],
+    generator: np.random.Generator,
+    rows: int = POINTS,
 ) -> RunSchedule:
     """The operating points of a design of `DESIGNS` with a number of runs.
 
-    Designs that are not about operating points have those of `sweep`. With repeats, the number of
-    runs is rounded to two loads at least, each driven two or three times. Two gears halve it: each
-    run is driven with both wheels.
+    Designs that are not about operating points have those of `sweep`, with so many rows in all.
+    With repeats, the number of runs is rounded to two loads at least, each driven two or three
+    times. Two gears halve it: each run is driven with both wheels.
     """
     if design == "few-rows":
         level = LOAD[0] * (LOAD[1] / LOAD[0]) ** generator.uniform()
@@ -90,7 +94,8 @@ def design_schedule(
     if design == "two-gears":
         once = sweep_schedule(runs // 2, needs, generator, points=POINTS // runs)
         return with_both_gears(once)
-    return sweep_schedule(runs, needs, generator, slip=slip_range(design))
+    points = min(rows // runs, MOST_RUN_POINTS * rows // POINTS)
+    return sweep_schedule(runs, needs, generator, points=points, slip=slip_range(design))
 
 
 def slip_range(design: str) -> tuple[float, float]:
