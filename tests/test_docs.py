@@ -74,7 +74,7 @@ def test_the_analyses_of_the_readme_find_the_hidden_effect(monkeypatch):
     assert names["fit"].names == ("cohesion", "friction_angle", "shear_modulus")
     exact = names["fit"].exact_model
     assert any(remark.code == "excess-residuals" for remark in exact.warnings)
-    assert "slip-sinkage" in " ".join(names["fit"].explanations)
+    assert names["fit"].explanations[0].effect == "slip-sinkage"
     assert names["report"].status == "named"
     assert names["report"].cause_set == (("slip-sinkage",),)
 
