@@ -19,10 +19,10 @@ static any_wheel_context wheel_on_dry_sand(float radius, float width)
     wheel.bearing_std = 0.1f;
     wheel.cohesion_max = 3000.0f;
     wheel.shear_modulus_max = 0.03f;
-    // errors that all rows share: as usual
+    // NAN: the value of the file, typical errors of sensors and the averaged answer
     wheel.slip_bias = wheel.load_gain = wheel.torque_gain = NAN;
     wheel.sinkage_bias = wheel.drawbar_pull_bias = NAN;
-    wheel.model_error = 0.0f; // the model is right; 1: its errors are as usual
+    wheel.model_error = NAN; // 0: the model is right
     return wheel;
 }
 

@@ -10,9 +10,6 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.report import numbers
 from soilml.report.page import ReportTable
 
-#: What the two intervals of `estimate` are called on a page.
-MODEL_EXACT, TYPICAL_ERRORS = "model taken as exact", "with typical errors of model and sensors"
-
 
 @dataclass(frozen=True)
 class ParameterLine:
