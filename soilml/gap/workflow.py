@@ -341,7 +341,7 @@ def _build_report(
         conditions = (*conditions, noise_range(analysis, decision.shown))
     return replace(
         report,
-        suspects=tuple(suspects(analysis)),
+        suspects=tuple(suspects(analysis, decision.claimed)),
         conditions=conditions,
         where=tuple(discrepancy_map(problem, result.soil, seed)),
         residual_trend=residual_trend(problem, left_by.fit),

@@ -110,14 +110,21 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
     return summaries
 
 
-def suspects(analysis: Analysis) -> list[Suspect]:
+def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect]:
     """Explanations with their odds against all others, the likeliest first.
 
     None stands before the likeliest one that was fitted in full, whose figures are shown; after it
-    come those only whose odds the data raise.
+    come those only whose odds the data raise. A set that adds effects to a claimed one is listed
+    as that one, since the evidence for what it adds is not decisive.
     """
     problem, posterior = analysis.problem, analysis.result.posterior
-    ranked = posterior.ranked()
+    stated = [c.names for c in claimed]
+
+    def as_claimed(names: tuple[str, ...]) -> tuple[str, ...]:
+        return next((own for own in stated if set(own) <= set(names)), names)
+
+    listed = dict.fromkeys([*stated, *(as_claimed(names) for names, _ in posterior.ranked())])
+    ranked = sorted(((n, posterior.log_odds(*n)) for n in listed), key=lambda item: -item[1])
     fitted = {c.names for c in analysis.result.candidates}
     first = next((i for i, (names, _) in enumerate(ranked) if names in fitted), 0)
     rest = [

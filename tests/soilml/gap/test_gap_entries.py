@@ -99,19 +99,28 @@ def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_
 
 def test_suspects_are_the_likeliest_eight_under_stated_conditions():
     weights = {(f"e{i}",): -1.0 - i for i in range(12)} | {(): -3.0}
-    found = suspects(analysed(weights=weights))
+    found = suspects(analysed(weights=weights), ())
     # prior odds of 1 to e^4: those below 1 to e^4 beside the soil alone are none, but the first
     assert [s.effects[0] for s in found] == [f"e{i}" for i in range(6)]
-    many = suspects(analysed(weights={names: 0.1 * w for names, w in weights.items()}))
+    many = suspects(analysed(weights={names: 0.1 * w for names, w in weights.items()}), ())
     assert [s.effects[0] for s in many] == [f"e{i}" for i in range(8)]
     unlikely = {("e0",): -9.0, (): -3.0}
-    assert [s.effects for s in suspects(analysed(weights=unlikely))] == [("e0",)]
+    assert [s.effects for s in suspects(analysed(weights=unlikely), ())] == [("e0",)]
     assert found[0].log_odds > found[1].log_odds
     plain = conditions_of_suspects(analysed(), [])
     assert [c.code for c in plain] == ["catalogue-complete"]
     one = conditions_of_suspects(analysed(runs=("a",)), [Remark(ONE_LOAD, "")])
     assert conditions_text(one).startswith("if no other cause than those of the catalogue has a ")
     assert ", and if the bed was the same for all rows, and if the soil" in conditions_text(one)
+
+
+def test_a_pair_that_contains_a_named_effect_is_listed_as_that_effect():
+    weights = {("a", "b"): -0.1, ("a",): -3.0, ("c",): -8.0, (): -30.0}
+    given = analysed(made("a"), made("a", "b"), weights=weights)
+    assert suspects(given, ())[0].effects == ("a", "b")
+    found = suspects(given, [made("a")])
+    assert [s.effects for s in found] == [("a",), ("c",)]
+    assert found[0].log_odds > found[1].log_odds
 
 
 def notes(given):
