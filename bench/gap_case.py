@@ -29,6 +29,9 @@ SOLUTIONS = 4000
 ORDER = "progress"
 #: The other methods are run on one set in so many.
 EVERY = 8
+#: Causes of another law than the catalogue's that an effect names rightly: both the layer and the
+#: firm base are firmer ground at a depth below loose soil, where the pressure rises faster.
+SAME_CAUSE = {"stiff-layer": ["firm-base"]}
 
 
 def judged(job: tuple[int, Plan]) -> dict[str, Any]:
@@ -61,7 +64,9 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
 
 
 def _relatives(tier: str, truth: tuple[str, ...]) -> list[str]:
-    """Effects that are right too: those of the law's family, or of a soil that changes."""
+    """Effects that are right too: of the law's family, of a soil that changes, or `SAME_CAUSE`."""
+    if tier == "C":
+        return [n for cause in truth for n in SAME_CAUSE.get(cause, ())]
     if tier == "T":
         return [n for n, e in EFFECTS.items() if ORDER in getattr(e.about, "uses", ())]
     families = {getattr(EFFECTS[n].about, "family", "") for n in truth if n in EFFECTS} - {""}

@@ -8,13 +8,13 @@ from gap_records import (
     NAMEABLE_SIGMA,
     Figure,
     Judged,
+    falsely_unique,
     nameable,
     rate,
     related,
     share,
     suspected,
     table,
-    unique,
 )
 
 #: Signature, in sigma, from which a set shows that something is missing.
@@ -33,9 +33,11 @@ def figures(sets: Sequence[Judged]) -> Iterator[Figure]:
     yield share("soil changes, signature of 6 sigma: change is first", told, len(own))
     for tier, words in (("L", "another law"), ("T", "soil that changes")):
         own = _tier(sets, tier)
-        yield share(f"falsely unique: {words}", sum(map(_false, own)), len(own), "<= 0.03")
+        yield share(f"falsely unique: {words}", sum(map(falsely_unique, own)), len(own), "<= 0.03")
     own = [s for tier in "LTC" for s in _tier(sets, tier)]
-    yield share("falsely unique: tiers L, T and C", sum(map(_false, own)), len(own), "<= 0.03")
+    yield share(
+        "falsely unique: tiers L, T and C", sum(map(falsely_unique, own)), len(own), "<= 0.03"
+    )
     every = [s for s in sets if s["design"] == "few-rows" and s["catalogued"]]
     own = [s for s in every if nameable(s)]
     for most, place, goal in ((1, "first", ">= 0.70"), (3, "in the first three", ">= 0.90")):
@@ -48,17 +50,12 @@ def figures(sets: Sequence[Judged]) -> Iterator[Figure]:
     silent = sum(s["status"] == "no-gap" for s in own)
     yield share("torque alone, signature of 6 sigma: `no-gap`", silent, len(own))
     own = [s for s in sets if s["design"] == "torque-alone"]
-    yield share("torque alone: falsely unique", sum(map(_false, own)), len(own), "<= 0.05")
+    yield share("torque alone: falsely unique", sum(map(falsely_unique, own)), len(own), "<= 0.05")
 
 
 def _tier(sets: Sequence[Judged], tier: str) -> list[Judged]:
     """Sets of a tier, but those of designs with figures of their own."""
     return [s for s in sets if s["tier"] == tier and s["design"] == "sweep"]
-
-
-def _false(s: Judged) -> bool:
-    """Whether one explanation is stated that is neither right nor of the right family."""
-    return unique(s) and not set(s["cause_set"][0]) <= {*s["truth"], *s.get("relatives", ())}
 
 
 def text(sets: Sequence[Judged]) -> str:
@@ -76,7 +73,7 @@ def text(sets: Sequence[Judged]) -> str:
                     str(len(part)),
                     rate(sum(map(related, clear)), len(clear)),
                     rate(sum(map(related, seen)), len(seen)),
-                    str(sum(map(_false, part))),
+                    str(sum(map(falsely_unique, part))),
                 )
             )
     if not rows:

@@ -71,8 +71,18 @@ def first(s: Judged) -> bool:
 
 
 def right(s: Judged) -> bool:
-    """Whether every effect of the best explanation is one that was hidden."""
-    return bool(s.get("cause_set")) and set(s["cause_set"][0]) <= set(s["truth"])
+    """Whether every effect of the best explanation is one that was hidden, or right too."""
+    return bool(s.get("cause_set")) and set(s["cause_set"][0]) <= answers(s)
+
+
+def answers(s: Judged) -> set[str]:
+    """The effects that were hidden, and those that are right too where another law was."""
+    return {*s["truth"], *s.get("relatives", ())}
+
+
+def falsely_unique(s: Judged) -> bool:
+    """Whether one explanation is stated that is neither right nor of the right family."""
+    return unique(s) and not right(s)
 
 
 def suspected(s: Judged, most: int) -> bool:
@@ -83,7 +93,7 @@ def suspected(s: Judged, most: int) -> bool:
 def related(s: Judged) -> bool:
     """Whether the likeliest explanation has an effect of the truth, or of its family."""
     likeliest = (s.get("cause_set") or s.get("suspects") or ((),))[0]
-    return bool({*s["truth"], *s.get("relatives", ())} & set(likeliest))
+    return bool(answers(s) & set(likeliest))
 
 
 def nameable(s: Judged) -> bool:

@@ -34,7 +34,7 @@ class Bin:
 def statements(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
     """(n,) stated probabilities, ascending, and (n,) whether the effect was hidden in that set."""
     pairs = [
-        (p, name in s["truth"] or (s["tier"] == "T" and name in s.get("relatives", ())))
+        (p, name in s["truth"] or (s["tier"] in ("T", "C") and name in s.get("relatives", ())))
         for s in sets
         for name, p in s.get("probabilities", {}).items()
     ]

@@ -15,6 +15,7 @@ from gap_records import (
     Figure,
     Judged,
     bare,
+    falsely_unique,
     holds,
     nameable,
     own_figures,
@@ -80,7 +81,7 @@ def _false_names(sets: Sequence[Judged]) -> Iterator[Figure]:
         "cause outside the catalogue": [s for s in sets if s["tier"] == "C"],
     }
     for name, own in groups.items():
-        yield share(f"falsely unique: {name}", sum(map(unique, own)), len(own), "<= 0.05")
+        yield share(f"falsely unique: {name}", sum(map(falsely_unique, own)), len(own), "<= 0.05")
     for name in ("null", "scatter"):
         own = groups[name]
         hits = sum(s["status"] in CLAIMING_STATUSES for s in own)

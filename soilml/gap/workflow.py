@@ -220,7 +220,9 @@ def gap(
         held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
         held_out = held_out.subset(np.isfinite(held_out.std))
     gains = predictive_gains(analysis.predictions)
-    analysis = replace(analysis, result=with_refused_outside(analysis.result, gains))
+    analysis = replace(
+        analysis, result=with_refused_outside(analysis.problem, analysis.result, gains)
+    )
     agreement = noise_agreement(case, readings, soil, analysis)
     report = _build_report(case, analysis, checks, split, held_out, agreement, seed=seed)
     report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
@@ -358,7 +360,7 @@ def _changed_by_outliers(
     if analysis.of_all is None:
         return []
     whole = analysis.of_all
-    result = with_refused_outside(whole.result, {})
+    result = with_refused_outside(whole.problem, whole.result, {})
     smooth = result.has_gap and not is_left_open(result)
     conflicts = [] if smooth else disagreements(whole.problem, result.soil)
     other = decide(whole.problem, result, obstacles, conflicts)

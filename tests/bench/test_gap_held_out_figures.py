@@ -9,9 +9,11 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import gap
+import gap_case
 import gap_families
 import gap_held_out
 import gap_pages
+import gap_table
 
 from datagen.blind_sets.plans import Plan, benchmark_plans
 
@@ -92,6 +94,17 @@ def test_a_law_of_the_same_family_is_right_and_any_other_is_false():
     assert figure(found, "falsely unique: another law").measured.endswith("1/3")
     mixed = law(cause_set=[("shear-softening", "slip-sinkage")])
     assert figure(gap_families.figures([mixed]), "falsely unique: another").measured.endswith("1/1")
+
+
+def test_a_firm_base_is_a_right_name_of_a_stiff_layer():
+    relatives = gap_case._relatives("C", ("stiff-layer",))
+    assert relatives == ["firm-base"] and gap_case._relatives("C", ("crust",)) == []
+    layer = record(tier="C", truth=("stiff-layer",), catalogued=False, relatives=relatives)
+    sets = [layer | {"cause_set": [(name,)]} for name in ("firm-base", "slope")]
+    found = list(gap_families.figures(sets))
+    assert figure(found, "falsely unique: tiers L, T and C").measured.endswith("1/2")
+    assert figure(gap_table.figures(sets), "falsely unique: cause outside").measured.endswith("1/2")
+    assert "A stiff layer of tier C counts as named rightly" in gap_pages.text(sets, [])
 
 
 def test_few_rows_and_torque_alone_have_figures_of_their_own():

@@ -14,6 +14,7 @@ from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import Names, Posterior, not_rejected
 from soilml.gap.search.stepwise import SearchResult
+from soilml.gap.verdict.lookalikes import only_channels
 from soilml.quantities import column
 from soilml.remarks import Remark
 
@@ -98,7 +99,7 @@ def decide(
         remark = Remark("not-predictive", text, best.names)
         return Decision("suspected", (), _first_suspect(result), remark)
     listed = tuple(c for c in accepted if c.names not in result.posterior.unlisted)
-    if _far_from_catalogue(best):
+    if _far_from_catalogue(problem, result, best):
         text = OTHER_LAW.format(" + ".join(best.names))
         shown = _first_suspect(result) or best
         return Decision("suspected", (), shown, Remark("other-law", text, best.names))
@@ -172,7 +173,9 @@ def is_left_open(result: SearchResult) -> bool:
     return likeliest is None or soil_alone.objective <= likeliest.objective
 
 
-def with_refused_outside(result: SearchResult, gains: Mapping[Names, float]) -> SearchResult:
+def with_refused_outside(
+    problem: FitProblem, result: SearchResult, gains: Mapping[Names, float]
+) -> SearchResult:
     """The result with refused explanations counted as causes outside the catalogue.
 
     They need an implausible size, or another law than the catalogue's, or they predict rows that
@@ -184,7 +187,7 @@ def with_refused_outside(result: SearchResult, gains: Mapping[Names, float]) -> 
     candidates = [c for c in result.candidates if c.names]
     unlisted = {c.names for c in candidates if _implausible(c.fit) or _implausibly_large(c.fit)}
     unlisted |= {names for names, gain in gains.items() if gain <= 0.0}
-    far = unlisted | {c.names for c in candidates if _far_from_catalogue(c)}
+    far = unlisted | {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
     parts = [set(c.names) for c in result.accepted if c.names not in far]
     refused = {
         names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
@@ -193,10 +196,19 @@ def with_refused_outside(result: SearchResult, gains: Mapping[Names, float]) -> 
     return replace(result, posterior=found)
 
 
-def _far_from_catalogue(best: Explanation) -> bool:
-    """Whether an explanation needs another law than the catalogue's."""
-    most = MAX_SHAPE_DEVIATION if len(best.names) == 1 else MAX_SHAPE_DEVIATION_SEVERAL
-    return best.shape_deviation > most
+def _far_from_catalogue(problem: FitProblem, result: SearchResult, best: Explanation) -> bool:
+    """Whether an explanation needs another law than the catalogue's.
+
+    An effect that changes one channel alone is known by its law alone: it needs another one where
+    the soil alone, beside its smooth discrepancy, is as likely as the catalogue's law.
+    """
+    several, soil_alone = len(best.names) > 1, result.soil_alone
+    if best.shape_deviation > (MAX_SHAPE_DEVIATION_SEVERAL if several else MAX_SHAPE_DEVIATION):
+        return True
+    if several or soil_alone is None or not best.shape_supported:
+        return False
+    by_catalogue = best.catalogue_law.evidence.value + best.penalty
+    return by_catalogue >= soil_alone.objective and best.names[0] in only_channels(problem, result)
 
 
 def _implausible(fit: Solution) -> bool:

@@ -63,17 +63,14 @@ def like_another_force(
 
     Any force along the travel direction has such a signature, by whatever law it grows.
     """
-    readings = problem.readings
-    pull = readings.channels.index(PULL) if PULL in readings.channels else -1
-    if pull < 0 or len(readings.channels) == 1:
+    if len(problem.readings.channels) == 1:
         return []
-    own = readings.channel == pull
-    alone = []
-    for s in result.soil_test.signatures:
-        change = np.abs(s.column / readings.std)
-        on_pull = s.name in names and change[~own].max() < NEGLIGIBLE * change[own].max()
-        if on_pull and problem.effects[s.name].about.kind != "sensor":
-            alone.append(s.name)
+    channel = only_channels(problem, result)
+    alone = [
+        name
+        for name in names
+        if channel.get(name) == PULL and problem.effects[name].about.kind != "sensor"
+    ]
     return [
         Remark(
             "like-another-force",
@@ -83,3 +80,15 @@ def like_another_force(
         )
         for name in alone
     ]
+
+
+def only_channels(problem: FitProblem, result: SearchResult) -> dict[str, str]:
+    """The channel of each effect that changes one of the measured channels alone, by its name."""
+    readings = problem.readings
+    found = {}
+    for s in result.soil_test.signatures:
+        change = np.abs(s.column / readings.std)
+        own = readings.channel == readings.channel[int(np.argmax(change))]
+        if change[~own].max(initial=0.0) < NEGLIGIBLE * change.max():
+            found[s.name] = readings.channels[readings.channel[int(np.argmax(change))]]
+    return found

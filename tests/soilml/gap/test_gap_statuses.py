@@ -203,6 +203,20 @@ def test_another_law_is_stated_where_it_matters(law):
     assert status(searched(NONE, free, adequate=False)) == "partly-named"
 
 
+def test_an_effect_on_one_channel_is_not_named_by_another_law_alone(law, monkeypatch):
+    """What the catalogue's law explains less well than the soil alone is no name by its law."""
+    alone = {"dig": "drawbar_pull"}
+    monkeypatch.setattr(decision, "only_channels", lambda problem, result: alone)
+    for by_catalogue, expected in ((99.9, "form-open"), (100.0, "suspected")):
+        free = Explanation(("dig",), marginal(by_catalogue), marginal(15.0))
+        made = decide(PROBLEM, searched(NONE, free), (), ())
+        assert made.status == expected
+        assert (made.reason and made.reason.code) == (None if made.claimed else "other-law")
+    assert with_refused_outside(PROBLEM, searched(NONE, free), {}).posterior.refused
+    alone.clear()  # where several channels show it, their relation identifies it
+    assert status(searched(NONE, free)) == "form-open"
+
+
 def test_what_is_shown_is_the_suspect_that_is_listed_first():
     """An effect that was not fitted in full is passed over; other sets count towards theirs."""
     weights = {(): -5.0, ("dig",): -1.0, ("plough",): -2.0, ("unfitted",): -0.5}
@@ -262,9 +276,9 @@ def test_refused_explanations_lend_their_parts_that_are_accepted():
     pair = candidate("dig+plough", 18.0, coordinates=far[0], x=far[1])
     alone = candidate("plough", 21.0, coordinates=far[0], x=far[1])
     result = searched(NONE, DIG, pair, alone)
-    found = with_refused_outside(result, {}).posterior.refused
+    found = with_refused_outside(PROBLEM, result, {}).posterior.refused
     assert found == {("dig", "plough"): frozenset({"dig"}), ("plough",): frozenset()}
-    assert with_refused_outside(searched(NONE, DIG), {}).posterior.refused == {}
+    assert with_refused_outside(PROBLEM, searched(NONE, DIG), {}).posterior.refused == {}
 
 
 def test_candidates_are_summarised_against_the_soil_alone_and_the_best():
