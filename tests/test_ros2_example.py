@@ -1,181 +1,315 @@
-"""The ROS 2 example: its logic by itself, and its node with stand-ins for the libraries of ROS."""
+"""What the ROS 2 example does without ROS: messages of all kinds in, rows and reports out."""
 
-import importlib
+import math
 import sys
-import types
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from ros2_messages import GIVEN, LOAD, MODEL, RADIUS, ROOT, SAND, SECOND, contents, drive, play
 
-from soilml import Estimator, Model, Operating, Wheel, soil
+from soilml.errors import InputError, ModelFileError
 
-ROOT = Path(__file__).parents[1]
-RADIUS, LOAD = 0.15, 60.0
+sys.path.insert(0, str(ROOT / "examples" / "ros2"))
 
+from soil_estimator.clock import Stamp, StampedSamples
+from soil_estimator.logic import Level, SoilLogic
+from soil_estimator.rows import RowCollector
+from soil_estimator.settings import DEFAULTS, PARAMETERS, REQUIRED, settings_of
+from soil_estimator.slip import slip_of
 
-@pytest.fixture(autouse=True)
-def example(monkeypatch):
-    monkeypatch.syspath_prepend(str(ROOT / "examples" / "ros2"))
-    yield
-    for name in [n for n in sys.modules if n.split(".")[0] == "soil_estimator"]:
-        del sys.modules[name]
-
-
-def module(name):
-    return importlib.import_module(f"soil_estimator.{name}")
+#: Rows of a drive of a minute: the last stretch is not known to be complete.
+WHOLE = 59
 
 
-def drive(slips):
-    """Samples of ten seconds at each slip, twenty a second: time, wheel speed, torque, speed."""
-    force = Model(Wheel(radius=RADIUS, width=0.12))(
-        soil("wong1989/dry_sand"), Operating(slip=np.asarray(slips), load=LOAD)
+def logic(**given):
+    return SoilLogic(settings_of(GIVEN | given))
+
+
+def rows_of(reports):
+    names = ("row_slip", "row_torque")
+    return np.asarray([[r.stamp, *(r.values[name] for name in names)] for r in reports])
+
+
+@pytest.fixture(scope="module")
+def prompt():
+    """Reports of a drive of a minute whose messages arrive at once."""
+    return play(logic(), contents(drive()))
+
+
+def test_a_drive_over_sand_is_recognised(prompt):
+    assert len(prompt) == WHOLE == len({report.stamp for report in prompt})
+    last, known = prompt[-1], SAND
+    assert last.level is Level.OK and last.values["rows_remembered"] >= WHOLE - 1
+    for name in ("cohesion", "friction_angle"):
+        error = last.values[name] - float(getattr(known, name))
+        assert abs(error) < 3.0 * last.values[f"{name}_std"]
+        assert last.values[f"{name}_low"] < last.values[name] < last.values[f"{name}_high"]
+
+
+@pytest.mark.parametrize("delay", [0.05, 0.3, 0.9, 1.2, 1.9])
+def test_odometry_that_arrives_late_gives_the_same_rows(prompt, delay):
+    late = play(logic(), contents(drive(), delay))
+    assert np.array_equal(rows_of(late), rows_of(prompt))
+    assert late[-1].values == prompt[-1].values
+
+
+def test_messages_that_wait_on_the_way_and_come_twice_give_the_same_rows(prompt):
+    rng, ready, mixed = np.random.default_rng(0), {"joints": 0.0, "odometry": 0.0}, []
+    for at, (kind, *parts) in contents(drive()):
+        # each topic keeps its order, as in ROS
+        ready[kind] = max(ready[kind], at + rng.exponential(0.2))
+        mixed += [(ready[kind], (kind, *parts))] * 2
+    mixed.sort(key=lambda each: each[0])
+    own = logic()
+    assert np.array_equal(rows_of(play(own, mixed)), rows_of(prompt))
+    assert own.inputs(160.0).values["repeated_stamps"] > 500
+
+
+@pytest.mark.parametrize("every", [2, 5])
+def test_slow_odometry_gives_as_many_rows(every):
+    assert len(play(logic(), contents(drive(), odometry_every=every))) == WHOLE
+
+
+def test_later_than_the_patience_is_told_and_a_longer_patience_helps():
+    own, late = logic(), contents(drive(), 2.5)
+    assert play(own, late[:1150]) == []
+    told = own.inputs(late[1149][0])
+    assert told.level is Level.WARN
+    assert "odometry is stamped 2.6 s before the others, and patience is 2 s" in told.message
+    assert told.values["late_samples"] > 200
+    assert len(play(logic(patience=3.0), late)) == WHOLE
+
+
+def test_fields_that_are_missing_are_no_samples():
+    own = logic()
+    for at, (kind, *parts) in contents(drive(20)):
+        if kind == "joints":
+            stamp, names, speed, effort = parts
+            # speed and effort in messages of their own, in another order and with other joints
+            turned = [names[::-1], speed[::-1], effort[::-1]]
+            own.on_joints(stamp, turned[0], turned[1], [], at)
+            own.on_joints(stamp, turned[0], [], turned[2], at)
+            own.on_joints(stamp, ["other"], [7.0], [7.0], at)
+            own.on_joints(stamp, names, speed[:1], [math.nan] * 2, at)
+        else:
+            own.on_odometry(*parts, at)
+    assert own.soil().values["rows_accepted"] == 19
+    own = logic()
+    for at, (kind, *parts) in contents(drive(20)):
+        parts = [*parts[:-1], []] if kind == "joints" else parts
+        assert play(own, [(at, (kind, *parts))]) == []
+    told = own.inputs(120.0)
+    assert told.level is Level.ERROR and told.message == "no effort of the joint since the start"
+
+
+def test_what_does_not_arrive_is_told():
+    own = logic()
+    assert own.inputs(100.0).level is Level.OK  # has just begun to wait
+    assert own.inputs(104.0).message == "no velocity of the joint since the start"
+    own.on_joints(SECOND, ["left", "right"], [], [], 105.0)
+    assert (
+        "no joint wheel_joint in joint_states, which has left, right" in own.inputs(106.0).message
     )
-    rng, time = np.random.default_rng(0), 0.0
-    for slip, torque in zip(slips, force.torque, strict=True):
-        for _ in range(20):
-            noise = 1.0 + 0.02 * rng.normal(size=2)
-            yield time, 1.0 * noise[0], torque * noise[1], RADIUS * (1.0 - slip)
-            time += 0.05
+    own = logic()
+    play(own, contents(drive(10)))
+    assert own.inputs(110.0).level is Level.OK
+    assert own.inputs(120.0).message == "no velocity of the joint for 10.1 s"
 
 
-def test_rows_are_means_of_a_stretch():
-    rows = module("rows").RowCollector(RADIUS, LOAD, period=1.0)
-    assert rows.add(0.0, {"wheel_speed": 1.0, "torque": 2.0}) is None
-    assert rows.add(0.5, {"wheel_speed": 3.0, "torque": 4.0, "speed": 0.15}) is None
-    row = rows.add(1.1, {"speed": 0.15})
-    assert row == pytest.approx({"slip": 0.5, "torque": 3.0, "load": LOAD})
+def test_after_another_soil_it_recovers_by_itself(prompt):
+    own = logic()
+    other = replace(SAND, cohesion=300.0, friction_angle=0.75, shear_modulus=0.01)
+    play(own, contents(drive(40)))
+    after = play(own, contents(drive(40, other, begin=200, seed=1)))
+    events = [report.values["event"] for report in after]
+    assert "SOIL_CHANGED" in events[:8]
+    assert after[-1].level is Level.OK and after[-1].values["in_range"] == 1.0
+    assert after[-1].values["friction_angle"] > 1.1 * prompt[-1].values["friction_angle"]
+
+
+@pytest.mark.parametrize("fault", ["torque", "speed", "silent"])
+def test_after_a_fault_of_a_sensor_it_recovers_by_itself(fault):
+    own = logic()
+    found = []
+    for at, (kind, stamp, *parts) in contents(drive(60)):
+        if 120.0 <= at < 130.0:
+            if kind == "joints" and fault == "torque":
+                parts[2] = [9.0, 2.5]
+            if kind == "odometry" and fault == "speed":
+                parts[0] = 0.02
+            if kind == "odometry" and fault == "silent":
+                continue
+        found += play(own, [(at, (kind, stamp, *parts))])
+    assert found[-1].values["in_range"] == 1.0
+    during = [r for r in found if 122 * SECOND < r.stamp <= 130 * SECOND]
+    assert not [r for r in during if r.values["event"] == "ACCEPTED"]
+    late = [r.values["event"] for r in found if r.stamp > 140 * SECOND]
+    assert late.count("ACCEPTED") >= len(late) - 1
+
+
+def test_a_clock_that_is_set_back_begins_again_and_keeps_the_soil():
+    own = logic()
+    play(own, contents(drive(20, begin=1000)))
+    again = play(own, contents(drive(20, begin=7, seed=2)))
+    assert len(again) >= 18 and again[-1].level is Level.OK
+    assert again[-1].values["rows_remembered"] >= 36
+
+
+def test_single_wrong_stamps_change_nothing(prompt):
+    messages = contents(drive())
+    wrong = []
+    for i, (at, (kind, stamp, *parts)) in enumerate(messages):
+        wrong.append((at, (kind, stamp, *parts)))
+        if i % 50 == 25:
+            wrong.append((at, (kind, (0, -5, 10**18, stamp + 10**10)[i // 50 % 4], *parts)))
+    own = logic()
+    assert np.array_equal(rows_of(play(own, wrong)), rows_of(prompt))
+    values = own.inputs(160.0).values
+    assert values["messages_without_stamp"] + values["doubtful_stamps"] == len(messages) // 50
+    assert values["clocks_set"] == 0
+
+
+def test_load_from_its_topic_and_a_wheel_beside_the_centre():
+    own, found = logic(load="topic", wheel_y=0.5, joint_sign=-1.0), []
+    for at, (kind, stamp, *parts) in contents(drive(10)):
+        if kind == "joints":
+            names, speed, effort = parts
+            parts = [names, [-v for v in speed], [-v for v in effort]]
+            found += own.on_load(stamp, LOAD + 2.0, at)
+        else:
+            parts = [parts[0] + 0.5 * 0.1, 0.1]
+        found += play(own, [(at, (kind, stamp, *parts))])
+    plain = play(logic(), contents(drive(10)))
+    assert rows_of(found) == pytest.approx(rows_of(plain))
+    assert {report.values["row_load"] for report in found} == {LOAD + 2.0}
+
+
+def samples(wheel_speed=1.0, torque=1.0, speed=0.1):
+    return {"wheel_speed": wheel_speed, "torque": torque, "speed": speed}
 
 
 @pytest.mark.parametrize(
-    "samples",
+    ("parts", "reason"),
     [
-        {"wheel_speed": 0.0, "torque": 1.0, "speed": 0.1},
-        {"wheel_speed": 1.0, "torque": 1.0, "speed": 0.0},
-        {"wheel_speed": 1.0, "torque": 1.0},
-        {"wheel_speed": 1.0, "torque": float("nan"), "speed": 0.1},
+        ([samples(0.0), samples(0.01)], "the wheel stands"),
+        ([samples(), samples(torque=math.nan)], "1 samples of effort of the joint"),
+        ([samples(), samples(speed=math.inf)], "1 samples of odometry"),
+        ([samples(0.3), samples(1.0)], "the wheel starts or stops"),
+        ([samples(), samples(1.0, 1e308, 1e308)], ""),
     ],
-    ids=["wheel stands", "rover stands", "no odometry", "no torque"],
 )
-def test_a_stretch_that_says_nothing_gives_no_row(samples):
-    rows = module("rows").RowCollector(RADIUS, LOAD)
-    rows.add(0.0, samples)
-    assert rows.add(1.0, samples) is None
+def test_a_stretch_that_says_nothing_gives_no_row(parts, reason):
+    rows = RowCollector(RADIUS, LOAD)
+    for i, part in enumerate(parts):
+        assert rows.add(SECOND + i * 7 * SECOND // 10, part) == []
+    (found,) = rows.add(5 * SECOND // 2, samples())
+    assert (found.reason, found.row is None) == (reason, bool(reason))
 
 
-def test_a_clock_that_jumps_back_begins_again():
-    rows = module("rows").RowCollector(RADIUS, LOAD)
-    good = {"wheel_speed": 1.0, "torque": 1.0, "speed": 0.1}
-    rows.add(100.0, good)
-    assert rows.add(0.0, good) is None
-    assert rows.add(1.0, good) is not None
+def test_a_stretch_with_samples_in_a_part_of_it_gives_no_row():
+    rows = RowCollector(RADIUS, LOAD)
+    for i in range(4):
+        rows.add(SECOND + i * SECOND // 10, samples())
+    (found,) = rows.add(5 * SECOND // 2, samples())
+    assert found.reason == "velocity of the joint for a part of the time only"
 
 
-def test_slip_of_driving_and_braking_wheels():
-    slip_of = module("slip").slip_of
+def test_slip_of_driving_and_braking_wheels_forward_and_backward():
     assert slip_of(0.2, 0.15) == pytest.approx(0.25)
     assert slip_of(0.15, 0.2) == pytest.approx(-0.25)
+    rows = RowCollector(RADIUS, LOAD)
+    for i in range(2):
+        rows.add(SECOND + i * SECOND // 2, samples(-1.0, -2.0, -0.75 * RADIUS))
+    (found,) = rows.add(5 * SECOND // 2, samples())
+    assert found.row == pytest.approx({"slip": 0.25, "torque": 2.0, "load": LOAD})
 
 
-def logic():
-    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    return module("logic").SoilLogic(estimator, module("rows").RowCollector(RADIUS, LOAD))
+def test_a_stamp_is_believed_when_others_follow_it():
+    own = StampedSamples(reach=10)
+    assert [own.add(t, 1.0) for t in (100, 105, 105)] == [Stamp.USED, Stamp.USED, Stamp.REPEATED]
+    assert [own.add(t, 1.0) for t in (500, 106, 500, 800)] == [
+        Stamp.DOUBTFUL,
+        Stamp.USED,
+        Stamp.DOUBTFUL,
+        Stamp.DOUBTFUL,
+    ]
+    assert [own.add(t, 2.0) for t in (805, 806)] == [Stamp.DOUBTFUL, Stamp.SET_FORWARD]
+    assert own.newest == 806 and own.samples[805] == 2.0
+    assert [own.add(t, 3.0) for t in (1, 2, 3)][-1] is Stamp.SET_BACK
+    assert own.samples == dict.fromkeys((1, 2, 3), 3.0)
 
 
-def reports(own, slips):
-    found = []
-    for time, wheel_speed, torque, speed in drive(slips):
-        found.append(own.add(time, wheel_speed=wheel_speed, torque=torque))
-        found.append(own.add(time, speed=speed))
-    return [report for report in found if report is not None]
+@pytest.mark.parametrize("name", REQUIRED)
+def test_each_parameter_that_is_missing_is_named_in_one_line(name):
+    with pytest.raises(InputError, match=f"^the parameter {name} is missing: [^\n]+$"):
+        settings_of({k: v for k, v in GIVEN.items() if k != name})
 
 
-def test_a_drive_over_sand_is_recognised():
-    found = reports(logic(), np.linspace(0.08, 0.55, 12))
-    last = found[-1]
-    assert len(found) == 11 and last.sound and last.values["rows"] == 11
-    truth = float(soil("wong1989/dry_sand").friction_angle)
-    std = last.values["friction_angle_std"]
-    assert abs(last.values["friction_angle"] - truth) < 3.0 * std < 0.3
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"load": "60"}, "the parameter load is '60'; needed is a number in N, or 'topic'"),
+        ({"load": -1.0}, "the parameter load is -1; it must be above zero"),
+        ({"load": True}, "the parameter load is True; needed"),
+        ({"wheel_radius": 0.2}, "the parameter wheel_radius is 0.2; .* for a wheel of 0.15 m"),
+        ({"wheel_radius": math.nan}, "the parameter wheel_radius is nan; needed"),
+        ({"torque_noise": 0.02}, "the parameter torque_noise is 0.02; needed"),
+        ({"torque_noise": [0.0, 0.0]}, "a sensor has noise above zero"),
+        ({"slip_noise": [-0.1, 0.0]}, "a sensor has noise above zero"),
+        ({"joint": ""}, "the parameter joint is empty"),
+        ({"joint": 3}, "the parameter joint is 3; needed"),
+        ({"joint_sign": 2.0}, "joint_sign is 2; it is 1 or -1"),
+        ({"period": 0.0}, "the parameter period is 0; it must be above zero"),
+        ({"length": 5}, "the parameter length is 5; needed is a whole number"),
+        ({"n": 1.1}, "'n' is not a context input of this file"),
+    ],
+)
+def test_each_wrong_parameter_is_named_in_one_line(given, message):
+    with pytest.raises(InputError, match=message) as caught:
+        settings_of(GIVEN | given)
+    assert "\n" not in str(caught.value)
 
 
-def test_restart_forgets_and_bad_rows_are_told():
+def test_a_file_for_many_wheels_needs_the_wheel_and_the_soil():
+    many = GIVEN | {"model": str(ROOT / "exported" / "any_wheel.onnx"), "wheel_width": 0.12}
+    with pytest.raises(InputError, match="the parameter bearing_modulus is missing: kc / width"):
+        settings_of(many)
+    many |= {"bearing_modulus": 1536680.0, "n": 1.1, "bearing_std": 0.2, "cohesion_max": 3000.0}
+    own = settings_of(many | {"shear_modulus_max": 0.03})
+    assert len(play(SoilLogic(own), contents(drive(10)))) == 9
+    with pytest.raises(ModelFileError):
+        settings_of(GIVEN | {"model": "/nowhere.onnx"})
+
+
+def test_the_settings_are_printed_and_the_defaults_are_among_them():
+    text = settings_of(GIVEN).text
+    assert all(f"{name}=" in text for name in (*REQUIRED, *DEFAULTS))
+    example = (ROOT / "examples" / "ros2" / "config" / "wheel.yaml").read_text()
+    used = [line.split(":")[0].strip() for line in example.splitlines()[2:]]
+    assert set(REQUIRED) <= set(used) <= set(PARAMETERS)
+
+
+def test_rows_are_kept_in_the_state_file(tmp_path):
+    path = tmp_path / "state.npz"
+    own = logic(state_file=str(path))
+    play(own, contents(drive(10)))
+    own.save()
+    again = logic(state_file=str(path))
+    assert again.remark.startswith("9 rows are restored from")
+    assert again.soil().values["rows_remembered"] == 9.0
+    other = logic(state_file=str(path), torque_noise=[0.1, 0.02], length=200)
+    assert "is not used" in other.remark
+    for damaged in (b"", b"PK\x03\x04 nothing", b"\x93NUMPY"):
+        path.write_bytes(damaged)
+        assert "is not used" in logic(state_file=str(path)).remark
+    assert logic().remark == "" and Path(MODEL).exists()
+
+
+def test_restart_forgets_the_soil():
     own = logic()
-    reports(own, [0.1, 0.2, 0.3])
+    play(own, contents(drive(10)))
     own.restart()
-    (report,) = reports(own, [0.2, 0.3])
-    assert report.values["rows"] == 1
-    own.add(100.0, wheel_speed=1.0, torque=2.0, speed=0.1, load=-5.0)
-    refused = own.add(101.0, speed=0.1)
-    assert not refused.sound and "load is -5" in refused.message
-
-
-class FakeNode:
-    """What the node uses of rclpy.node.Node."""
-
-    def __init__(self, name):
-        self.callbacks, self.published = {}, []
-
-    def declare_parameter(self, name, default):
-        model = str(ROOT / "exported" / "wheel.onnx")
-        return SimpleNamespace(value=model if name == "model" else default)
-
-    def create_publisher(self, kind, topic, depth):
-        return SimpleNamespace(publish=self.published.append)
-
-    def create_subscription(self, kind, topic, callback, depth):
-        self.callbacks[topic] = callback
-
-    def create_service(self, kind, name, callback):
-        self.callbacks[name] = callback
-
-
-class FakeMessage:
-    """A message with whatever fields are set."""
-
-    OK, WARN = 0, 1
-
-    def __init__(self, **fields):
-        self.header = SimpleNamespace(stamp=None)
-        self.__dict__.update(fields)
-
-
-def test_the_node_passes_messages_on(monkeypatch):
-    kinds = {
-        "diagnostic_msgs.msg": ["DiagnosticArray", "DiagnosticStatus", "KeyValue"],
-        "geometry_msgs.msg": ["WrenchStamped"],
-        "nav_msgs.msg": ["Odometry"],
-        "sensor_msgs.msg": ["JointState"],
-        "std_srvs.srv": [],
-        "rclpy.node": [],
-    }
-    for path, names in kinds.items():
-        parent = types.ModuleType(path.partition(".")[0])
-        made = types.ModuleType(path)
-        for name in names:
-            setattr(made, name, FakeMessage)
-        monkeypatch.setitem(sys.modules, parent.__name__, parent)
-        monkeypatch.setitem(sys.modules, path, made)
-    sys.modules["rclpy.node"].Node = FakeNode
-    service = SimpleNamespace(Request=FakeMessage, Response=FakeMessage)
-    sys.modules["std_srvs.srv"].Trigger = service
-    node = module("node").SoilNode()
-    for time, wheel_speed, torque, speed in drive([0.1, 0.25, 0.4]):
-        stamp = SimpleNamespace(sec=int(time), nanosec=int(time % 1.0 * 1e9))
-        header = SimpleNamespace(stamp=stamp)
-        twist = SimpleNamespace(twist=SimpleNamespace(linear=SimpleNamespace(x=speed)))
-        node.callbacks["joint_states"](
-            FakeMessage(
-                header=header,
-                name=["other", "wheel_joint"],
-                velocity=[9.0, wheel_speed],
-                effort=[9.0, torque],
-            )
-        )
-        node.callbacks["odom"](FakeMessage(header=header, twist=twist))
-    assert len(node.published) == 2
-    (status,) = node.published[-1].status
-    values = {pair.key: float(pair.value) for pair in status.values}
-    assert status.level == FakeMessage.OK and values["rows"] == 2
-    assert node.callbacks["~/restart"](None, FakeMessage()).success
+    assert own.soil().values["rows_remembered"] == 0.0
+    assert own.soil().level is Level.WARN

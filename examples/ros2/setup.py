@@ -9,6 +9,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", ["resource/soil_estimator"]),
         ("share/soil_estimator", ["package.xml"]),
+        ("share/soil_estimator/config", ["config/wheel.yaml"]),
     ],
     install_requires=["setuptools", "soilml"],
     entry_points={"console_scripts": ["soil_estimator = soil_estimator.node:main"]},

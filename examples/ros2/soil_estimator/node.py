@@ -1,95 +1,139 @@
 """The ROS 2 node: parameters, topics and a service around `SoilLogic`.
 
 Subscribes to `joint_states` (sensor_msgs/JointState: speed and effort of the wheel), `odom`
-(nav_msgs/Odometry: speed of the rover) and `wheel_load` (geometry_msgs/WrenchStamped: force.z,
-optional). Publishes `soil` (diagnostic_msgs/DiagnosticArray). The service `~/restart`
-(std_srvs/Trigger) forgets all rows.
+(nav_msgs/Odometry: speed of the rover) and, where the parameter `load` says so, `wheel_load`
+(geometry_msgs/WrenchStamped: force.z). Publishes `soil` after each row and `/diagnostics` once a
+second (diagnostic_msgs/DiagnosticArray). The service `~/restart` (std_srvs/Trigger) forgets all
+rows.
 """
 
 from __future__ import annotations
+
+import sys
+from time import monotonic
+from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import WrenchStamped
 from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.executors import ExternalShutdownException
 from rclpy.node import Node
+from rclpy.qos import qos_profile_sensor_data
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 
-from soil_estimator.logic import Report, SoilLogic
-from soil_estimator.rows import RowCollector
-from soilml import Estimator
+from soil_estimator.logic import SoilLogic, SoilReport
+from soil_estimator.rows import SECOND
+from soil_estimator.settings import PARAMETERS, settings_of
+from soilml.errors import SoilmlError
 
-#: Parameters and their defaults; `context` are names and values for a file of many wheels.
-PARAMETERS = {
-    "model": "wheel.onnx",
-    "joint": "wheel_joint",
-    "wheel_radius": 0.15,
-    "load": 60.0,
-    "period": 1.0,
-    "context_names": [""],
-    "context_values": [0.0],
-}
+#: Seconds between two messages of diagnostics.
+DIAGNOSTICS_EVERY = 1.0
+#: Largest stamp of a message, ns.
+LAST_STAMP = (2**31 - 1) * SECOND
 
 
 class SoilNode(Node):
-    """Feeds messages to a `SoilLogic` and publishes its reports."""
+    """Feeds messages to a `SoilLogic` and publishes its reports.
+
+    Raises `SoilmlError` for a parameter that is missing or wrong, with one line that names it.
+    """
 
     def __init__(self) -> None:
         super().__init__("soil_estimator")
-        given = {name: self.declare_parameter(name, v).value for name, v in PARAMETERS.items()}
-        estimator = Estimator.load(given["model"])
-        if any(given["context_names"]):
-            names, values = given["context_names"], given["context_values"]
-            estimator = estimator.on(**dict(zip(names, values, strict=True)))
-        rows = RowCollector(given["wheel_radius"], given["load"], given["period"])
-        self._logic, self._joint = SoilLogic(estimator, rows), given["joint"]
-        self._publisher = self.create_publisher(DiagnosticArray, "soil", 10)
-        self.create_subscription(JointState, "joint_states", self._on_joints, 10)
-        self.create_subscription(Odometry, "odom", self._on_odometry, 10)
-        self.create_subscription(WrenchStamped, "wheel_load", self._on_load, 10)
+        settings = settings_of({name: self._parameter(name) for name in PARAMETERS})
+        self.logic = SoilLogic(settings)
+        self.get_logger().info(settings.text)
+        if self.logic.remark:
+            self.get_logger().warning(self.logic.remark)
+        self._of_joint = settings.joint
+        self._soil = self.create_publisher(DiagnosticArray, "soil", 10)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        quality = qos_profile_sensor_data
+        self.create_subscription(JointState, "joint_states", self._on_joints, quality)
+        self.create_subscription(Odometry, "odom", self._on_odometry, quality)
+        if settings.load is None:
+            self.create_subscription(WrenchStamped, "wheel_load", self._on_load, quality)
         self.create_service(Trigger, "~/restart", self._on_restart)
+        self.create_timer(DIAGNOSTICS_EVERY, self._on_timer)
+
+    def _parameter(self, name: str) -> Any:
+        """The value of a parameter, None where it is not given; `settings_of` checks the types."""
+        text = ParameterDescriptor(
+            description=PARAMETERS[name], read_only=True, dynamic_typing=True
+        )
+        return self.declare_parameter(name, None, text).value
 
     def _on_joints(self, message: JointState) -> None:
-        if self._joint in message.name:
-            index = list(message.name).index(self._joint)
-            self._add(message, wheel_speed=message.velocity[index], torque=message.effort[index])
+        stamp = _nanoseconds(message.header.stamp)
+        fields = message.name, message.velocity, message.effort
+        self._publish(self.logic.on_joints(stamp, *fields, monotonic()))
 
     def _on_odometry(self, message: Odometry) -> None:
-        self._add(message, speed=message.twist.twist.linear.x)
+        stamp, twist = _nanoseconds(message.header.stamp), message.twist.twist
+        self._publish(self.logic.on_odometry(stamp, twist.linear.x, twist.angular.z, monotonic()))
 
     def _on_load(self, message: WrenchStamped) -> None:
-        self._add(message, load=message.wrench.force.z)
+        stamp = _nanoseconds(message.header.stamp)
+        self._publish(self.logic.on_load(stamp, message.wrench.force.z, monotonic()))
 
     def _on_restart(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._logic.restart()
+        self.logic.restart()
         response.success, response.message = True, "all rows are forgotten"
         return response
 
-    def _add(self, message: JointState | Odometry | WrenchStamped, **samples: float) -> None:
-        stamp = message.header.stamp
-        report = self._logic.add(stamp.sec + 1e-9 * stamp.nanosec, **samples)
-        if report is not None:
-            self._publisher.publish(self._as_message(report, message))
-
-    def _as_message(self, report: Report, source: JointState) -> DiagnosticArray:
-        status = DiagnosticStatus()
-        status.level = DiagnosticStatus.OK if report.sound else DiagnosticStatus.WARN
-        status.name, status.message = "soil", report.message
-        status.values = [KeyValue(key=k, value=f"{v:.9g}") for k, v in report.values.items()]
+    def _on_timer(self) -> None:
         array = DiagnosticArray()
-        array.header.stamp, array.status = source.header.stamp, [status]
-        return array
+        array.header.stamp = self.get_clock().now().to_msg()
+        reports = {"inputs": self.logic.inputs(monotonic()), "soil": self.logic.soil()}
+        array.status = [self._status(part, report) for part, report in reports.items()]
+        self._diagnostics.publish(array)
+
+    def _publish(self, reports: list[SoilReport]) -> None:
+        for report in reports:
+            array = DiagnosticArray()
+            array.header.stamp.sec, array.header.stamp.nanosec = _stamp_of(report)
+            array.status = [self._status("soil", report)]
+            self._soil.publish(array)
+
+    def _status(self, part: str, report: SoilReport) -> DiagnosticStatus:
+        status = DiagnosticStatus()
+        status.level = getattr(DiagnosticStatus, report.level.name)
+        status.name, status.message = f"{self.get_name()}: {part}", report.message
+        status.hardware_id = self._of_joint
+        status.values = [
+            KeyValue(key=k, value=v if isinstance(v, str) else f"{v:.9g}")
+            for k, v in report.values.items()
+        ]
+        return status
 
 
-def main() -> None:
-    """Run the node until it is interrupted."""
+def _nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec) * SECOND + int(stamp.nanosec)
+
+
+def _stamp_of(report: SoilReport) -> tuple[int, int]:
+    """Seconds and nanoseconds of a message."""
+    return divmod(min(report.stamp, LAST_STAMP), SECOND)
+
+
+def main() -> int:
+    """Run the node until it is interrupted; 2 for a wrong parameter."""
     rclpy.init()
-    node = SoilNode()
+    node = None
     try:
+        node = SoilNode()
         rclpy.spin(node)
-    except KeyboardInterrupt:
+    except SoilmlError as error:
+        print(f"soil_estimator: {error}", file=sys.stderr)
+        return 2
+    except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
-        node.destroy_node()
+        if node is not None:
+            node.logic.save()
+            node.destroy_node()
         rclpy.try_shutdown()
+    return 0
