@@ -25,6 +25,7 @@ from soilml.log_import.checks.sensors import (
     untared_sensors,
 )
 from soilml.log_import.checks.table_hints import table_hints
+from soilml.log_import.guesses.map_text import log_files
 from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.result import ImportedLog
@@ -88,7 +89,7 @@ def import_log(
         Where a reader's library is not installed.
     """
     tell = progress or (lambda stage, done, total: None)
-    files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
+    files = log_files(logs)
     found = _as_map(log_map)
     recordings = []
     for i, file in enumerate(files):

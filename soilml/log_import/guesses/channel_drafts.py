@@ -185,7 +185,7 @@ def _put_gear_ratio(
 ) -> None:
     """The turns of the motor for one of the wheel, where a column may be of the motor."""
     name = column.address.lower()
-    of_motor = role == "motor_current" or "mot" in name
+    of_motor = role == "motor_current" or "mot" in name or "before gear" in name
     if said is not None and (of_motor or "enc" in name):
         draft.put("gear_ratio", float(said[0].split()[0]), f"stated in the log: {said[1]}")
         return

@@ -45,6 +45,8 @@ _UNIT_SUFFICES = {
     ("torque", "N m"), ("motor_current", "A"), ("wheel_speed", "rad/s"), ("ground_speed", "m/s"),
     ("position", "m"), ("load", "N"), ("wheel_angle", "count"),
 }  # fmt: skip
+#: Least load, N, and largest range of a sinkage, mm, of columns without a unit.
+_LEAST_LOAD, _MOST_SINKAGE = 1.0, 900.0
 _CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
 _MOST_TEXTS = 12  # Most columns of text that are listed
 
@@ -114,7 +116,7 @@ def candidates_of(recordings: Sequence[Recording], steady: bool = False) -> list
 def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -> Candidate:
     values = recording.columns[name]
     stated = recording.units.get(name, "")
-    unit = stated if dimension(stated) else unit_in_name(name)
+    unit = stated if dimension(stated) else _unit_by_name(name)
     kind = dimension(unit) if unit else None
     own = behaviour(values)
     if steady:
@@ -137,6 +139,17 @@ def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -
     return replace(column, scores={role: total for role, total in totals.items() if total > 0.0})
 
 
+def _unit_by_name(name: str) -> str:
+    """The unit that ends a name; "" where it contradicts the rest, as newton does in `v_N`."""
+    unit = unit_in_name(name)
+    if not unit or len(unit) > 1:
+        return unit
+    kind = dimension(unit)
+    roles = name_scores(re.split(r"[_\s.\-]+", name)[0])
+    wanted = [(ROLES[role][0], *_ALSO.get(role, ())) for role in roles if role in ROLES]
+    return "" if wanted and not any(kind in kinds for kinds in wanted) else unit
+
+
 def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
     """How well a column fits a role; 0 or less where it does not. `score` is that of its name."""
     own, kind = column.about, column.kind
@@ -157,6 +170,8 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
             return 0.0  # i in per cent is a slip
         if kind == "1" and role != "slip" and spelling(column.unit) != "percent":
             return 0.0
+        if kind == "count" and role == "wheel_angle":
+            score -= 0.5  # an angle beside it needs no counts of a turn
         score += 2.5 if kind not in ("1",) else 2.0 if role == "slip" and score > 0.0 else 1.0
         if score <= 2.5 and (role, kind) not in _UNIT_SUFFICES:
             return 0.0
@@ -176,6 +191,10 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
         score -= 1.5  # a pull varies with slip
     if role == "slip" and kind is None and own.size > 150.0:
         score -= 4.0
+    if role == "load" and kind is None and own.size < _LEAST_LOAD:
+        score -= 4.0
+    if role == "sinkage" and kind is None and own.high - own.low > _MOST_SINKAGE:
+        score -= 8.0  # no wheel sinks in by as many mm: a raw signal
     if words_of(column.name)[:1] == ["std"]:
         score -= 3.0
     return score

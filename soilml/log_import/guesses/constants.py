@@ -17,10 +17,14 @@ _UNIT_BEFORE = re.compile(r"(?:[\[(]\s*([^\])]*)\s*[\])]|_(mm|cm|m|kg|n)\b)", re
 #: Constant -> words before the number, and the unit that it must have.
 _STATED = {
     "radius": (
-        r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel|r(?=\s*[=:]))",
+        r"(?:wheel[ _]?|rad)?(?:radius|radius[ _]wheel|wheel[ _]r|r[ _]?wheel|r(?=\s*[=:])"
+        r"|rayon(?: \w+){0,3}|radio(?: \w+){0,3}|raggio(?: \w+){0,3})",
         "m",
     ),
-    "diameter": (r"(?:wheel[ _]?|rad)?(?:diameter|durchmesser)", "m"),
+    "diameter": (
+        r"(?:wheel[ _]?|rad)?(?:diameter|durchmesser|di[aáà]m[eèé]tr[eo](?: \w+){0,3})",
+        "m",
+    ),
     "rate": (r"(?:sampl\w*[ _]?(?:rate|freq\w*)|rate|fs|frequency|abtastrate)", "Hz"),
     "gear_ratio": (r"(?:gear\w*[ _]?(?:ratio)?|ratio|getriebe\w*|reduction)", "1"),
     "torque_constant": (r"(?:torque[ _]?const\w*|kt|k_t|km)", "N m/A"),
@@ -48,6 +52,19 @@ _IN_NAMES = (
     ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(\d\d?(?:\.\d+)?)(?:pct|percent|%)?(?![0-9a-z])", "%"),
     ("slip", r"(?<![a-z])(?:slip|s)[_=-]?(-?0\.\d+)(?![0-9])", "1"),
 )
+#: Constants in names of files: name, and pattern of the number and its unit.
+_CONSTANTS_IN_NAMES = tuple(
+    (constant, rf"(?<![a-z]){words}[_= -]?(\d+(?:[.p]\d+)?)[_ ]?{unit}(?![a-z0-9])")
+    for constant, words, unit in (
+        ("radius", r"(?:wheel[_ -]?)?(?:radius|rad)", "(mm|cm|m)?"),
+        ("diameter", r"(?:wheel[_ -]?)?(?:diameter|diam|dia|durchmesser)", "(mm|cm|m)?"),
+        ("radius", "r", "(mm|cm)"),
+        ("diameter", "d", "(mm|cm)"),
+        ("gear_ratio", r"(?:gear[_ -]?ratio|gear|gr)", "()"),
+    )
+)
+#: Units of a length without one, and radii of wheels, m.
+_LENGTHS, _LEAST, _MOST = (("m", 1.0), ("cm", 0.01), ("mm", 0.001)), 0.02, 0.7
 _NUMBER = r"([+-]?[0-9]+(?:[.,][0-9]+)?(?:[eE][+-]?[0-9]+)?)"
 _RAW = r"([munµμ]?V(?:/V)?|volts?|digits?|counts?|lsb)\b"
 _UNIT = r"([A-Za-zµ·*][A-Za-zµ·* ²^0-9-]*)"
@@ -116,8 +133,9 @@ class StatedConstants:
 
 
 def agreed_constants(logs: Sequence[Sequence[Recording]]) -> StatedConstants:
-    """The constants that logs state."""
+    """The constants that logs state, or the names of their files where all say the same."""
     each = [stated_constants([line for own in log for line in own.about]) for log in logs]
+    named = [constants_in_name(log[0].file.stem) for log in logs]
     alike, differing = {}, {}
     for name in dict.fromkeys(name for found in each for name in found):
         values = list(dict.fromkeys(found[name][0] for found in each if name in found))
@@ -130,7 +148,33 @@ def agreed_constants(logs: Sequence[Sequence[Recording]]) -> StatedConstants:
         if start > 0 and all(name in found for found in each):
             pattern = re.escape(line[:start]).replace("\\ ", " ") + r"([+-]?\d+(?:[.,]\d+)?)"
             differing[name] = (pattern, unit, values)
+    for name, said in named[0].items():
+        lengths = {"radius", "diameter"}
+        there = lengths & alike.keys() if name in lengths else {name} & alike.keys()
+        if not there and all(own.get(name, ("",))[0] == said[0] for own in named):
+            alike[name] = said
     return StatedConstants(alike, differing)
+
+
+def constants_in_name(name: str) -> dict[str, tuple[str, str]]:
+    """Constants that the name of a file states, as `WHEELDIAMETER25.0_GEARRATIO6` does.
+
+    A length without a unit is taken in that of m, cm and mm which fits a wheel, and says so.
+    """
+    found: dict[str, tuple[str, str]] = {}
+    for constant, pattern in _CONSTANTS_IN_NAMES:
+        match = re.search(pattern, name, re.IGNORECASE)
+        if match is None or constant in found or ("radius" in found and constant == "diameter"):
+            continue
+        number, unit = match[1].replace("p", "."), match[2] or ""
+        said = f"name of the file: {match[0]}"
+        if constant in ("radius", "diameter") and not unit:
+            size = float(number) / (2.0 if constant == "diameter" else 1.0)
+            unit = next((u for u, one in _LENGTHS if _LEAST < size * one < _MOST), "")
+            said = f"{said}; CHANGE where that is not {unit}"
+        if unit or constant == "gear_ratio":
+            found[constant] = (f"{number} {unit}".strip(), said)
+    return found
 
 
 def number_in_names(role: str, names: Sequence[str]) -> tuple[str, str, list[float]] | None:

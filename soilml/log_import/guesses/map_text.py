@@ -37,16 +37,17 @@ from soilml.log_import.guesses.constants import agreed_constants
 from soilml.log_import.guesses.draft import (
     Draft,
     Marked,
-    fastest_ratio,
-    inputs_of,
     key_line,
     keys_alike,
 )
+from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.roles import Assignment, assign, axle_of
+from soilml.log_import.guesses.wheel_radius import wheel_lines
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.readers import read_log
+from soilml.log_import.readers.side_files import is_side_file
 from soilml.log_import.recording import Recording
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
@@ -97,11 +98,20 @@ def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
 
 def draft_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> DraftedMap:
     """What `init_map` gives, with the number of lines that are marked."""
-    files = [logs] if isinstance(logs, str | os.PathLike) else list(logs)
-    if not files:
-        raise InputError("no log was given; needed is at least one file")
+    files = log_files(logs)
     recordings = [read_log(Path(file)) for file in files]
     return _MapDrafting(recordings).draft()
+
+
+def log_files(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Path]:
+    """The files, without those that state constants of the others.
+
+    Raises `InputError` where there is none.
+    """
+    files = [Path(f) for f in ([logs] if isinstance(logs, str | os.PathLike) else logs)]
+    if not files:
+        raise InputError("no log was given; needed is at least one file")
+    return [file for file in files if not is_side_file(file)] or files
 
 
 class _MapDrafting:
@@ -136,7 +146,10 @@ class _MapDrafting:
         columns = candidates_of(self.run.recordings, self.steady > 0)
         self.columns = [c for c in columns if c.name not in clocks]
         self.errors = [c for c in self.columns if is_error(c)] if self.steady else []
-        self.found: Assignment = assign([c for c in self.columns if c not in self.errors])
+        usable = [c for c in self.columns if c not in self.errors]
+        behaved = by_behaviour(usable, self.run)
+        self.reasons = behaved.reasons
+        self.found: Assignment = assign(behaved.candidates)
         self.run_names = [run.name for run in self.runs]
 
     def _map(self, kinds: Sequence[FileKind]) -> LogMap:
@@ -182,7 +195,10 @@ class _MapDrafting:
         }
         first = next(iter(drafts.values()))
         add_errors(first, self.found, self.errors)
-        lines += self._wheel(first)
+        for role, why in self.reasons.items():
+            if role in first:
+                first[role].comments.setdefault("column", why)
+        lines += wheel_lines(first, self.found, self.run, self.stated.common)
         lines += load_lines(self.found, self.stated, self.run_names, len(self.labels))
         for role in ROLES:
             if role in self.found.shared:
@@ -279,38 +295,6 @@ class _MapDrafting:
             key, value = "split_at_pauses_over", f"{self.longest:g} s"
             why = f"the log pauses {self.pauses} times"
         return ["", "[runs]", key_line(key, value, why)] if key else []
-
-    def _wheel(self, drafts: dict[str, Draft]) -> list[str]:
-        lines = ["", "[wheel]"]
-        for key in ("radius", "diameter"):
-            if key in self.stated.common:
-                value, line = self.stated.common[key]
-                number = value if " " in value else f"{value} m"
-                return [
-                    *lines,
-                    key_line(key, f"{number} +- 1 %", f"stated in the log: {line[:60]}"),
-                ]
-        needed = not {"slip", "rim_speed"} & self.found.roles() and bool(
-            {"wheel_speed", "wheel_angle"} & self.found.roles()
-        )
-        inputs = inputs_of(drafts, self.run)
-        ratio = fastest_ratio(inputs) if inputs is not None and needed else math.nan
-        hint = ""
-        for role in ("wheel_speed", "wheel_angle"):
-            if role in drafts:  # the rotation is that of the motor
-                ratio *= float(drafts[role].keys.get("gear_ratio", 1.0))
-        if math.isfinite(ratio) and ratio > 0.0:
-            if 0.02 < ratio < 0.7:
-                hint = f"; travel over rotation is {ratio:.3g} m at the lowest slip: a little less"
-            else:
-                hint = (
-                    f"; travel over rotation is {ratio:.3g} m: a unit is wrong, or the rotation is "
-                    "measured before a gearbox"
-                )
-        example = '# radius = "0.15 m +- 1 %"'
-        if needed:
-            return [*lines, Marked(f"{example}  # NEEDED{hint}")]
-        return [*lines, f"{example}  # for checks{hint}"]
 
     def _table(self, header: str, role: str, draft: Draft) -> list[str]:
         lines = ["", header]

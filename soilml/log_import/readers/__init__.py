@@ -6,12 +6,14 @@ They import their libraries when they are called.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import refuse_device
 from soilml.log_import.readers.missing_codes import without_codes
+from soilml.log_import.readers.side_files import side_lines
 from soilml.log_import.recording import Recording
 
 #: Ending -> module and function; any other ending is read as text.
@@ -35,7 +37,10 @@ _OTHERS = {
 
 
 def read_log(path: str | Path) -> list[Recording]:
-    """The recordings of a log; raises `InputError` where it is missing or cannot be read."""
+    """The recordings of a log, with what files beside it state.
+
+    Raises `InputError` where it is missing or cannot be read.
+    """
     file = Path(path)
     if not file.exists():
         raise InputError(f"{file}: there is no such file")
@@ -62,6 +67,7 @@ def read_log(path: str | Path) -> list[Recording]:
     read: Callable[[Path], list[Recording]] = getattr(found, function)
     try:
         refuse_device(file)
-        return [without_codes(recording) for recording in read(file)]
+        beside = side_lines(file)
+        return [replace(own, about=(*own.about, *beside)) for own in map(without_codes, read(file))]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None

@@ -37,6 +37,11 @@ _SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 #: A quantity over its unit, as `Zeit / s` and `T in N m`.
 _OVER_UNIT = re.compile(r"^(.+?\w)\s+(?:/|in)\s+(\S.{0,15})$")
+#: What divides the words in brackets; words before a unit.
+_PARTS = re.compile(r"\s+[-:\u2013]\s+|[,;]")
+_IN = re.compile(r"^(?:(.*)\s)?in\s+(\S.*)$")
+#: Words that are no unit.
+_WORDS = re.compile(r"[^\W\d_]{4,}(?:[ _-].*)?|.*[ _-][^\W\d_]{4,}")
 #: A name with its unit in brackets, or a word.
 _NAMED = re.compile(r"[^\s\[(]+\s*(?:\[[^\]]*\]|\([^)]*\))?")
 #: What stands before units in a line of comment.
@@ -145,11 +150,30 @@ def name_and_unit(cell: str) -> tuple[str, str]:
         return match[1].strip(), _bare(match[2])
     match = _BRACKETS.match(cell)
     if match and match[1].strip():
-        return match[1].strip(), match[2].strip()
-    name, comma, unit = cell.rpartition(",")
-    if comma and name.strip() and 0 < len(unit.strip()) <= 8 and " " not in unit.strip():
-        return name.strip(), unit.strip()
+        return _unit_and_remark(match[1].strip(), match[2].strip())
+    for mark in (",", " - "):
+        name, there, unit = (part.strip() for part in cell.rpartition(mark))
+        short = mark == "," and 0 < len(unit) <= 3
+        if there and name and (short or known_unit(unit)):
+            return name, unit
     return cell.strip(), ""
+
+
+def _unit_and_remark(name: str, said: str) -> tuple[str, str]:
+    """Name and unit of what stands in brackets, as `before gearbox - degrees`.
+
+    Words there that are no unit are part of the name.
+    """
+    if (match := _IN.match(said)) and known_unit(match[2]):
+        return f"{name} {match[1] or ''}".strip(), match[2]
+    if known_unit(said):
+        return name, said
+    parts = [part.strip() for part in _PARTS.split(said) if part.strip()]
+    units = [part for part in parts if known_unit(part)]
+    if len(parts) > 1 and len(units) == 1:
+        rest = " ".join(part for part in parts if part != units[0])
+        return f"{name} {rest}", units[0]
+    return (f"{name} {said}", "") if _WORDS.fullmatch(said) else (name, said)
 
 
 def _samples(head: list[str], separator: str, comma: bool) -> tuple[int, int, int]:

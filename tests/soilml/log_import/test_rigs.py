@@ -85,7 +85,8 @@ def test_abbreviations_and_times_of_day(tmp_path):
                    "h_mm": np.where(d.rim > 0, 16.0, 14.0)}  # fmt: skip
         name = tmp_path / f"run{k}.txt"
         logs.append(write_csv(name, columns, "\t", ".", "utf-16", ("Testbed v2", "Operator\tJD")))
-    found, text = imported(tmp_path, logs, [RADIUS_EDIT])
+    found, text = imported(tmp_path, logs)
+    assert "v / (omega (1 - slip)) with the slip of the column 's'" in text
     for role, column in (("torque", "M_w"), ("ground_speed", "v_c"), ("sinkage", "h_mm")):
         assert f"[{role}]  #" in text and f'column = "{column}"' in text
     true = np.asarray(SLIPS)[[int(run[-1]) for run in found.table["run"]]]

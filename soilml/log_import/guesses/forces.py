@@ -1,0 +1,268 @@
+"""Which of several alike forces and moments are load, pull and torque, by how they behave.
+
+Axes of a force sensor lie as somebody has mounted it, so that x, y and z say little. On a wheel
+that drives, the largest steady force is the load. The torque and the pull vary together, beside
+what either has of the load.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.log_import.channels.runs import Run
+from soilml.log_import.guesses.columns import Candidate, words_of
+from soilml.log_import.guesses.draft import Marked
+from soilml.log_import.units import factor
+
+_FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "effort", "力"}
+_MOMENTS = {"m", "mx", "my", "mz", "t", "tx", "ty", "tz", "moment", "torque", "drehmoment", "tau"}
+_MOMENTS |= {"momento", "couple", "coppia"}
+#: Words of cells that carry a wheel together, whose forces are added.
+_TOGETHER = {"lc", "cell", "zelle", "celda", "cella", "corner"}
+#: Words before the number of a wheel.
+_OF_WHEELS = {"wheel", "rad", "motor", "joint", "axle", "leg"}
+#: Axis of a name, and number of a channel.
+_AXIS, _NUMBER = re.compile(r"[xyz](?![a-z])", re.IGNORECASE), re.compile(r"\d+")
+_BLOCKS, _FEWEST = 240, 12  # Means of which the behaviour is judged: most and fewest
+_DRIVES = 0.3  # Share of the usual speed from which a wheel drives
+#: How much larger the load is than another force; its scatter over its size; correlation of pull
+#: and torque; share of the load that a pull varies by.
+_CLEARLY, _STEADY, _TOGETHER_FROM, _VARIES = 1.3, 0.6, 0.6, 0.02
+_BY_BEHAVIOUR = 9.0  # Score of a column whose behaviour shows the role
+_ROLES = ("load", "drawbar_pull", "torque")
+
+
+@dataclass(frozen=True)
+class Behaved:
+    """Candidates with the scores that their behaviour gives them, and a reason by role."""
+
+    candidates: list[Candidate]
+    reasons: dict[str, str]
+
+
+class Means:
+    """Block means of the columns of a run, and the blocks in which the wheel drives.
+
+    The blocks are those of the recording of `first`, whose clock the others are brought to.
+    """
+
+    def __init__(self, run: Run, candidates: Sequence[Candidate], first: str) -> None:
+        self._run, (times, _) = run, run.find(first)
+        self._times = times
+        self._width = max(1, times.size // _BLOCKS)
+        self.count = times.size // self._width
+        self._scales = {c.address: _in_newton(c) for c in candidates}
+        self.driving = self._motion(candidates)
+
+    def of(self, address: str) -> Floats | None:
+        """Means (blocks,) of a column, forces in N and moments in N m; None for one without."""
+        times, values = self._run.find(address)
+        good = np.isfinite(values)
+        if not good.any():
+            return None
+        if times.size != self._times.size:
+            values = np.interp(self._times, times[good], values[good])
+        values = self._scales.get(address, 1.0) * values
+        blocks = values[: self.count * self._width].reshape(self.count, self._width)
+        known = np.isfinite(blocks)
+        total = np.where(known, blocks, 0.0).sum(axis=1)
+        means = total / np.maximum(known.sum(axis=1), 1)
+        return np.where(known.any(axis=1), means, float(np.nanmedian(values)))
+
+    def level(self, address: str) -> float:
+        """Median while driving; NaN where there is none."""
+        own = self.of(address)
+        return float(np.median(own[self.driving])) if own is not None else float("nan")
+
+    def _motion(self, candidates: Sequence[Candidate]) -> NDArray[np.bool_]:
+        every = np.ones(self.count, dtype=bool)
+        best: tuple[float, Floats] | None = None
+        for role in ("wheel_speed", "rim_speed", "wheel_angle", "ground_speed", "position"):
+            for c in candidates:
+                score = c.scores.get(role, 0.0)
+                if score <= 2.0 or (best is not None and score <= best[0]):
+                    continue
+                if (own := self.of(c.address)) is not None:
+                    place = role in ("wheel_angle", "position")
+                    best = (score, np.abs(np.gradient(own) if place and own.size > 2 else own))
+        if best is None:
+            return every
+        driving: NDArray[np.bool_] = best[1] > _DRIVES * float(np.percentile(best[1], 90))
+        return driving if driving.sum() > 2 else every
+
+
+def _in_newton(candidate: Candidate) -> float:
+    """What a force or moment is multiplied by to be in N or N m; 1 where it states no unit."""
+    if candidate.kind in ("N", "N m"):
+        return factor(candidate.unit, candidate.kind, candidate.address)
+    if candidate.kind == "kg":
+        return 9.80665 * factor(candidate.unit, "kg", candidate.address)
+    return 1.0
+
+
+def alike(candidates: Sequence[Candidate], moments: bool) -> list[Candidate]:
+    """Forces, or moments, whose names differ by an axis or a number alone; the largest group."""
+    groups: dict[tuple[str, str], dict[str, Candidate]] = {}
+    for c in (c for c in candidates if _is_alike(c, moments)):
+        topic = c.address.removesuffix(c.name)
+        for pattern in (_AXIS, _NUMBER):
+            for match in pattern.finditer(c.name):
+                frame = f"{c.name[: match.start()]}\0{c.name[match.end() :]}".lower()
+                groups.setdefault((topic, frame), {})[c.address] = c
+    groups = {frame: own for frame, own in groups.items() if 2 <= len(own) <= 3}
+    best = max(groups.values(), key=len, default={})
+    return list(best.values())
+
+
+def _is_alike(candidate: Candidate, moments: bool) -> bool:
+    words = {*words_of(candidate.name)}
+    if words & (_TOGETHER | _OF_WHEELS) or candidate.about.count < 2 or candidate.about.constant:
+        return False
+    if candidate.kind is not None:
+        return candidate.kind in (("N m",) if moments else ("N", "kg"))
+    return bool(words & (_MOMENTS if moments else _FORCES))
+
+
+def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
+    """Give the load, the pull and the torque of alike columns the roles that they behave as."""
+    forces, moments = alike(candidates, False), alike(candidates, True)
+    if not forces and not moments:
+        return Behaved(list(candidates), {})
+    means = Means(run, candidates, (forces or moments)[0].address)
+    if means.count < _FEWEST:
+        return Behaved(list(candidates), {})
+    given: dict[str, str] = {}
+    reasons: dict[str, str] = {}
+    named = _named(candidates, [*forces, *moments], means)
+    load = _load(forces, means, reasons) if forces and "load" not in named else None
+    if load is not None:
+        given["load"] = load
+    steady = load or named.get("load", "")
+    weight = means.of(steady) if steady else None
+    pulls = [c.address for c in forces if c.address != steady]
+    if "drawbar_pull" in named:
+        pulls = [named["drawbar_pull"]]
+    turning = [named["torque"]] if "torque" in named else [c.address for c in moments]
+    if "torque" not in named and not turning and "motor_current" in named:
+        turning = [named["motor_current"]]
+    pair = _pair(pulls, turning, weight, means, steady)
+    for role, address, others in (("drawbar_pull", pair[0], forces), ("torque", pair[1], moments)):
+        if address and role not in named and any(c.address == address for c in others):
+            given[role] = address
+            reasons[role] = "of its kind it varies most as the wheel drives"
+            if pair[2] >= _TOGETHER_FROM:
+                reasons[role] = "pull and torque vary together"
+    return Behaved(_rescored(candidates, forces, moments, given), reasons)
+
+
+def _named(
+    candidates: Sequence[Candidate], groups: Sequence[Candidate], means: Means
+) -> dict[str, str]:
+    """Columns outside of the groups whose names say their role."""
+    inside = {c.address for c in groups}
+    found = {}
+    for role in (*_ROLES, "motor_current"):
+        own = [
+            c
+            for c in candidates
+            if c.address not in inside
+            and c.scores.get(role, 0.0) >= _BY_BEHAVIOUR
+            and means.of(c.address) is not None
+        ]
+        if own:
+            found[role] = max(own, key=lambda c: c.scores[role]).address
+    return found
+
+
+def _load(forces: Sequence[Candidate], means: Means, reasons: dict[str, str]) -> str | None:
+    """The largest force that is steady while the wheel drives."""
+    sizes = []
+    for c in forces:
+        own = means.of(c.address)
+        if own is None:
+            continue
+        driven = own[means.driving]
+        level = abs(float(np.median(driven)))
+        if level > 0.0 and float(np.std(driven)) < _STEADY * level:
+            sizes.append((level, c.address))
+    sizes.sort(reverse=True)
+    if not sizes:
+        return None
+    others = [abs(means.level(c.address)) for c in forces if c.address != sizes[0][1]]
+    most = max((x for x in others if np.isfinite(x)), default=0.0)
+    reasons["load"] = f"the largest steady force of {len(forces)}"
+    if sizes[0][0] < _CLEARLY * most:
+        reasons["load"] = Marked(
+            f"CHANGE: one of {len(forces)} forces; another one is {most / sizes[0][0]:.0%} of it"
+        )
+    return sizes[0][1]
+
+
+def _pair(
+    pulls: Sequence[str], turning: Sequence[str], weight: Floats | None, means: Means, load: str
+) -> tuple[str, str, float]:
+    """Pull and torque: the force and the moment that vary most together, and their correlation.
+
+    What varies with the load is taken off first: lateral forces and the moments that they make.
+    """
+    size = abs(means.level(load)) if load else 0.0
+    left = {
+        address: _beside(own, weight)
+        for address in (*pulls, *turning)
+        if (own := means.of(address)) is not None
+    }
+    spread = {address: float(np.std(own)) for address, own in left.items()}
+    lively = [a for a in pulls if spread.get(a, 0.0) > _VARIES * size]
+    best, score, correlation = ("", ""), 0.0, 0.0
+    for f in lively:
+        for m in (t for t in turning if spread.get(t, 0.0) > 0.0):
+            common = abs(float(np.corrcoef(left[f], left[m])[0, 1]))
+            if common * spread[f] * spread[m] > score:
+                best, score, correlation = (f, m), common * spread[f] * spread[m], common
+    if correlation >= _TOGETHER_FROM:
+        return (*best, correlation)
+    most = max(lively, key=lambda a: spread[a], default="")
+    moment = max((t for t in turning if t in spread), key=lambda a: spread[a], default="")
+    return most, moment, 0.0
+
+
+def _beside(own: Floats, weight: Floats | None) -> Floats:
+    """What of a column (n,) does not follow from the load (n,)."""
+    if weight is None or float(np.std(weight)) == 0.0:
+        return np.asarray(own - own.mean())
+    share = weight - weight.mean()
+    rest = np.asarray(own - own.mean())
+    if float(np.std(weight)) < 0.05 * abs(float(weight.mean())):
+        return rest  # nothing of note: the load did not change
+    return np.asarray(rest - share * float(share @ rest) / float(share @ share))
+
+
+def _rescored(
+    candidates: Sequence[Candidate],
+    forces: Sequence[Candidate],
+    moments: Sequence[Candidate],
+    given: dict[str, str],
+) -> list[Candidate]:
+    """Candidates whose roles are those of their behaviour, within the groups that it decides."""
+    decided = [
+        ({"load", "drawbar_pull"} & given.keys(), forces),
+        ({"torque"} & given.keys(), moments),
+    ]
+    taken = {c.address: roles for roles, own in decided for c in own if roles}
+    found = []
+    for c in candidates:
+        scores = dict(c.scores)
+        for role in taken.get(c.address, ()):
+            scores.pop(role, None)
+        scores |= {role: _BY_BEHAVIOUR for role, address in given.items() if address == c.address}
+        if c.address in taken and c.address not in given.values():
+            # an axis that is none of them is no other of them either
+            scores = {role: s for role, s in scores.items() if role not in _ROLES}
+        found.append(replace(c, scores=scores))
+    return found

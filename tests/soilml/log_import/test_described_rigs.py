@@ -1,0 +1,77 @@
+"""Channels and constants that a new map has right, over logs of rigs written after descriptions."""
+
+import json
+
+import numpy as np
+import pytest
+from described_rigs import WRITERS, drive
+from foreign_rigs import table
+from guessed_channels import RIGHT, judged
+
+from soilml.log_import import import_log, init_map
+from soilml.log_import.guesses.constants import constants_in_name
+from soilml.log_import.readers.side_files import side_lines
+from soilml.log_import.readers.text_layout import name_and_unit
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
+def test_channels_of_a_described_rig(writer, tmp_path):
+    logs, truth = writer(np.random.default_rng(11), tmp_path)
+    found = judged(logs, truth)
+    assert set(found.values()) == {RIGHT}, found
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("WHEELDIAMETER25.0_GEARRATIO6", {"diameter": "25.0 cm", "gear_ratio": "6"}),
+        ("run3_R130mm_GR14", {"radius": "130 mm", "gear_ratio": "14"}),
+        ("D26cm_sand", {"diameter": "26 cm"}),
+        ("radius_0.13_b", {"radius": "0.13 m"}),
+        ("trial2_r1_d3", {}),  # repeats and days
+        ("gearless", {}),
+    ],
+)
+def test_constants_in_names_of_files(name, expected):
+    assert {key: value for key, (value, _) in constants_in_name(name).items()} == expected
+
+
+@pytest.mark.parametrize(
+    ("cell", "expected"),
+    [
+        ("Motor Position (before gearbox - degrees)", ("Motor Position before gearbox", "degrees")),
+        ("speed (rpm, before gearbox)", ("speed before gearbox", "rpm")),
+        ("wheel angle [in degrees]", ("wheel angle", "degrees")),
+        ("M z, N mm", ("M z", "N mm")),
+        ("Carriage travel - millimetres", ("Carriage travel", "millimetres")),
+        ("Force (vertical)", ("Force vertical", "")),
+        ("T (% of rated)", ("T", "% of rated")),
+    ],
+)
+def test_units_in_words(cell, expected):
+    assert name_and_unit(cell) == expected
+
+
+@pytest.mark.parametrize("kind", ["json", "csv", "txt", "own"])
+def test_files_beside_a_log_state_constants(kind, tmp_path):
+    d = drive(np.random.default_rng(3), (0.1, 0.4), [60] * 2)
+    log = tmp_path / "log1.csv"
+    rows = table((d.t, d.omega, d.v, d.torque, d.load))
+    log.write_text("\n".join(["t,omega,v,torque,Fz", *rows]))
+    content = {"wheel_radius_mm": 130, "gear_ratio": 1}
+    if kind == "json":
+        (tmp_path / "run_parameters.json").write_text(json.dumps(content, indent=2))
+    elif kind == "csv":
+        (tmp_path / "RUN_PARAMETERS.csv").write_text("wheel_radius_mm,gear_ratio\n130,1\n")
+    else:
+        name = "RUN_PARAMETERS" if kind == "txt" else "log1_meta"
+        (tmp_path / f"{name}.txt").write_text("wheel_radius_mm = 130\n")
+    (tmp_path / "log2_meta.txt").write_text("wheel_radius_mm = 999\n")  # of another log
+    (tmp_path / "notes.txt").write_text("radius: 888 mm\n")
+    assert not any("999" in line or "888" in line for line in side_lines(log))
+    text = init_map(sorted(tmp_path.glob("*.csv")))  # the table of parameters is no log
+    assert 'radius = "130' in text
+    (tmp_path / "map.toml").write_text(text)
+    found = import_log(log, tmp_path / "map.toml")
+    assert found.radius == pytest.approx(0.13)
