@@ -87,6 +87,7 @@ from soilml.gap.verdict.remainder import (
     residual_trend,
     with_uncertain_discrepancy,
 )
+from soilml.gap.verdict.remainder_lengths import with_fitted_lengths
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
@@ -286,7 +287,7 @@ def _build_report(
     intervals = with_uncertain_discrepancy(problem, written)
     if smooth_gap:
         left = discrepancy_amplitudes(problem, written)
-        learned = learned_remainder(problem, written)
+        learned = learned_remainder(*with_fitted_lengths(problem, written))
         spread = among_candidates(intervals, result.candidates, result.posterior)
     else:
         left, learned = None, None
@@ -323,9 +324,8 @@ def _build_report(
     )
     if decision.status == "suspected":
         fit = with_uncertain_discrepancy(problem, shown)
-        suspected = updated_case(
-            fit, discrepancy_amplitudes(problem, shown), learned_remainder(problem, shown)
-        )
+        beside_shown = learned_remainder(*with_fitted_lengths(problem, shown))
+        suspected = updated_case(fit, discrepancy_amplitudes(problem, shown), beside_shown)
         report = replace(report, suspected_model=suspected)
     if decision.claimed:
         claimed = decision.claimed

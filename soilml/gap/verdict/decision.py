@@ -32,6 +32,9 @@ SUSPECT_MARGIN = 4.0
 #: the catalogue lacks (by default 8 % of a range), and the decrease of the objective from which a
 #: cause is stated all the same: tempered odds of 1100 to 1.
 LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
+#: Probability, causes outside the catalogue included, from which a single explanation is named; a
+#: smaller one lists it first among the suspects. That of right names lies near `IN_CATALOGUE`.
+NAMED_PROBABILITY = 0.9
 #: Why an explanation that the evidence supports is not claimed.
 IMPLAUSIBLE_FAULT = Remark(
     "implausible-fault", "the fault of a sensor or of the rig would have to be implausibly large"
@@ -113,7 +116,7 @@ def decide(
     if len(listed) > 1:
         listed = by_probability(listed, result.posterior)
         return Decision("class", listed, listed[0])
-    if len(accepted) > 1:
+    if len(accepted) > 1 or result.posterior.probability(*best.names) < NAMED_PROBABILITY:
         return Decision("suspected", (), _first_suspect(result) or best, NOT_DECISIVE)
     if not result.adequate:
         return Decision("partly-named", accepted, best)

@@ -16,8 +16,9 @@ from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.quantities import column
 
-#: Variance of the process, as a fraction, that the points may leave out anywhere at the readings.
-LEFT_OUT = 1e-3
+#: Variance of the process that the points may leave out anywhere at the readings, as a fraction of
+#: it and, where that is less, of the variance of the noise.
+LEFT_OUT, LEFT_OUT_OF_NOISE = 1e-3, 0.04
 #: Information on a weight, relative to its prior, below which it is not written.
 LEAST_INFORMATION = 0.01
 #: Decimals of the written weights, whose prior standard deviation is one.
@@ -98,16 +99,19 @@ def _blank_parts(problem: FitProblem, amplitude: Floats) -> list[tuple[Remainder
             if not own.any():
                 continue
             slip, load = readings.slip[own], readings.load[own]
+            size = amplitude[i] * problem.discrepancy.process.usual[i]
+            noise = float(np.median(problem.covariance.std[own]))
+            quiet = LEFT_OUT_OF_NOISE * (noise / size) ** 2
             part = RemainderPart(
                 column=column(name),
                 gear=gear,
-                amplitude=float(amplitude[i] * problem.discrepancy.process.usual[i]),
+                amplitude=float(size),
                 usual=float(problem.discrepancy.process.usual[i]),
                 slip_length=declared.slip_length,
                 log_load_length=declared.log_load_length,
                 slip=(float(slip.min()), float(slip.max())),
                 load=(float(load.min()), float(load.max())),
-                points=_spread_points(slip, load, declared),
+                points=_spread_points(slip, load, declared, min(LEFT_OUT, quiet)),
                 mean=(),
                 known=(),
                 shared=(),
@@ -123,7 +127,7 @@ def _declared(discrepancy: Mapping[str, Discrepancy], channel: str) -> Discrepan
 
 
 def _spread_points(
-    slip: Floats, load: Floats, lengths: Discrepancy
+    slip: Floats, load: Floats, lengths: Discrepancy, left_out: float
 ) -> tuple[tuple[float, float], ...]:
     """Points of the readings that represent the process: each where most of it is left out.
 
@@ -135,7 +139,7 @@ def _spread_points(
     )
     left, factor = np.ones(len(z)), np.zeros((len(z), 0))
     taken: list[int] = []
-    while len(taken) < min(MOST_POINTS, len(z)) and left.max() > LEFT_OUT:
+    while len(taken) < min(MOST_POINTS, len(z)) and left.max() > left_out:
         i = int(np.argmax(left))
         correlation = np.exp(-0.5 * ((z - z[i]) ** 2).sum(axis=1))
         new = (correlation - factor @ factor[i]) / np.sqrt(left[i])

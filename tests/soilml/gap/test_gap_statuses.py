@@ -64,6 +64,7 @@ def searched(*candidates, accepted=1, adequate=True, gap=True, weights=None):
     """A search with these candidates, of which the first ones with effects are accepted."""
     with_effects = [c for c in candidates if c.names]
     weights = weights or {c.names: -0.5 * c.objective for c in candidates}
+    total = np.logaddexp.reduce(list(weights.values()))
     return SearchResult(
         soil=None,
         soil_test=REJECTED if gap else KEPT,
@@ -71,7 +72,7 @@ def searched(*candidates, accepted=1, adequate=True, gap=True, weights=None):
         candidates=candidates,
         final_test=KEPT if adequate else REJECTED,
         predicted_gain={},
-        posterior=Posterior(weights),
+        posterior=Posterior({n: own - total for n, own in weights.items()}),
     )
 
 
@@ -215,6 +216,13 @@ def test_an_effect_on_one_channel_is_not_named_by_another_law_alone(law, monkeyp
     assert with_refused_outside(PROBLEM, searched(NONE, free), {}).posterior.refused
     alone.clear()  # where several channels show it, their relation identifies it
     assert status(searched(NONE, free)) == "form-open"
+
+
+def test_a_name_has_a_probability_of_nine_tenths():
+    for chance, expected in ((0.96, "named"), (0.93, "suspected")):
+        weights = {("dig",): np.log(chance), ("plough",): np.log(1.0 - chance)}
+        made = decide(PROBLEM, searched(NONE, DIG, weights=weights), (), ())
+        assert made.status == expected and made.shown is DIG
 
 
 def test_what_is_shown_is_the_suspect_that_is_listed_first():

@@ -1,0 +1,167 @@
+"""Correlation lengths, amplitude and noise of a remainder, by channel, from what a fit leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.config.measurement_noise import LOG_LOAD_LENGTH, SLIP_LENGTH
+from soilml.fitting.covariance import USUAL
+from soilml.fitting.operating_points import gear_numbers
+from soilml.gap.evidence.covariance import Covariance, assemble_covariance
+from soilml.gap.evidence.linearised_fit import AMPLITUDES
+from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.numerics.smooth_process import slip_load_points, squared_exponential
+from soilml.quantities import column
+
+#: Factors on the usual correlation lengths that are tried, in slip and in the logarithm of load.
+FACTORS = np.asarray([0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5])
+USUAL_FACTOR = 4  # Index of the usual lengths
+#: Standard deviation of the logarithm of a length about that of the usual one.
+LENGTH_STD = 1.0
+#: Amplitudes that are tried, in usual ones.
+SIZES = np.append(AMPLITUDES, [40.0, 63.0, 100.0])
+#: Factors on the declared noise that are tried where no scatter is granted.
+NOISE_FACTORS = np.asarray([1.0, 1.25, 1.6, 2.0, 2.5, 3.2])
+#: Decrease of -2 ln of the likelihood from which other lengths, another noise, or a remainder of a
+#: channel without one, are written.
+LEAST_GAIN = 6.0
+#: Readings of a channel that the lengths are fitted to, at most.
+MOST_READINGS = 100
+SWEEPS = 2
+
+
+@dataclass(frozen=True)
+class _Likeliest:
+    """The likeliest process of a channel, and what its -2 ln of the likelihood is."""
+
+    value: float
+    slip_length: float
+    log_load_length: float
+    amplitude: float  # in usual ones
+    noise: float  # factor on the noise
+
+
+def with_fitted_lengths(
+    problem: FitProblem, marginal: MarginalFit
+) -> tuple[FitProblem, MarginalFit]:
+    r"""The problem with lengths and noise, and the fit with amplitudes, that its residuals support.
+
+    .. math:: -2 \ln p = \ln|V + a^2 K(l)| + r^T [V + a^2 K(l)]^{-1} r + \text{prior}
+
+    with the residuals r of a channel and the covariance V of their noise and scatter, maximised
+    over lengths l and amplitudes a on a grid. V is that of the problem, or independent noise of
+    a size that is fitted too: what changes fast with slip or load is no noise, and the variance
+    components of a search take it for noise or for scatter between runs. Soil and effects stay as
+    they are, and so does the process of a channel whose discrepancy the case declares.
+
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.8.
+    """
+    granted = _likeliest(problem, marginal, problem.covariance, NOISE_FACTORS[:1])
+    declared = _declared(problem, np.ones(len(problem.readings.channels)))
+    alone = _likeliest(problem, marginal, declared, NOISE_FACTORS)
+    found, covariance = granted, problem.covariance
+    if sum(p.value for p in alone.values()) < sum(p.value for p in granted.values()) - LEAST_GAIN:
+        noise = np.ones(len(problem.readings.channels))
+        noise[list(alone)] = [p.noise for p in alone.values()]
+        found, covariance = alone, _declared(problem, noise)
+    amplitude = marginal.evidence.amplitude.copy()
+    discrepancy = dict(problem.case.discrepancy)
+    for i, process in found.items():
+        amplitude[i] = process.amplitude
+        discrepancy[column(problem.readings.channels[i])] = replace(
+            USUAL, slip_length=process.slip_length, log_load_length=process.log_load_length
+        )
+    case = replace(problem.case, discrepancy=discrepancy)
+    evidence = replace(marginal.evidence, amplitude=amplitude)
+    problem = replace(problem, case=case, covariance=covariance)
+    return problem, replace(marginal, evidence=evidence)
+
+
+def _declared(problem: FitProblem, noise: Floats) -> Covariance:
+    """Independent noise, of these factors on the declared one by channel, (channels,)."""
+    readings = problem.readings
+    components = replace(
+        problem.covariance.components,
+        noise_scale=noise,
+        friction_angle_std=0.0,
+        bearing_std=0.0,
+        autocorrelation=0.0,
+    )
+    return assemble_covariance(readings, np.zeros((len(readings), 2)), components)
+
+
+def _likeliest(
+    problem: FitProblem, marginal: MarginalFit, covariance: Covariance, noise: Floats
+) -> dict[int, _Likeliest]:
+    """The likeliest process of each channel without a declared discrepancy, by its number."""
+    readings, usual = problem.readings, problem.discrepancy.process.usual
+    residual = readings.measured - marginal.fit.prediction
+    gear = gear_numbers(readings.at)[readings.row]
+    found = {}
+    for i, name in enumerate(readings.channels):
+        if usual[i] == 0.0 or column(name) in problem.case.discrepancy:
+            continue
+        own = np.flatnonzero(readings.channel == i)
+        own = own[:: -(-len(own) // MOST_READINGS)]
+        factor = np.linalg.cholesky(covariance.matrix[np.ix_(own, own)])
+        root = np.linalg.inv(factor)
+        same_gear = gear[own][:, None] == gear[own]
+        found[i] = _of_channel(
+            root @ residual[own],
+            usual[i] * root,
+            readings.slip[own],
+            readings.load[own],
+            same_gear,
+            noise,
+            2.0 * float(np.log(np.diag(factor)).sum()),
+            0.0 if marginal.evidence.amplitude[i] > 0.0 else LEAST_GAIN,
+        )
+    return found
+
+
+def _of_channel(
+    white: Floats,
+    root: Floats,
+    slip: Floats,
+    load: Floats,
+    same_gear: Floats,
+    noise: Floats,
+    log_determinant: float,
+    needed: float,
+) -> _Likeliest:
+    """The likeliest process of one channel, with the usual lengths where these are as good.
+
+    white (m,): Residuals, whitened by their noise. root (m, m): What whitens it, times the usual
+    amplitude. log_determinant: Logarithm of the determinant of the noise. needed: Decrease of
+    -2 ln of the likelihood from which there is a process at all.
+    """
+    square = noise[:, None, None] ** 2
+
+    def at(i: int, k: int) -> _Likeliest:
+        lengths = float(SLIP_LENGTH * FACTORS[i]), float(LOG_LOAD_LENGTH * FACTORS[k])
+        z = slip_load_points(slip, load, *lengths)
+        size, vector = np.linalg.eigh(
+            root @ np.where(same_gear, squared_exponential(z, z), 0.0) @ root.T
+        )
+        scale = square + np.maximum(size, 0.0) * SIZES[:, None] ** 2  # noise, size, m
+        values = (np.log(scale) + (vector.T @ white) ** 2 / scale).sum(axis=2)
+        values += needed * (SIZES > 0.0)
+        n, a = np.unravel_index(int(np.argmin(values)), values.shape)
+        prior = float(np.sum((np.log([FACTORS[i], FACTORS[k]]) / LENGTH_STD) ** 2))
+        value = float(values[n, a]) + log_determinant + prior
+        return _Likeliest(value, *lengths, float(SIZES[a]), float(noise[n]))
+
+    middle = best = USUAL_FACTOR, USUAL_FACTOR
+    known = {middle: at(*middle)}
+    for _ in range(SWEEPS):
+        for axis in range(2):
+            for k in range(len(FACTORS)):
+                pair = (k, best[1]) if axis == 0 else (best[0], k)
+                if pair not in known:
+                    known[pair] = at(*pair)
+            best = min(known, key=lambda pair: known[pair].value)
+    better = known[best].value < known[middle].value - LEAST_GAIN
+    return known[best if better else middle]

@@ -1,0 +1,80 @@
+"""Correlation lengths and noise of the learned remainder, from what a fit leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+from gap_sets import case_of, driven, fit_problem
+
+from soilml.config.measurement_noise import LOG_LOAD_LENGTH, SLIP_LENGTH, Discrepancy
+from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
+from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.verdict.learned_remainder import learned_remainder
+from soilml.gap.verdict.remainder_lengths import with_fitted_lengths
+from soilml.io.table import Table
+
+
+def changed(shape, amplitude=(1.0, 0.0, 0.0), **declared):
+    """A soil fitted to rows whose torque a function of slip and load changes, and the change."""
+    case = case_of()
+    case = replace(case, discrepancy=declared)
+    table = driven(case, slips=16)
+    slip, load = table["slip"], table["load_N"]
+    added = 0.06 * np.ptp(table["torque_Nm"]) * shape(slip, load)
+    problem = fit_problem(
+        case, Table(dict(table.columns) | {"torque_Nm": table["torque_Nm"] + added})
+    )
+    soil = problem.fit_soil([np.full(len(problem.soil), 0.5)])
+    evidence = problem.discrepancy.evidence(soil)
+    return problem, MarginalFit(soil, replace(evidence, amplitude=np.asarray(amplitude)))
+
+
+def band(slip, load):
+    return np.exp(-(((slip - 0.3) / 0.06) ** 2))
+
+
+def lengths(problem, name="torque_Nm"):
+    own = problem.case.discrepancy[name]
+    return own.slip_length, own.log_load_length
+
+
+def test_a_narrow_band_of_slip_has_a_short_length_in_slip_alone():
+    problem, marginal = with_fitted_lengths(*changed(band))
+    in_slip, in_load = lengths(problem)
+    assert in_slip <= 0.4 * SLIP_LENGTH and in_load >= LOG_LOAD_LENGTH
+    assert lengths(problem, "sinkage_m") == (SLIP_LENGTH, LOG_LOAD_LENGTH)
+    assert marginal.evidence.amplitude[0] > 0.0
+
+
+def test_what_changes_fast_is_no_noise_and_its_mean_is_learned():
+    """Noise that an analysis estimated three times as large is the declared one beside it."""
+    problem, marginal = changed(band)
+    readings = problem.readings
+    components = replace(VarianceComponents.usual(readings, units=0.0), noise_scale=np.full(3, 3.0))
+    loud = assemble_covariance(readings, np.zeros((len(readings), 2)), components)
+    found, again = with_fitted_lengths(replace(problem, covariance=loud), marginal)
+    assert found.covariance.components.noise_scale.max() < 2.0
+    left = [readings.measured - marginal.fit.prediction]
+    for own in (found, again), (replace(problem, covariance=loud), marginal):
+        mean = np.zeros(len(readings))
+        torque = readings.channel == 0
+        at = readings.slip[torque], readings.load[torque]
+        mean[torque] = learned_remainder(*own).mean_and_std("torque", *at)[0]
+        left.append((left[0] - mean)[torque])
+    assert np.std(left[1]) < 0.5 * np.std(left[2])
+
+
+def test_a_smooth_change_and_a_declared_one_keep_their_lengths():
+    problem, _ = with_fitted_lengths(*changed(lambda s, w: np.sin(3.0 * s + np.log(w / 80.0))))
+    assert lengths(problem) == (SLIP_LENGTH, LOG_LOAD_LENGTH)
+    declared = Discrepancy(share=0.02, slip_length=0.2)
+    given = changed(band, torque_Nm=declared)
+    problem, marginal = with_fitted_lengths(*given)
+    assert problem.case.discrepancy["torque_Nm"] == declared
+    assert marginal.evidence.amplitude[0] == given[1].evidence.amplitude[0]
+
+
+def test_a_channel_without_a_remainder_gets_one_where_it_is_decisive():
+    _, marginal = with_fitted_lengths(*changed(band, amplitude=(0.0, 0.0, 0.0)))
+    assert marginal.evidence.amplitude[0] > 0.0
+    quiet = changed(lambda s, w: 0.0 * s, amplitude=(0.0, 0.0, 0.0))
+    assert not with_fitted_lengths(*quiet)[1].evidence.amplitude.any()
