@@ -14,8 +14,10 @@ from soilml.log_import.channels.inputs import channel_constant, our_slip
 from soilml.log_import.channels.runs import Run, run_names
 from soilml.log_import.channels.shared_errors import shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of, slope_of
+from soilml.log_import.checks.column_units import unit_hints
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.table_hints import table_hints
+from soilml.log_import.guesses.other_columns import with_other_columns
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.recording import Recording
@@ -70,7 +72,10 @@ def import_rows(
                         continue
                     groups.append((wheel, Run(labels[i], (recording,), run.times), [row]))
                     rows.append(row)
-        wrong += map_hints(log_map, wheel, values_of(every))
+        first = Run(names[0], tuple(logs[0]), tuple(np.arange(float(len(r))) for r in logs[0]))
+        hints = unit_hints(log_map, wheel, first)
+        hints += map_hints(log_map, wheel, values_of(every))
+        wrong += with_other_columns(hints, wheel, first, steady=True)
         rows_of_wheels.append((wheel, rows))
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")

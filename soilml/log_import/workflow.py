@@ -17,6 +17,7 @@ from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run, runs_of
 from soilml.log_import.channels.shared_errors import SharedError, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of
+from soilml.log_import.checks.column_units import differing_units, unit_hints
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.sensors import (
     dead_sensors,
@@ -25,7 +26,9 @@ from soilml.log_import.checks.sensors import (
     untared_sensors,
 )
 from soilml.log_import.checks.table_hints import table_hints
+from soilml.log_import.guesses.columns import liveliest
 from soilml.log_import.guesses.map_text import log_files
+from soilml.log_import.guesses.other_columns import with_other_columns
 from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.result import ImportedLog
@@ -49,6 +52,7 @@ from soilml.log_import.windows.steady import Stretch, steady_windows
 from soilml.remarks import Remark
 
 PathLike = str | os.PathLike[str]
+_LOOKED = 8  # Runs among which a lively one is looked for
 Progress = Callable[[str, int, int], None]
 
 
@@ -206,7 +210,9 @@ class _Wheel:
         """What says that the map is wrong."""
         # all windows, left out or not
         windows = values_of([row for rows in self.rows for row in rows])
-        return map_hints(self.log_map, self.wheel, windows)
+        hints = unit_hints(self.log_map, self.wheel, self.runs[0])
+        hints += map_hints(self.log_map, self.wheel, windows)
+        return with_other_columns(hints, self.wheel, liveliest(self.runs[:_LOOKED]))
 
     def shared_errors(self) -> Any:
         """The errors that the rows share."""
@@ -233,6 +239,7 @@ class _Wheel:
                 found.append(Remark("dead-sensor", text, (role, run.name)))
         found += untared_sensors(self.wheel, self.inputs)
         found += untared_load(self.wheel, self.inputs)
+        found += differing_units(self.wheel, self.runs[0])
         return found + lifted_at_the_end(self.wheel, [run.name for run in self.runs], self.inputs)
 
     def series(self, i: int) -> WheelSeries:

@@ -27,6 +27,9 @@ _SLOW_ROTATION = (
     (180.0 / math.pi, "deg", "rad"),
     (30.0 / math.pi, "rpm", "rad/s"),
 )
+#: Largest pull over load, lever arm of torque over load, m, and sinkage, m, of any wheel.
+_MOST_PULL, _MOST_LEVER, _MOST_SINKAGE = 1.2, 0.8, 0.7
+_FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
 _TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
 
 
@@ -40,7 +43,7 @@ def map_hints(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> l
     # the load follows from the slope, and T / (W r) from the load: causes come before consequences
     found = [*_slope(wheel, windows), *_ratio(log_map, wheel, windows)]
     found += [*_load(log_map, wheel, windows), *_torque(log_map, wheel, windows)]
-    found += _sinkage(wheel, windows)
+    found += [*_pull(windows), *_sinkage(wheel, windows)]
     return [replace(hint, text=f"{log_map.source}{of}: {hint.text}") for hint in found]
 
 
@@ -166,10 +169,21 @@ def _load(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Itera
                 "unit = 'kgf' in [load]",
                 ("load",),
             )
+        elif not 1.0 / _FAR_FROM_WEIGHT < middle / weight < _FAR_FROM_WEIGHT:
+            yield Remark(
+                "load-not-of-mass",
+                f"the load is {middle:.3g} N in the middle of the windows, and the mass of "
+                f"[vehicle] gives {weight:.3g} N for each wheel: probably one of them is wrong, or "
+                "the column is another force",
+                ("load",),
+            )
 
 
 def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
-    if not {"torque", "load"} <= windows.keys() or wheel.radius is None:
+    if not {"torque", "load"} <= windows.keys():
+        return
+    if wheel.radius is None:
+        yield from _lever(wheel, windows)
         return
     torque, load = windows["torque"], windows["load"]
     good = np.isfinite(torque) & (load > 0.0)
@@ -189,7 +203,7 @@ def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Ite
         yield Remark(
             "traction-out-of-range",
             f"torque is {traction:.3g} times W r in the middle of the windows: probably {cause}",
-            (role,),
+            (role, "load"),
         )
     elif cause:
         unit = wheel.channels[role].unit
@@ -212,19 +226,53 @@ def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Ite
         )
 
 
+def _lever(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
+    """A torque over load that no wheel has, whatever its radius."""
+    torque, load = windows["torque"], windows["load"]
+    good = np.isfinite(torque) & (load > 0.0)
+    lever = float(np.median(np.abs(torque[good]) / load[good])) if good.any() else 0.0
+    if lever > _MOST_LEVER:
+        role = "torque" if "torque" in wheel.channels else "motor_current"
+        yield Remark(
+            "traction-out-of-range",
+            f"torque over load is {lever:.3g} m in the middle of the windows, more than the radius "
+            "of a wheel: probably the unit of one of them is wrong, or a column is another moment "
+            "or force",
+            (role, "load"),
+        )
+
+
+def _pull(windows: dict[str, Floats]) -> Iterator[Remark]:
+    if not {"drawbar_pull", "load"} <= windows.keys():
+        return
+    pull, load = windows["drawbar_pull"], windows["load"]
+    good = np.isfinite(pull) & (load > 0.0)
+    ratio = float(np.median(np.abs(pull[good]) / load[good])) if good.any() else 0.0
+    if ratio > _MOST_PULL:
+        yield Remark(
+            "pull-out-of-range",
+            f"drawbar pull is {ratio:.3g} times the load in the middle of the windows, more than "
+            "soil can give: probably one of them is in another unit, was not tared, or is another "
+            "force",
+            ("load", "drawbar_pull"),
+        )
+
+
 def _sinkage(wheel: WheelMap, windows: dict[str, Floats]) -> Iterator[Remark]:
     sinkage = windows.get("sinkage", np.zeros(0))
     sinkage = sinkage[np.isfinite(sinkage)]
-    if wheel.radius is None or sinkage.size == 0:
+    if sinkage.size == 0:
         return
     middle = float(np.median(np.abs(sinkage)))
-    if middle > 2.0 * wheel.radius.value:
-        cause = "it has its zero elsewhere; write tare = 'rest' in [sinkage]"
-        if middle / 1000.0 < wheel.radius.value:
+    most = wheel.radius.value if wheel.radius is not None else _MOST_SINKAGE
+    if middle > most:
+        cause = "it has its zero elsewhere (write tare = 'rest' in [sinkage]), or is no length"
+        if middle / 1000.0 < most:
             cause = "it is in mm; write unit = 'mm' in [sinkage]"
+        of = "the wheel" if wheel.radius is not None else "any wheel"
         yield Remark(
             "sinkage-out-of-range",
-            f"sinkage is {middle:.3g} m, more than the diameter of the wheel: probably {cause}",
+            f"sinkage is {middle:.3g} m, more than the radius of {of}: probably {cause}",
             ("sinkage",),
         )
 

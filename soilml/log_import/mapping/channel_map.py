@@ -48,6 +48,7 @@ class ChannelMap:
     role: Key of `ROLES`.
     columns: Columns of the log; empty for a constant and for a number in the name of the file.
     scale: What samples are multiplied by to be in the unit of soilml, with sign.
+    has_scale: Whether the map states that scale, or counts of a turn, in place of a unit.
     tare: Stretch in which the sensor should read zero: (from, until) in s after the start of a run,
         or "rest" for the time before the wheel starts; None where it is not tared.
     bias, noise: Errors that all rows share, and errors of each row beside its scatter.
@@ -83,6 +84,7 @@ class ChannelMap:
     std_column: str = ""
     std_scale: float = 1.0
     std_is_share: bool = False
+    has_scale: bool = False
 
     @property
     def where(self) -> str:
@@ -107,6 +109,7 @@ def take_channel(settings: Settings, role: str) -> ChannelMap:
         value = take_uncertain(settings, "value", ours)
     unit = settings.text("unit", "")
     scale, gain = 1.0, 0.0
+    has_scale = bool({"scale", "counts_per_turn"} & settings.content.keys())
     if "scale" in settings:
         one = take_uncertain(settings, "scale", ours)
         scale, gain = one.value, one.relative
@@ -152,6 +155,7 @@ def take_channel(settings: Settings, role: str) -> ChannelMap:
         std_column=std_column,
         std_scale=std_scale,
         std_is_share=is_share,
+        has_scale=has_scale,
         **own,
     )
     settings.finish()

@@ -1,0 +1,80 @@
+"""Maps of what cannot be are refused, and the likely other column is named."""
+
+import numpy as np
+import pytest
+from described_rigs import WRITERS, pull_curves, six_axes_load_on_y
+
+from soilml.errors import InputError
+from soilml.log_import import import_log, init_map
+
+#: Wrong lines in place of right ones, for the log with a sensor on its side; code and column.
+WRONG = {
+    "a lateral force as load": ('"Force Y"', '"Force Z"', "pull-out-of-range", "'Force Y'"),
+    "a moment as sinkage": (
+        'column = "Vertical Axis Position"', 'column = "Torque X"', "unit-of-another-kind",
+        "'Vertical Axis Position'",
+    ),
+    "a torque in N cm": (
+        'column = "Torque Z"\nunit = "Nm"', 'column = "Torque X"\nunit = "kN m"',
+        "traction-out-of-range", "'Torque Z'",
+    ),
+    "a sinkage in m": (
+        'column = "Vertical Axis Position"\nunit = "mm"',
+        'column = "Vertical Axis Position"\nscale = "1 m"', "sinkage-out-of-range", "'mm'",
+    ),
+}  # fmt: skip
+
+
+def edited(text, old, new):
+    lines = [line.split("  #")[0] for line in text.split("\n")]
+    plain = "\n".join(lines)
+    assert old in plain, plain
+    return plain.replace(old, new)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("radius", [True, False])
+@pytest.mark.parametrize("case", WRONG)
+def test_what_cannot_be_is_refused(case, radius, tmp_path):
+    old, new, code, column = WRONG[case]
+    logs, _ = six_axes_load_on_y(np.random.default_rng(5), tmp_path)
+    text = edited(init_map(logs), old, new)
+    if not radius:  # slip as it was set, and no radius
+        text = text.replace('diameter = "26.0 cm +- 1 %"', "").replace("[position]", "[wheel_x]")
+        start, stop = text.index("[wheel_angle]"), text.index("[torque]")
+        text = text[:start] + "[slip]\nvalue = 0.3\n\n" + text[stop:]
+    (tmp_path / "map.toml").write_text(text)
+    with pytest.raises(InputError) as refused:
+        import_log(logs, tmp_path / "map.toml")
+    found = import_log(logs, tmp_path / "map.toml", accept=True)
+    assert code in {remark.code for remark in found.implausible}
+    assert column in str(refused.value)
+
+
+def test_a_load_that_is_not_of_the_mass_is_refused(tmp_path):
+    logs, _ = six_axes_load_on_y(np.random.default_rng(5), tmp_path)
+    for mass, wrong in ((14.0, False), (60.0, True)):
+        text = init_map(logs) + f"\n[vehicle]\nmass = {mass}\n"
+        (tmp_path / "map.toml").write_text(text)
+        found = import_log(logs, tmp_path / "map.toml", accept=True)
+        assert ("load-not-of-mass" in {r.code for r in found.implausible}) == wrong
+
+
+def test_rows_with_load_and_pull_exchanged_are_refused(tmp_path):
+    logs, _ = pull_curves(np.random.default_rng(5), tmp_path)
+    text = edited(edited(edited(init_map(logs), '"DBP"', '"\0"'), '"Wv"', '"DBP"'), "\0", "Wv")
+    (tmp_path / "map.toml").write_text(text)
+    with pytest.raises(InputError, match=r"'Wv' .* likely column of \[load\]"):
+        import_log(logs, tmp_path / "map.toml")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
+def test_right_maps_are_not_refused(writer, tmp_path):
+    logs, _ = writer(np.random.default_rng(5), tmp_path)
+    text = init_map(logs)
+    if "# radius" in text:
+        text = text.replace("# radius =", "radius =").replace("0.15 m +- 1 %", "0.13 m")
+    (tmp_path / "map.toml").write_text(text.replace("1.0 N m/A", "0.036 N m/A"))
+    found = import_log(logs, tmp_path / "map.toml")
+    assert not found.implausible
