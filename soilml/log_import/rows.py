@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.runs import Run
@@ -26,6 +27,8 @@ AVERAGED = ("torque", "load", "drawbar_pull", "sinkage")
 #: How many times the usual wandering, and how large a standard error of slip, a window may have.
 _TIMES, _LEAST_ERROR = 6.0, 0.01
 _FEWEST = 4  # Fewest windows that tell what is usual
+#: Wandering of a pull over the load, and of a slip, s^0.5, that no steady window has.
+_MOST_WANDERING = 0.15
 #: Largest slip of a row: at 1 the wheel spins on the spot, and r omega and v say no more.
 _MOST_SLIP = 0.995
 
@@ -198,26 +201,35 @@ def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, in
 
     The wandering of a window is the standard error of its mean times the square root of its
     length, which does not depend on the length. Hands on the carriage, a cable that tightens or a
-    wheel that meets a stone raise it.
+    wheel that meets a stone raise it. A window is judged by the others of its own run, and in a run
+    of few windows by what no rig shows, so that it stays or goes whatever else is imported.
     """
     found: dict[tuple[int, int], Remark] = {}
     for name, least in (("drawbar_pull", 0.0), ("slip", _LEAST_ERROR)):
-        places = [(i, k) for i, rows in enumerate(runs) for k in range(len(rows))]
-        errors = np.asarray([runs[i][k].std.get(name, np.nan) for i, k in places])
-        lengths = np.asarray([runs[i][k].window.stop - runs[i][k].window.start for i, k in places])
-        known = np.isfinite(errors)
-        if known.sum() < _FEWEST:
-            continue
-        wandering = errors * np.sqrt(lengths)
-        usual = float(np.median(wandering[known]))
-        for place, size, error in zip(places, wandering, errors, strict=True):
-            if size > _TIMES * usual and error > least:
+        for i, rows in enumerate(runs):
+            errors = np.asarray([row.std.get(name, np.nan) for row in rows])
+            lengths = np.asarray([row.window.stop - row.window.start for row in rows])
+            wandering = errors * np.sqrt(lengths)
+            known = np.isfinite(errors)
+            if known.sum() >= _FEWEST:
+                limits = np.full(len(rows), _TIMES * float(np.median(wandering[known])))
+            else:
+                one = [
+                    row.values.get("load", np.nan) if name == "drawbar_pull" else 1.0
+                    for row in rows
+                ]
+                limits = _MOST_WANDERING * np.abs(one)
+            for k in np.flatnonzero((wandering > limits) & (errors > least)):
                 words = name.replace("_", " ")
+                usual = float(limits[k]) / _TIMES
+                than = "in the middle of the windows"
+                if known.sum() < _FEWEST:
+                    usual, than = float(limits[k]), "windows of any rig at most do"
                 text = (
-                    f"it is irregular: the {words} wanders {size / usual:.2g} times as much as "
-                    "in the middle of the windows, as if someone had touched the rig"
+                    f"it is irregular: the {words} wanders {wandering[k] / usual:.2g} times as "
+                    f"much as {than}, as if someone had touched the rig"
                 )
-                found[place] = Remark("irregular", text, (name,))
+                found[(i, int(k))] = Remark("irregular", text, (name,))
     return found
 
 
@@ -250,6 +262,22 @@ def without_torque(table: Table) -> list[Remark]:
     return [Remark("no-torque", text, ("torque",))]
 
 
+def gear_of(wheel: WheelMap, run: Run) -> str:
+    """The gear of a wheel in a run; "" where the map states none.
+
+    Raises `InputError` where neither the name of the run nor that of its file has it.
+    """
+    if wheel.gear_pattern is None:
+        return wheel.gear
+    for text in (run.name, run.recordings[0].file.name):
+        if match := wheel.gear_pattern.search(text):
+            return match[match.re.groups]
+    raise InputError(
+        f"[wheel] gear_from {wheel.gear_pattern.pattern!r} finds nothing in the name of the run "
+        f"{run.name!r}, nor in {run.recordings[0].file.name!r}"
+    )
+
+
 def rows_as_table(
     groups: Sequence[tuple[WheelMap, Run, Sequence[WindowRow]]], log_map: LogMap
 ) -> Table:
@@ -260,8 +288,8 @@ def rows_as_table(
             line: dict[str, Any] = {"run": f"{run.name}_{wheel.name}" if wheel.name else run.name}
             if wheel.name:
                 line["wheel"] = wheel.name
-            if wheel.gear:
-                line["gear"] = wheel.gear
+            if gear := gear_of(wheel, run):
+                line["gear"] = gear
             for name in ("slip", "load", "torque", "drawbar_pull", "sinkage"):
                 if name in row.values:
                     line[column(name)] = row.values[name]

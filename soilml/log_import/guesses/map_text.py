@@ -198,7 +198,7 @@ class _MapDrafting:
         for role, why in self.reasons.items():
             if role in first:
                 first[role].comments.setdefault("column", why)
-        lines += wheel_lines(first, self.found, self.run, self.stated.common)
+        lines += wheel_lines(first, self.found, self.run, self.stated.common, self.run_names)
         lines += load_lines(self.found, self.stated, self.run_names, len(self.labels))
         for role in ROLES:
             if role in self.found.shared:

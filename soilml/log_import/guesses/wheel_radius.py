@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -15,16 +16,23 @@ from soilml.log_import.guesses.draft import Draft, Marked, fastest_ratio, inputs
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.units import spelling
 
+_OF_GEAR = re.compile(
+    r"(?i)(?<![a-z])((?:width|wheel|b|w|lug|grouser|h)[_-]?\d+(?:mm)?)(?![a-z0-9])"
+)
 _RADII = (0.02, 0.7)  # Radii of wheels, m
 #: Slips from which a radius follows; fewest samples; scatter of the radius over it.
 _SLIPS, _FEWEST, _SCATTER = (0.0, 0.9), 20, 0.05
 
 
 def wheel_lines(
-    drafts: dict[str, Draft], found: Assignment, run: Run, stated: Mapping[str, tuple[str, str]]
+    drafts: dict[str, Draft],
+    found: Assignment,
+    run: Run,
+    stated: Mapping[str, tuple[str, str]],
+    run_names: Sequence[str] = (),
 ) -> list[str]:
     """The lines of the table."""
-    lines = ["", "[wheel]"]
+    lines = ["", "[wheel]", *_gear_lines(run_names)]
     for key in ("radius", "diameter"):
         if key in stated:
             value, line = stated[key]
@@ -61,6 +69,17 @@ def wheel_lines(
     if needed:
         return [*lines, Marked(f"{example}  # NEEDED{hint}")]
     return [*lines, f"{example}  # for checks{hint}"]
+
+
+def _gear_lines(run_names: Sequence[str]) -> list[str]:
+    """A line on the gear where names of runs have several widths or numbers of a wheel."""
+    matches = [_OF_GEAR.search(name) for name in run_names]
+    gears = dict.fromkeys(match[1] for match in matches if match)
+    if len(gears) < 2 or not all(matches):
+        return []
+    shown = ", ".join(list(gears)[:4])
+    why = f"the names say {shown}; where these are wheels: [gears.NAME] of the model file"
+    return ["# " + key_line("gear_from", _OF_GEAR.pattern, why)]
 
 
 def radius_of_slip(inputs: Inputs, slip: Candidate, run: Run) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -144,13 +145,17 @@ class Vehicle:
 
 @dataclass(frozen=True)
 class WheelMap:
-    """A wheel: its radius (m), its channels by role, and where it stands."""
+    """A wheel: its radius (m), its channels by role, and where it stands.
+
+    `gear_pattern` finds its gear in the name of each run or file: group 1, or the whole match.
+    """
 
     name: str
     radius: Uncertain | None
     channels: dict[str, ChannelMap]
     gear: str = ""
     axle: str = ""
+    gear_pattern: re.Pattern[str] | None = None
 
 
 @dataclass(frozen=True)
@@ -212,6 +217,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
     shared_wheel = settings.table("wheel")
     radius = _take_radius(shared_wheel)
+    pattern = _take_gear_pattern(shared_wheel)
     gear = shared_wheel.text("gear", "")
     shared_wheel.finish()
     named = settings.table("wheels")
@@ -225,6 +231,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
             f"{settings.where} [wheels.{name}]",
             settings.folder,
         )
+        own_pattern = _take_gear_pattern(own) or pattern
         wheels.append(
             WheelMap(
                 name,
@@ -232,11 +239,12 @@ def _take_map(settings: Settings, source: str) -> LogMap:
                 shared | _take_channels(own),
                 own.text("gear", gear),
                 _take_axle(own),
+                own_pattern,
             )
         )
         own.finish()
     if not wheels:
-        wheels = [WheelMap("", radius, shared, gear)]
+        wheels = [WheelMap("", radius, shared, gear, gear_pattern=pattern)]
     for wheel in wheels:
         _check_wheel(settings, wheel, vehicle)
     return LogMap(
@@ -270,6 +278,22 @@ def _take_radius(settings: Settings) -> Uncertain | None:
         return take_uncertain(settings, "radius", "m", lower=0.0)
     settings.permit(["radius", "diameter"])
     return None
+
+
+def _take_gear_pattern(settings: Settings) -> re.Pattern[str] | None:
+    if "gear_from" not in settings:
+        settings.permit(["gear_from"])
+        return None
+    text = settings.text("gear_from")
+    if "gear" in settings:
+        settings.fail("has gear and gear_from; give one of them")
+    try:
+        pattern = re.compile(text, re.IGNORECASE)
+    except re.error as error:
+        settings.fail(f"gear_from {text!r} is no regular expression: {error}")
+    if pattern.groups > 1:
+        settings.fail(f"gear_from is {text!r}; needed is at most one group, the name of the gear")
+    return pattern
 
 
 def _take_axle(settings: Settings) -> str:
