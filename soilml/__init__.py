@@ -46,6 +46,7 @@ _HOME = {
     "Soil": "soilml.physics.soils",
     "soil": "soilml.physics.soils",
     "soil_catalogue": "soilml.physics.soils",
+    "design": "soilml.rover_design",
     "Status": "soilml.row_status",
 }
 

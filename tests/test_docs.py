@@ -32,6 +32,7 @@ RUN = (
     "docs/papers/slip_models.md",
     "docs/start/board.md",
     "docs/start/research.md",
+    "docs/how-to/choose-wheels.md",
     "exported/README.md",
 )
 
@@ -140,6 +141,25 @@ def test_an_effect_of_ones_own_pulls_back(tmp_path, capsys):
     assert main(command) == 0
     without = float(capsys.readouterr().out.splitlines()[1].split(",")[3])
     assert without - with_drag == pytest.approx(2.0)
+
+
+def test_the_question_of_a_design_is_that_of_the_example():
+    (toml,) = blocks("docs/how-to/choose-wheels.md", "toml")
+    example = (ROOT / "examples/design/rover.toml").read_text()
+    assert toml == "".join(line for line in example.splitlines(keepends=True)[1:])
+
+
+@pytest.mark.slow
+def test_the_answer_of_a_design_is_what_the_command_prints(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(ROOT)
+    page = (ROOT / "docs/how-to/choose-wheels.md").read_text()
+    command = re.findall(r"```\nsoilml (design .*)\n```", page)[1].split()
+    assert main([*command, "--out", str(tmp_path / "design.json")]) == 0
+    verdict = capsys.readouterr().out.splitlines()[0]
+    (printed,) = blocks("docs/how-to/choose-wheels.md", "text")[1].splitlines()
+    # searches and quantiles may differ by rounding between processors
+    shown, expected = (re.findall(r"-?\d+(?:\.\d+)?", line) for line in (verdict, printed))
+    assert [float(x) for x in shown] == pytest.approx([float(x) for x in expected], rel=0.1)
 
 
 @pytest.mark.parametrize("command", COMMANDS)

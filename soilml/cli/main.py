@@ -40,6 +40,7 @@ friction angle and shear modulus, each with its uncertainty.
   comparison of methods        soilml compare
   slopes that can be climbed   soilml pull (from measured rows)
                                soilml climb (from stress on the rims)
+  wheels for a slope           soilml design
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 
@@ -67,6 +68,7 @@ COMMANDS = {
     "estimate": "soilml.cli.commands.estimate",
     "advise": "soilml.cli.commands.advise",
     "pull": "soilml.cli.commands.pull",
+    "design": "soilml.cli.commands.design",
     "compare": "training.commands.compare",
     "climb": "soilml.cli.commands.climb",
     "papers": "soilml.cli.commands.papers",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cache
 from importlib import resources
 from typing import Annotated, Any, final
@@ -42,7 +42,10 @@ class Soil:
 
 @dataclass(frozen=True)
 class SoilEntry:
-    """A soil of the catalogue: its values, where they are printed, and what had to be assumed."""
+    """A soil of the catalogue: its values, where they are printed, and what had to be assumed.
+
+    `spread` are ranges of parameters that the paper prints, in SI units.
+    """
 
     name: str
     soil: Soil
@@ -50,6 +53,7 @@ class SoilEntry:
     text: str
     assumed: tuple[str, ...]
     published: dict[str, float]
+    spread: dict[str, tuple[float, float]] = field(default_factory=dict)
 
 
 @cache
@@ -89,6 +93,9 @@ def _entry(name: str, source: str, assumed: dict[str, float], entry: dict[str, A
         text=entry["text"],
         assumed=tuple(sorted(used)),
         published=published,
+        spread={
+            key: (float(low), float(high)) for key, (low, high) in entry.get("spread", {}).items()
+        },
     )
 
 

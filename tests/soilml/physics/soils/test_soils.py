@@ -4,6 +4,7 @@ import csv
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from soilml import Soil, soil, soil_catalogue
@@ -36,6 +37,19 @@ def test_a_negative_published_cohesion_is_kept_and_not_used():
     entry = soil_catalogue()["comin2017/es-3"]
     assert entry.published["cohesion"] == -830.0
     assert entry.soil.cohesion == 0.0
+
+
+def test_printed_ranges_surround_the_value_and_stand_within_bounds():
+    spread = {n: e for n, e in soil_catalogue().items() if e.spread}
+    assert {"ding2015/lunar_soil", "moore1999/drift", "scott1970/apollo12"} <= set(spread)
+    for entry in spread.values():
+        for field, (low, high) in entry.spread.items():
+            value = getattr(entry.soil, field)
+            assert low <= value <= high
+            check(soil(entry.name, **{field: low}))
+            check(soil(entry.name, **{field: high}))
+    ends = np.rad2deg(soil_catalogue()["moore1999/cloddy"].spread["friction_angle"])
+    assert ends == pytest.approx([34.0, 39.0], abs=1e-4)
 
 
 def test_single_values_can_be_replaced():

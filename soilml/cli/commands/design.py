@@ -1,0 +1,156 @@
+"""`soilml design`: wheels of a rover for a slope, over soils and errors of the model."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from soilml.cli.options import (
+    InputFile,
+    add_output,
+    add_report_option,
+    need_for_report,
+    number,
+    parse_names,
+    whole_number_from,
+)
+
+if TYPE_CHECKING:
+    from soilml.report.page import Report
+    from soilml.rover_design.report import DesignReport
+    from soilml.rover_design.study import DesignStudy
+
+HELP = "which wheels climb a slope, with what margin"
+DESCRIPTION = """\
+Find the wheels with which a rover climbs a slope: sizes within limits are
+compared over the soils that it may meet and over typical errors of the model.
+
+  soilml design ROVER.toml
+  soilml design ROVER.toml --slope 20 --gravity moon --picture design.png
+  soilml design ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
+
+ROVER.toml states the rover; no figure of it is assumed. A dimension is a
+number, a range that is searched, or { values = [...] }:
+
+  [rover]
+  mass = 12 # kg
+  wheels = 4
+  wheelbase = 0.4 # m, from the first axle to the last
+  centre_of_mass = [0.0, 0.18] # m: ahead of the middle, above the ground
+  gravity = "earth"
+
+  [wheel]
+  radius = 0.09 # m
+  width = [0.04, 0.12]
+  lug_height = [0.0, 0.015]
+  # lug_count = 24
+
+  [soil] # as in a model file; or published ones, each as likely
+  names = ["ding2015/hit_lss1", "wang2016/kls1"]
+  # model = "model.toml" and runs = "runs.csv": the soil of measured rows
+
+  [goal]
+  slope = "15 deg"
+  # margin = 5 (N), torque_limit = 2 (N m), energy_limit = 150 (J/m),
+  # slip_limit = 0.6, risk = 0.05, least = "width" (or energy, torque, ...)
+
+The best design is the one that meets the goal with the probability 1 - risk
+and has the least of `least`; where none does, it is the likeliest. The margin
+is the largest pull up to the slip limit less the weight along the slope. The
+front has the designs that no other one beats in both margin and `least`.
+climbed_% is the probability of meeting the goal; p05 and p95 are the ends of
+the 90 % band; lugs is the number of lugs that a wheel needs.
+
+The result is JSON in SI units, in the file of --out or in a pipe; a terminal
+shows tables. --report writes a page to read and print.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "study", type=InputFile, metavar="ROVER.toml", help="rover, wheel, soil and goal"
+    )
+    parser.add_argument("--slope", type=number, metavar="DEG", help="slope in degrees")
+    parser.add_argument("--gravity", metavar="G", help="gravity: earth, moon, mars, or in m/s^2")
+    parser.add_argument("--soil", metavar="A,B,...", help="published soils, each as likely")
+    parser.add_argument("--risk", type=number, help="probability of failing that is accepted")
+    parser.add_argument(
+        "--designs",
+        type=whole_number_from(1, 100_000),
+        default=250,
+        metavar="N",
+        help="designs of the sweep (default: 250)",
+    )
+    parser.add_argument(
+        "--draws",
+        type=whole_number_from(50, 20_000),
+        default=1000,
+        metavar="N",
+        help="draws of soil and model error (default: 1000)",
+    )
+    parser.add_argument(
+        "--sweep-only", action="store_true", help="do not search between the designs of the sweep"
+    )
+    add_output(parser, "--out", "FILE.json", "write the result to this file")
+    add_output(parser, "--picture", "FILE.png", "draw contours, front and shares")
+    add_report_option(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Compare the designs and write the result."""
+    from soilml.cli.output import is_terminal, show, write_stdout, write_with_report
+    from soilml.cli.progress import stage_progress
+    from soilml.optional_imports import need
+
+    need("scipy", "design")
+    need_for_report(args, "design")
+    if args.picture is not None:
+        need("matplotlib", "design --picture")
+    from soilml.report.figure_style import save_png
+    from soilml.report.page import json_text
+    from soilml.rover_design.figures import SIZE
+    from soilml.rover_design.presentation import design_page, design_text
+    from soilml.rover_design.report import design_report
+
+    study = _study(args)
+    with stage_progress() as progress:
+        found: DesignReport = design_report(
+            study,
+            designs=args.designs,
+            draws=args.draws,
+            optimise=not args.sweep_only,
+            progress=progress,
+        )
+    content = found.as_json()
+
+    def draw(path: Path) -> None:
+        save_png(found.plot, 2, 2, SIZE, path)
+
+    def build() -> tuple[Report, Mapping[str, Any]]:
+        return design_page(found, args.study), content
+
+    text = json_text(content)
+    write_with_report(args, {args.out: text, args.picture: draw}, build, study.soil.files)
+    if args.out is not None or args.report is not None or is_terminal():
+        show(design_text(found))
+    else:
+        write_stdout(text)
+    return 0
+
+
+def _study(args: argparse.Namespace) -> DesignStudy:
+    """The question of the file, with what the options change."""
+    import math
+
+    from soilml.rover_design.study import read_study, with_changes
+
+    return with_changes(
+        read_study(args.study),
+        slope=None if args.slope is None else math.radians(args.slope),
+        gravity=args.gravity,
+        soils=parse_names(args.soil),
+        risk=args.risk,
+    )

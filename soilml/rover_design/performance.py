@@ -1,0 +1,309 @@
+"""What designs do on a slope in many worlds: margin, slip, work, torque, sinkage, lugs needed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, fields, replace
+from os import cpu_count
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats, Real
+from soilml.parameters import mapped
+from soilml.physics.contact import Force
+from soilml.physics.effects.grousers import Grousers
+from soilml.physics.equilibrium import without_unsolved
+from soilml.physics.forces import apply_input_effects
+from soilml.physics.gears import Wheel
+from soilml.physics.load_case import LoadCase
+from soilml.physics.model import Model, in_chunks
+from soilml.physics.operating_point import Operating
+from soilml.physics.sinkage_estimate import coarse_estimate
+from soilml.physics.sinkage_search import equilibrium_near
+from soilml.physics.soils import Soil
+from soilml.rover_design.study import DesignStudy
+from soilml.rover_design.worlds import DrawnWorlds
+
+#: Slips of a sweep and of a reported design, as shares of the slip limit.
+SWEPT = np.asarray([0.12, 0.3, 0.55, 0.8, 1.0])
+REPORTED = np.asarray([0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
+#: Rows of wheel, slip and world that are solved at a time by a thread, which bounds the memory.
+BLOCK_ROWS = 60_000
+MOST_THREADS = 4
+#: Of a rover, each slip and lug is reckoned by the rim, as `Grousers.rim_slip` says.
+RIM_SLIP = 1.0
+
+
+@dataclass(frozen=True)
+class Outcomes:
+    """What k designs do on the slope of a study in n worlds, (k, n) each.
+
+    margin: Largest pull up to the slip limit less the weight along the slope, N; minus infinity
+        where the soil does not carry a wheel at any slip.
+    slip, energy, torque, sinkage: Slip that the slope needs, work of the wheels for each metre
+        (J/m), largest torque (N m) and sinkage (m) of a wheel there; NaN where it is not climbed.
+    lugs: Lugs on a wheel that the soil between them needs to move with it; NaN without lugs.
+    pull_error: What the errors of the model add to the largest pull, N.
+    met: Whether the goal is met.
+    """
+
+    margin: Floats
+    slip: Floats
+    energy: Floats
+    torque: Floats
+    sinkage: Floats
+    lugs: Floats
+    pull_error: Floats
+    met: NDArray[np.bool_]
+
+
+def evaluate(
+    study: DesignStudy,
+    designs: Mapping[str, Floats],
+    worlds: DrawnWorlds,
+    *,
+    shares: Floats = REPORTED,
+    quick: bool = False,
+) -> Outcomes:
+    r"""Outcomes of designs in worlds.
+
+    .. math:: \sum_i DP_i(s, W_i) = m g \sin\alpha, \quad
+        E = \sum_i \frac{T_i}{r (1 - s)}, \quad
+        DP_i = DP(s, W_i) + W_i (e_1 + e_2 s) + \delta(s, W_i)
+
+    The first, at the least slip s that all wheels share, gives the slip that the slope needs, as in
+    `soilml.traction.rover_performance`. The errors of the model e and delta are those of the world.
+
+    designs: Values (k,) by dimension of the study.
+    shares: Slips, as shares of the slip limit.
+    quick: Take the equilibrium next to an estimate, without looking for an earlier one.
+
+    Raises `InputError` where a wheel leaves the ground on the slope.
+
+    References: Wong, Theory of Ground Vehicles, chapters 2 and 3; Skonieczny, Moreland and
+    Wettergreen, IROS 2012, for the number of lugs.
+    """
+    count = len(designs["radius"])
+    parts: list[tuple[NDArray[np.int64], Outcomes]] = []
+    for wheels in np.unique(designs["wheels"]):
+        own = np.flatnonzero(designs["wheels"] == wheels)
+        values = {name: column[own] for name, column in designs.items()}
+        parts.append((own, _of_equal_wheels(study, int(wheels), values, worlds, shares, quick)))
+    joined = {}
+    for field in fields(Outcomes):
+        one = getattr(parts[0][1], field.name)
+        joined[field.name] = np.empty((count, worlds.count), one.dtype)
+        for own, part in parts:
+            joined[field.name][own] = getattr(part, field.name)
+    return Outcomes(**joined)
+
+
+def in_blocks(
+    study: DesignStudy,
+    designs: Mapping[str, Floats],
+    worlds: DrawnWorlds,
+    keep: Callable[[NDArray[np.int64], Outcomes], None],
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Evaluate designs quickly, on the slips of a sweep, in blocks and by several threads.
+
+    keep: Given the numbers of some designs (b,) and their outcomes, which are not held.
+    progress: Given the number of designs done.
+    """
+    count = len(designs["radius"])
+    axles = max(1, int(designs["wheels"].max()) // 2)
+    size = max(1, BLOCK_ROWS // (worlds.count * len(SWEPT) * axles))
+    blocks = [np.arange(i, min(i + size, count)) for i in range(0, count, size)]
+
+    def solve(block: NDArray[np.int64]) -> Outcomes:
+        own = {name: column[block] for name, column in designs.items()}
+        return evaluate(study, own, worlds, shares=SWEPT, quick=True)
+
+    done = 0
+    with ThreadPoolExecutor(min(MOST_THREADS, cpu_count() or 1)) as pool:
+        try:
+            for block, found in zip(blocks, pool.map(solve, blocks), strict=True):
+                keep(block, found)
+                done += len(block)
+                if progress is not None:
+                    progress(done)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def _of_equal_wheels(
+    study: DesignStudy,
+    wheels: int,
+    designs: Mapping[str, Floats],
+    worlds: DrawnWorlds,
+    shares: Floats,
+    quick: bool,
+) -> Outcomes:
+    """The outcomes of designs that have the same number of wheels."""
+    goal, count = study.goal, len(designs["radius"])
+    slip = goal.slip_limit * shares
+    load = designs["mass"][:, None] * study.axle_loads(wheels, goal.slope)  # (k, axles)
+    shape = (count, worlds.count, load.shape[1], len(slip))
+    pull, torque, sinkage = (np.empty(shape) for _ in range(3))
+    for name, draw in worlds.groups():
+        force = _forces(designs, load, worlds, name, draw, slip, quick)
+        pull[:, draw] = force.drawbar_pull
+        torque[:, draw] = force.torque
+        sinkage[:, draw] = force.sinkage
+    pull_error, torque = _with_errors(pull, torque, load, worlds, slip)
+    total = 2.0 * (pull + pull_error).sum(axis=2)  # (k, n, m)
+    needed = (designs["mass"] * study.gravity * np.sin(goal.slope))[:, None]
+    known = np.nan_to_num(total, nan=-np.inf)
+    best = np.argmax(known, axis=-1)[..., None]
+    margin = np.take_along_axis(known, best, axis=-1)[..., 0] - needed
+    error = 2.0 * np.take_along_axis(pull_error.sum(axis=2), best, axis=-1)[..., 0]
+    at = _Needed.of(total, needed)
+    radius = designs["radius"][:, None, None]
+    work = 2.0 * torque.sum(axis=2) / (radius * (1.0 - slip))
+    found_slip = at.of_curve(np.broadcast_to(slip, total.shape))
+    found_sinkage = at.of_curve(sinkage.max(axis=2))
+    lugs = lugs_needed(designs["radius"][:, None], designs["lug_height"][:, None],
+                       found_sinkage, found_slip)  # fmt: skip
+    energy, most_torque = at.of_curve(work), at.of_curve(torque.max(axis=2))
+    met = (margin >= goal.margin) & (most_torque <= goal.torque_limit)
+    met &= energy <= goal.energy_limit
+    return Outcomes(
+        margin, found_slip, energy, most_torque, found_sinkage, lugs, np.nan_to_num(error), met
+    )
+
+
+def _forces(
+    designs: Mapping[str, Floats],
+    load: Floats,
+    worlds: DrawnWorlds,
+    effect: str,
+    draw: NDArray[np.int64],
+    slip: Floats,
+    quick: bool,
+) -> Force:
+    """Forces (k, g, axles, m) of k designs in the g worlds of one group."""
+    shape = (len(load), len(draw), load.shape[1], len(slip))
+    design, world, axle, column = (grid.ravel() for grid in np.indices(shape))
+    world = draw[world]
+    effects = worlds.effects(effect, world, load.mean(axis=1)[design])
+    if np.any(designs["lug_height"] > 0.0):
+        lugs = Grousers(
+            height=designs["lug_height"][design],
+            shearing=worlds.lug_shearing[world],
+            rim_slip=RIM_SLIP,
+        )
+        effects.append(lugs)
+    gear = Wheel(radius=designs["radius"][design], width=designs["width"][design])
+    at = Operating(
+        slip=slip[column], load=load[design, axle], pass_number=axle + 1.0, slip_angle=0.0
+    )
+    model, soil = Model(gear, tuple(effects)), worlds.of_soil(world)
+    force = _nearest(model, soil, at) if quick else model(soil, at)
+    return Force(**{f.name: np.reshape(getattr(force, f.name), shape) for f in fields(Force)})
+
+
+def _nearest(model: Model, soil: Soil, at: Operating) -> Force:
+    """Forces at the equilibrium next to a coarse estimate; rows without it by the full search."""
+    load_case, _ = model.load_case(soil, at)
+
+    def solve(part: LoadCase) -> Force:
+        part = apply_input_effects(part)
+        found = equilibrium_near(part, replace(coarse_estimate(part), nearest=True))
+        return without_unsolved(found)
+
+    with np.errstate(all="ignore"):
+        force = in_chunks(load_case, solve)
+        failed = np.flatnonzero(force.status != 0)
+        if failed.size:
+            again = _rows(model, soil, at, failed)
+            for field in fields(Force):
+                getattr(force, field.name)[failed] = getattr(again, field.name)
+    return force
+
+
+def _rows(model: Model, soil: Soil, at: Operating, index: NDArray[np.int64]) -> Force:
+    """Forces of some rows by the full search."""
+
+    def some(value: Any) -> Real:
+        return np.asarray(value)[index] if np.ndim(value) else value
+
+    return mapped(model, some)(mapped(soil, some), mapped(at, some))
+
+
+def _with_errors(
+    pull: Floats, torque: Floats, load: Floats, worlds: DrawnWorlds, slip: Floats
+) -> tuple[Floats, Floats]:
+    """Errors of the pull (k, n, axles, m), N, and the torque with its own."""
+    errors, none = worlds.errors, np.zeros(worlds.count)
+    offset, growth, gain = (
+        errors.get(name, none)
+        for name in ("drawbar_pull", "drawbar_pull_by_slip", "torque_by_slip")
+    )
+    share = offset[:, None] + growth[:, None] * slip  # (n, m)
+    pull_error = load[:, None, :, None] * share[None, :, None, :]
+    relative = load / load.mean(axis=1, keepdims=True)
+    at_slip, at_load = np.broadcast_arrays(slip, relative[..., None])
+    basis = worlds.smooth.at(at_slip.ravel(), at_load.ravel())
+    basis = basis.reshape(*relative.shape, len(slip), -1)
+    smooth = np.einsum("kamq,ncq->cknam", basis, worlds.weights)
+    pull_error += _range_with_zero(pull) * smooth[0]
+    torque = torque * (1.0 + (gain[:, None] * slip)[None, :, None, :])
+    return pull_error, torque + _range_with_zero(torque) * smooth[1]
+
+
+def _range_with_zero(values: Floats) -> Floats:
+    """max(y, 0) - min(y, 0) along the slips, kept as an axis of length 1."""
+    known = np.nan_to_num(values)
+    high, low = known.max(axis=-1, keepdims=True), known.min(axis=-1, keepdims=True)
+    return np.asarray(np.maximum(high, 0.0) - np.minimum(low, 0.0))
+
+
+@dataclass(frozen=True)
+class _Needed:
+    """Where curves over the slips reach what is needed: index before, share of the way, whether."""
+
+    before: NDArray[np.int64]
+    index: NDArray[np.int64]
+    share: Floats
+    reached: NDArray[np.bool_]
+
+    @staticmethod
+    def of(total: Floats, needed: Floats) -> _Needed:
+        """For totals (k, n, m) and what is needed (k, 1)."""
+        enough = np.nan_to_num(total, nan=-np.inf) >= needed[..., None]
+        index = np.argmax(enough, axis=-1)[..., None]
+        before = np.maximum(index - 1, 0)
+        low, high = (np.take_along_axis(total, i, axis=-1) for i in (before, index))
+        rise = np.where(high > low, high - low, 1.0)
+        share = np.where(index > 0, (needed[..., None] - low) / rise, 1.0)
+        return _Needed(before, index, share, np.asarray(enough.any(axis=-1)))
+
+    def of_curve(self, values: Floats) -> Floats:
+        """Values (k, n, m) interpolated there, (k, n); NaN where it is not reached."""
+        low, high = (np.take_along_axis(values, i, axis=-1) for i in (self.before, self.index))
+        return np.where(self.reached, (low + self.share * (high - low))[..., 0], np.nan)
+
+
+def lugs_needed(radius: Floats, height: Floats, sinkage: Floats, slip: Floats) -> Floats:
+    r"""Least number of lugs on a wheel between which the soil moves with it.
+
+    .. math:: \frac{2\pi}{N} < \frac{1}{1 - s} \left(\sqrt{(1 + h / r)^2 - (1 - z / r)^2} -
+        \sqrt{1 - (1 - z / r)^2}\right)
+
+    With fewer, soil flows forward ahead of the rim, and the effect `grousers` overstates the pull.
+
+    References: Skonieczny, Moreland and Wettergreen, A grouser spacing equation for determining
+    appropriate geometry of planetary rover wheels, IROS 2012.
+
+    >>> float(lugs_needed(*map(np.asarray, (0.1, 0.01, 0.01, 0.2))))
+    26.0
+    """
+    above = 1.0 - sinkage / radius
+    with np.errstate(invalid="ignore", divide="ignore"):
+        tip = np.sqrt((1.0 + height / radius) ** 2 - above**2)
+        spacing = (tip - np.sqrt(1.0 - above**2)) / (1.0 - slip)
+        return np.asarray(np.where(height > 0.0, np.ceil(2.0 * np.pi / spacing), np.nan))

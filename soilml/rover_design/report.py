@@ -1,0 +1,267 @@
+"""The answer to a question of a design, and how it is found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.config.wheeled_rover import GRAVITY
+from soilml.remarks import Remark
+from soilml.rover_design.figures import plot_designs
+from soilml.rover_design.performance import Outcomes, evaluate
+from soilml.rover_design.search import (
+    DESIGNS,
+    Designs,
+    best_design,
+    grid_fractions,
+    meets,
+    optimised,
+    optimised_count,
+    pareto_front,
+    quantile_of_worlds,
+    summary,
+    swept,
+    tried,
+)
+from soilml.rover_design.search import at_fractions as dimensions_at
+from soilml.rover_design.study import DesignStudy
+from soilml.rover_design.uncertainty import (
+    DRAWS,
+    PossibleTest,
+    VarianceShare,
+    possible_tests,
+    variance_shares,
+)
+from soilml.rover_design.worlds import DrawnWorlds, draw_worlds
+
+WORLDS = 1000  # Draws of soil and model error under which designs are compared
+SLICE = 144  # Designs of the contours through the best one
+#: Function of a stage, of the designs done and of those in all.
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class SoilOutcome:
+    """What the best design does on one of several soils.
+
+    probability: Of meeting the goal.
+    margin: Ends of the 90 % band and median, N.
+    """
+
+    name: str
+    probability: float
+    margin: tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class DesignReport:
+    """Designs that were tried, the best of them, and what its margin depends on.
+
+    Attributes
+    ----------
+    study
+        The question.
+    designs
+        All designs that were tried, under the same draws.
+    best
+        Results of the best design by column name, under `DRAWS` draws of its own.
+    best_dimensions
+        Its dimensions.
+    met
+        Whether it meets the goal with the probability that the risk leaves.
+    front
+        Numbers of the designs that no other one beats in margin and in what is to be least.
+    contours
+        Designs about the best one over the first two dimensions that vary; None where fewer do.
+    by_soil
+        What the best design does on each of several soils; empty for one.
+    shares
+        First-order shares of the variance of the best design's margin.
+    tests
+        Tests that would reduce it.
+    remarks
+        What limits the answer.
+    """
+
+    study: DesignStudy
+    designs: Designs
+    best: dict[str, float]
+    best_dimensions: dict[str, float]
+    met: bool
+    front: NDArray[np.int64]
+    contours: Designs | None
+    by_soil: tuple[SoilOutcome, ...]
+    shares: tuple[VarianceShare, ...]
+    tests: tuple[PossibleTest, ...]
+    remarks: tuple[Remark, ...]
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw probability, margin at risk, front and shares; see `plot_designs`."""
+        return plot_designs(self, ax)
+
+    def as_json(self) -> dict[str, Any]:
+        """The content of the JSON file, in SI units."""
+        goal, designs = self.study.goal, self.designs
+        columns = {**designs.dimensions, **designs.results}
+        return {
+            "goal": {
+                "slope_rad": goal.slope,
+                "margin_N": goal.margin,
+                "risk": goal.risk,
+                "slip_limit": goal.slip_limit,
+                "torque_limit_Nm": goal.torque_limit,
+                "energy_limit_J_per_m": goal.energy_limit,
+                "least": goal.least,
+            },
+            "gravity_m_s2": self.study.gravity,
+            "soils": list(self.study.soil.entries) or self.study.soil.files,
+            "met": self.met,
+            "best": {**self.best_dimensions, **self.best},
+            "front": self.front.tolist(),
+            "designs": {name: values.tolist() for name, values in columns.items()},
+            "by_soil": {
+                one.name: {"probability": one.probability, "margin_N": one.margin[1],
+                           "margin_N_p05": one.margin[0], "margin_N_p95": one.margin[2]}
+                for one in self.by_soil
+            },
+            "variance_shares": {one.name: one.share for one in self.shares},
+            "tests": [
+                {"test": one.text, "inputs": list(one.inputs), "share": one.share,
+                 "command": one.command}
+                for one in self.tests
+            ],
+            "warnings": [remark.as_json() for remark in self.remarks],
+        }  # fmt: skip
+
+
+def design_report(
+    study: DesignStudy,
+    *,
+    designs: int = DESIGNS,
+    draws: int = WORLDS,
+    optimise: bool = True,
+    progress: Progress | None = None,
+) -> DesignReport:
+    """The designs of a study that climb its slope, with what probability, margin and work.
+
+    All designs are compared under the same draws of the soil and of the model's error; the best one
+    is evaluated again under others, so that its figures are not those of a lucky draw.
+
+    designs: Designs of the sweep.
+    draws: Draws of soil and model error, `WORLDS` by default.
+    optimise: Whether to search between the designs of the sweep.
+    progress: Given a stage, the number of designs done and that of all.
+
+    Raises `InputError` where a wheel leaves the ground on the slope, and as `draw_worlds`.
+    """
+    stage = _stages(progress)
+    worlds = draw_worlds(study.soil, draws, study.goal.slip_limit)
+    found = swept(study, worlds, designs, stage("designs", designs))
+    searched = any(study.dimensions[name].searched for name in study.varied)
+    if optimise and searched and found.count > 1:
+        more = stage("optimisation", optimised_count(study))
+        found = optimised(study, worlds, found, more)
+    best = best_design(study, found)
+    dimensions = {name: float(values[best]) for name, values in found.dimensions.items()}
+    own = draw_worlds(study.soil, DRAWS, study.goal.slip_limit, seed=1)
+    outcome = evaluate(study, {k: np.asarray([v]) for k, v in dimensions.items()}, own)
+    results = {name: float(values[0]) for name, values in summary(study, outcome).items()}
+    enough = results["probability"] >= 1.0 - study.goal.risk
+    contours = None
+    if len(study.varied) > 1:
+        fractions = grid_fractions(study, study.varied[:2], SLICE)
+        grid = dimensions_at(study, fractions, dimensions)
+        contours = tried(study, grid, worlds, stage("contours", SLICE))
+    remarks = (*worlds.remarks, *_remarks(study, found, dimensions, results, outcome, draws))
+    return DesignReport(
+        study=study,
+        designs=found,
+        best=results,
+        best_dimensions=dimensions,
+        met=bool(enough and meets(study, found)[best]),
+        front=pareto_front(study, found),
+        contours=contours,
+        by_soil=tuple(_by_soil(own, outcome)),
+        shares=tuple(variance_shares(own, outcome)),
+        tests=tuple(possible_tests(own, outcome)),
+        remarks=remarks,
+    )
+
+
+def _by_soil(worlds: DrawnWorlds, outcome: Outcomes) -> Iterator[SoilOutcome]:
+    if len(worlds.kinds) < 2:
+        return
+    for number, name in enumerate(worlds.kinds):
+        own = worlds.kind == number
+        low, middle, high = (
+            float(quantile_of_worlds(outcome.margin[:, own], q)[0]) for q in (0.05, 0.5, 0.95)
+        )
+        yield SoilOutcome(name, float(outcome.met[0, own].mean()), (low, middle, high))
+
+
+def _stages(progress: Progress | None) -> Callable[[str, int], Callable[[int], None] | None]:
+    def stage(name: str, total: int) -> Callable[[int], None] | None:
+        if progress is None:
+            return None
+        return lambda done: progress(name, min(done, total), total)
+
+    return stage
+
+
+def _remarks(
+    study: DesignStudy,
+    found: Designs,
+    best: dict[str, float],
+    results: dict[str, float],
+    outcome: Outcomes,
+    draws: int,
+) -> Iterator[Remark]:
+    """What limits the answer for the best design."""
+    if not meets(study, found).any():
+        text = "no design within the limits meets the goal at this risk; shown is the likeliest"
+        yield Remark("goal-not-met", text)
+    elif results["probability"] < 1.0 - study.goal.risk:
+        text = (
+            f"under other draws the best design meets the goal with "
+            f"{results['probability']:.1%}, not with {1.0 - study.goal.risk:.0%}: it stands on the "
+            "limit; take one of the front beyond it"
+        )
+        yield Remark("on-the-limit", text)
+    for name in study.varied:
+        ends = study.dimensions[name].values[0], study.dimensions[name].values[-1]
+        if study.dimensions[name].searched and best[name] in ends and name != study.goal.least:
+            text = f"{name} is at the end of its limits: {best[name]:g}"
+            yield Remark("at-limit", text, (name,), "note")
+    sunk = float(np.mean(~np.isfinite(outcome.margin)))
+    if sunk >= 0.0005:
+        yield Remark("not-carried", f"{sunk:.1%} of the soils do not carry a wheel at any slip")
+    if best["lug_height"] > 0.0:
+        needed = results["lugs_needed"]
+        if "lug_count" in best and best["lug_count"] < needed:
+            text = f"{best['lug_count']:g} lugs are too few: {needed:.0f} are needed between which "
+            yield Remark("few-lugs", f"{text}the soil moves with the wheel", ("lug_count",))
+        elif "lug_count" not in best and math.isfinite(needed):
+            text = f"lugs are taken to be close enough: {needed:.0f} or more on a wheel"
+            yield Remark("lugs-needed", text, ("lug_count",), "note")
+    if abs(study.gravity / GRAVITY["earth"] - 1.0) > 0.02:
+        text = (
+            f"gravity is {study.gravity:.3g} m/s^2: the soil is taken to have the parameters that "
+            "it has on Earth, which tests under low gravity do not confirm"
+        )
+        yield Remark("other-gravity", text)
+    if study.soil.rows is not None:
+        text = "errors of the model are as before the rows, which may know them better"
+        yield Remark("errors-before-rows", text, severity="note")
+    error = 100.0 * math.sqrt(max(results["probability"] * (1.0 - results["probability"]), 1e-4))
+    text = (
+        "probabilities and bands are over the soils and typical errors of the model, with a "
+        f"standard error of {error / math.sqrt(draws):.1f} % in the comparison and of "
+        f"{error / math.sqrt(DRAWS):.1f} % for the best design; straight up the slope, all wheels "
+        "driven at one slip, loads of equally stiff wheels"
+    )
+    yield Remark("band-content", text, severity="note")

@@ -1,0 +1,319 @@
+"""A question about a rover's design, as a file asks it: rover, wheel, soil, goal."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.config.model_settings import in_si, take_quantity, take_soil
+from soilml.config.wheeled_rover import RoverWheel, WheeledRover, read_gravity
+from soilml.errors import InputError
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.numerics.prior import Prior
+from soilml.parameters import Parameter
+from soilml.physics.soils import SoilEntry, soil_catalogue
+from soilml.physics.soils.catalogue import Soil, soil
+from soilml.physics.soils.soil_tests import SoilTest
+
+#: What a design consists of, in the order of all tables, and the bounds of each.
+DIMENSIONS = {
+    "radius": Parameter("m", 0.005, 2.0, "radius of the rim"),
+    "width": Parameter("m", 0.005, 2.0, "width of a wheel"),
+    "lug_height": Parameter("m", 0.0, 0.2, "height of a lug above the rim"),
+    "lug_count": Parameter("1", 1, 500, "lugs on a wheel"),
+    "wheels": Parameter("1", 4, 40, "wheels, all driven, in pairs"),
+    "mass": Parameter("kg", 0.01, 1e5, "mass of the whole rover"),
+}
+WHOLE = ("lug_count", "wheels")  # Dimensions that are counted
+STEP = {"lug_count": 1, "wheels": 2}  # Steps of their ranges
+#: What a goal may ask to be least among the designs that meet it.
+LEAST = ("energy", "torque", *DIMENSIONS)
+SLIP_LIMIT, RISK = 0.6, 0.05  # Defaults: those of `pull` and of its 90 % bands
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension of a design: some values (m,), or all between two of them (`searched`)."""
+
+    values: tuple[float, ...]
+    searched: bool = False
+
+    @property
+    def varied(self) -> bool:
+        """Whether there is more than one design by it."""
+        return len(self.values) > 1
+
+    def at(self, fraction: Floats, step: int = 0) -> Floats:
+        """Values at fractions (k,) from 0 to 1 of the range, or of the list; whole by `step`."""
+        low, high = self.values[0], self.values[-1]
+        if not self.searched:
+            index = np.minimum((fraction * len(self.values)).astype(int), len(self.values) - 1)
+            return np.asarray(np.asarray(self.values, dtype=np.float64)[index])
+        if step:
+            count = round((high - low) / step)
+            return np.asarray(low + step * np.minimum(np.floor(fraction * (count + 1)), count))
+        return np.asarray(low + (high - low) * fraction)
+
+
+@dataclass(frozen=True)
+class ClimbingGoal:
+    """What a design must do.
+
+    slope: Slope that is climbed straight up, rad.
+    margin: Pull that must be left on it, N.
+    risk: Probability of failing that is accepted.
+    slip_limit: Highest slip considered.
+    torque_limit, energy_limit: Most torque of a wheel (N m) and work for each metre (J/m) on it.
+    least: What is least among the designs that meet the goal, one of `LEAST`.
+    """
+
+    slope: float
+    margin: float = 0.0
+    risk: float = RISK
+    slip_limit: float = SLIP_LIMIT
+    torque_limit: float = math.inf
+    energy_limit: float = math.inf
+    least: str = "energy"
+
+
+@dataclass(frozen=True)
+class SoilQuestion:
+    """The soils that a design may meet.
+
+    entries: Published soils by name, as likely as each other; empty where the file states one soil.
+    soil, prior, tests: The soil of the file, priors of its parameters, tests of it.
+    rows: Model file and table of runs whose posterior is the soil; None without.
+    """
+
+    entries: Mapping[str, SoilEntry] = field(default_factory=dict)
+    soil: Soil | None = None
+    prior: Mapping[str, Prior] = field(default_factory=dict)
+    tests: tuple[SoilTest, ...] = ()
+    rows: tuple[Path, Path] | None = None
+
+    @property
+    def files(self) -> list[str]:
+        """Files that it is read from beside the question's own."""
+        return [] if self.rows is None else [str(path) for path in self.rows]
+
+
+@dataclass(frozen=True)
+class DesignStudy:
+    """A rover whose dimensions are open within limits, the soils that it may meet, and its goal.
+
+    dimensions: By name, as in `DIMENSIONS`; `lug_count` is absent where it is not judged.
+    wheelbase: Distance of the first axle from the last, m; axles between are evenly spaced.
+    centre_of_mass: How far it is ahead of the middle of the wheelbase, and above the ground, m.
+    gravity: In m/s^2.
+    """
+
+    dimensions: Mapping[str, Dimension]
+    wheelbase: float
+    centre_of_mass: tuple[float, float]
+    gravity: float
+    soil: SoilQuestion
+    goal: ClimbingGoal
+
+    @property
+    def varied(self) -> list[str]:
+        """Names of the dimensions with more than one value."""
+        return [name for name, own in self.dimensions.items() if own.varied]
+
+    def axle_loads(self, wheels: int, slope: float) -> Floats:
+        """Load on a wheel of each axle, front first, N for each kg of the rover's mass (axles,).
+
+        Those of equally stiff wheels under a rigid body, see `WheeledRover.loads`; raises
+        `InputError` where a wheel leaves the ground.
+        """
+        axles = wheels // 2
+        places = self.wheelbase * (0.5 - np.arange(axles) / (axles - 1))
+        forward, height = self.centre_of_mass
+        one = {f"of axle {i + 1}": RoverWheel(float(x), 0.0) for i, x in enumerate(places)}
+        rover = WheeledRover(1.0, (forward, 0.0, height), one, self.gravity)
+        return np.asarray(0.5 * rover.loads(slope))
+
+
+def read_study(path: str | os.PathLike[str]) -> DesignStudy:
+    """Read a question of a design from a TOML file with [rover], [wheel], [soil] and [goal].
+
+    Raises `InputError`, which names file, table and key, for a figure that is missing, misspelt or
+    out of bounds: nothing of a rover is assumed.
+    """
+    settings = read_settings(path)
+    rover, wheel = settings.table("rover"), settings.table("wheel")
+    dimensions = {
+        "mass": _take_dimension(rover, "mass"),
+        "wheels": _take_dimension(rover, "wheels"),
+    }
+    wheelbase = take_quantity(rover, "wheelbase", "m")
+    centre = _take_pair(rover, "centre_of_mass", "[ahead of the middle, above the ground] in m")
+    needed = "earth, moon, mars, or a number in m/s^2"
+    gravity = read_gravity(rover.take("gravity", (int, float, str), needed), rover)
+    rover.finish()
+    for name in ("radius", "width", "lug_height"):
+        dimensions[name] = _take_dimension(wheel, name)
+    if "lug_count" in wheel:
+        dimensions["lug_count"] = _take_dimension(wheel, "lug_count")
+    wheel.permit(DIMENSIONS)
+    wheel.finish()
+    if not 0.0 < wheelbase <= 100.0:
+        rover.fail(f"wheelbase is {wheelbase:g} m; needed is a length above zero, up to 100")
+    if centre[1] < 0.0:
+        rover.fail(f"centre_of_mass is {list(centre)}; its height cannot be negative")
+    study = DesignStudy(
+        {name: dimensions[name] for name in DIMENSIONS if name in dimensions},
+        wheelbase,
+        centre,
+        gravity,
+        _take_soil(settings.table("soil")),
+        _take_goal(settings.table("goal")),
+    )
+    settings.finish()
+    return study
+
+
+def with_changes(
+    study: DesignStudy,
+    *,
+    slope: float | None = None,
+    gravity: str | float | None = None,
+    soils: list[str] | None = None,
+    risk: float | None = None,
+) -> DesignStudy:
+    """The study for another slope (rad), gravity, published soils, or risk; None keeps each."""
+    goal = study.goal
+    if slope is not None:
+        goal = replace(goal, slope=_bounded("--slope", slope, 0.0, math.radians(60.0), "rad"))
+    if risk is not None:
+        goal = replace(goal, risk=_bounded("--risk", risk, 0.001, 0.5, ""))
+    study = replace(study, goal=goal)
+    if gravity is not None:
+        study = replace(study, gravity=read_gravity(gravity))
+    if soils is not None:
+        study = replace(study, soil=replace(_published(soils), prior=study.soil.prior))
+    return study
+
+
+def _take_dimension(settings: Settings, name: str) -> Dimension:
+    """A number, a range [lower, upper], or { values = [...] }; texts may have a unit."""
+    bounds = DIMENSIONS[name]
+    unit = f" in {bounds.unit}" if bounds.unit != "1" else ""
+    needed = f"a number{unit}, a range [lower, upper], or {{ values = [...] }} ({bounds.text})"
+    given = settings.take(name, (int, float, str, list, dict), needed)
+    searched = isinstance(given, list)
+    if isinstance(given, dict):
+        values = given.get("values")
+        if given.keys() != {"values"} or not isinstance(values, list) or not values:
+            settings.fail(f"{name} is {given!r}; needed is {needed}")
+        given = values
+    listed = given if isinstance(given, list) else [given]
+    if not all(isinstance(v, int | float | str) and not isinstance(v, bool) for v in listed):
+        settings.fail(f"{name} is {listed!r}; needed is {needed}")
+    numbers = [in_si(settings, name, v, bounds.unit) for v in listed]
+    if searched and not (len(numbers) == 2 and numbers[0] < numbers[1]):
+        settings.fail(f"{name} is {listed!r}; needed is {needed}, with lower below upper")
+    for value in numbers:
+        if not bounds.lower <= value <= bounds.upper:
+            settings.fail(
+                f"{name} is {value:g}{unit.removeprefix(' in')}; needed is {bounds.lower:g} to "
+                f"{bounds.upper:g}"
+            )
+        if name in WHOLE and (value % STEP[name] != 0.0):
+            even = "an even number, since wheels stand in pairs" if name == "wheels" else "whole"
+            settings.fail(f"{name} is {value:g}; needed is {even}")
+    return Dimension(tuple(numbers if searched else sorted(set(numbers))), searched)
+
+
+def _take_pair(settings: Settings, key: str, needed: str) -> tuple[float, float]:
+    values = settings.take(key, list, needed)
+    if len(values) != 2:
+        settings.fail(f"{key} is {values!r}; needed is {needed}")
+    first, second = (in_si(settings, key, v, "m") if _is_size(v) else math.nan for v in values)
+    if not (abs(first) <= 100.0 and abs(second) <= 100.0):
+        settings.fail(f"{key} is {values!r}; needed is {needed}")
+    return first, second
+
+
+def _is_size(value: Any) -> bool:
+    return isinstance(value, int | float | str) and not isinstance(value, bool)
+
+
+def _take_soil(settings: Settings) -> SoilQuestion:
+    """One soil as in a model file, `names` of published ones, or `model` with `runs`."""
+    if "model" in settings or "runs" in settings:
+        model, runs = settings.text("model"), settings.text("runs")
+        settings.finish()
+        return SoilQuestion(rows=(settings.folder / model, settings.folder / runs))
+    if "names" not in settings:
+        name = settings.content.get("name")
+        own, prior, tests = take_soil(settings)
+        if not isinstance(name, str):
+            return SoilQuestion({}, own, prior, tests)
+        entry = replace(soil_catalogue()[name], soil=own)
+        stated = settings.content.keys()
+        spread = {k: v for k, v in entry.spread.items() if k not in stated}
+        assumed = tuple(k for k in entry.assumed if k not in stated and k not in prior)
+        return SoilQuestion(
+            {name: replace(entry, spread=spread, assumed=assumed)}, None, prior, tests
+        )
+    names = settings.take("names", list, "a list of published soils, see `soilml soils`")
+    base = Settings({k: v for k, v in settings.content.items() if k != "names"}, settings.where,
+                    settings.folder)  # fmt: skip
+    if not names or not all(isinstance(name, str) for name in names):
+        settings.fail(f"names is {names!r}; needed is a list of published soils")
+    try:
+        found = _published(names)
+    except InputError as error:
+        settings.fail(str(error))
+    base.content["name"] = names[0]
+    _, prior, tests = take_soil(Settings(base.content, settings.where, settings.folder))
+    others = base.content.keys() - {"name", "prior", "test"}
+    if others:
+        settings.fail(f"{sorted(others)[0]} is of one soil; for all of names write [soil.prior]")
+    return replace(found, prior=prior, tests=tests)
+
+
+def _published(names: list[str]) -> SoilQuestion:
+    for name in names:
+        soil(name)  # raises for one that there is not
+    return SoilQuestion({name: soil_catalogue()[name] for name in names})
+
+
+def _take_goal(settings: Settings) -> ClimbingGoal:
+    slope = take_quantity(settings, "slope", "rad")
+    if not 0.0 <= slope <= math.radians(60.0):
+        hint = f" (if {slope:g} are degrees, write '{slope:g} deg')" if slope > 1.0 else ""
+        settings.fail(f"slope is {slope:g} rad; needed is 0 to 1.047 rad{hint}")
+    limits = {}
+    for key, unit in (("margin", "N"), ("torque_limit", "N m"), ("energy_limit", "N")):
+        if key in settings:
+            limits[key] = take_quantity(settings, key, unit)
+            if not 0.0 <= limits[key] < 1e9:
+                settings.fail(f"{key} is {limits[key]:g}; needed is a number above zero")
+    for key, default, low, high in (
+        ("risk", RISK, 0.001, 0.5),
+        ("slip_limit", SLIP_LIMIT, 0.01, 0.99),
+    ):
+        limits[key] = take_quantity(settings, key, "1") if key in settings else default
+        if not low <= limits[key] <= high:
+            settings.fail(f"{key} is {limits[key]:g}; needed is {low:g} to {high:g}")
+    least = settings.text("least", "energy")
+    if least not in LEAST:
+        settings.fail(f"least is {least!r}; needed is one of {', '.join(LEAST)}")
+    settings.finish()
+    return ClimbingGoal(slope=slope, least=least, **limits)
+
+
+def _bounded(what: str, value: float, low: float, high: float, unit: str) -> float:
+    if not low <= value <= high:
+        raise InputError(
+            f"{what} is {value:.4g} {unit}".rstrip() + f"; needed is {low:g} to {high:.4g}"
+        )
+    return value

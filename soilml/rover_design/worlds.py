@@ -1,0 +1,243 @@
+"""Draws of what a design may meet: a soil, and an error of the model as large as is typical."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.config.case import Case, read_case
+from soilml.config.measurement_noise import Discrepancy
+from soilml.errors import InputError
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, ModelledErrors, without_errors
+from soilml.identification.averaged import EFFECT, ERRORS, EXACT, LAW, LAW_SIZE, LAWS, SIZES
+from soilml.identification.hypotheses import REACH, SMOOTH
+from soilml.io.read_table import RUNS, read_table
+from soilml.numerics.prior import Prior
+from soilml.numerics.smooth_functions import SmoothFunctions
+from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.parameters import declared
+from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.effects.grousers import Grousers
+from soilml.physics.gears import Wheel
+from soilml.physics.model import Model
+from soilml.physics.soils import Soil
+from soilml.remarks import Remark
+from soilml.rover_design.study import SoilQuestion
+from soilml.traction.soil_draws import measured_soil, prior_draws
+
+#: Range of lambda, the share of a lug's height by which the soil shears further out (Ding et al.
+#: 2011).
+LUG_SHEARING = (0.5, 1.0)
+#: Loads over the mean load of the wheels between which the smooth error is defined.
+LOADS = (0.2, 5.0)
+#: What a rover tells of a drive; effects that need anything else are left out.
+TOLD = {"pass_number", "slip_angle"}
+
+
+@dataclass(frozen=True)
+class DrawnWorlds:
+    """n draws of a soil, and of the error of the model beside each.
+
+    Attributes
+    ----------
+    soil
+        Parameters (n,) in SI units by name.
+    kind
+        Number (n,) of the published soil that each is, in `kinds`.
+    errors
+        Errors (n,) by the names of `USUAL_MODEL_ERRORS`.
+    scale
+        Size (n,) of all errors over the typical ones.
+    effect
+        Name (n,) of the effect that the model lacks; "" for none.
+    size
+        Its size (n,), in its unit.
+    lug_shearing
+        Lambda of `grousers`, (n,).
+    smooth
+        Functions of slip and of load over the mean load of the wheels, for a smooth error.
+    weights
+        Weights (n, 2, q) of these functions, of drawbar pull and of torque.
+    remarks
+        What limits the draws.
+    """
+
+    soil: Mapping[str, Floats]
+    kind: NDArray[np.int64]
+    kinds: tuple[str, ...]
+    errors: Mapping[str, Floats]
+    scale: Floats
+    effect: NDArray[np.str_]
+    size: Floats
+    lug_shearing: Floats
+    smooth: SmoothFunctions
+    weights: Floats
+    remarks: tuple[Remark, ...]
+
+    @property
+    def count(self) -> int:
+        """Number of draws, n."""
+        return len(self.scale)
+
+    def groups(self) -> list[tuple[str, NDArray[np.int64]]]:
+        """Draws (g,) that share one form of the model, by the name of its effect."""
+        return [(str(e), np.flatnonzero(self.effect == e)) for e in np.unique(self.effect)]
+
+    def effects(self, name: str, draw: NDArray[np.int64], mean_load: Floats) -> list[Effect]:
+        """The effects (k,) by which these draws (k,), of one group, differ from the plain model.
+
+        mean_load: Mean load of the wheels of each, N (k,).
+        """
+        solved = [n for n in declared(ModelledErrors) if n in self.errors]
+        values = {n: self.errors[n][draw] for n in solved}
+        found: list[Effect] = [ModelledErrors(**values, typical_load=mean_load)]
+        if name:
+            own = EFFECTS[name]
+            found.append(own(**{own.about.size: self.size[draw]}))
+        return found
+
+    def of_soil(self, draw: NDArray[np.int64]) -> Soil:
+        """The soils (k,) of these draws (k,)."""
+        return Soil(**{name: values[draw] for name, values in self.soil.items()})
+
+
+def draw_worlds(
+    question: SoilQuestion, count: int, slip_limit: float, seed: int = 0
+) -> DrawnWorlds:
+    r"""Draws of the soil and of the model's errors, before any test of the design.
+
+    The errors are those over which `identify` averages, with its probabilities before the rows: the
+    model exactly as it is, typical errors of several scales with a smooth error of slip and load,
+    another law of the soil, an effect of the catalogue. Errors of sensors are none of a rover's. A
+    published soil keeps to the ranges that its paper prints, and each of several is as likely.
+
+    question: The soils.
+    count: Number of draws, n.
+    slip_limit: Highest slip at which errors are asked for.
+
+    Raises `InputError` and `FitError` as the posterior of the rows does.
+    """
+    rng = np.random.default_rng(seed)
+    soil, kind, kinds, free, remarks = _soils(question, count, rng)
+    names = [n for n in USUAL_MODEL_ERRORS if n not in without_errors(free, (), [_WHEEL])]
+    scale, effect, size = _hypotheses(count, rng)
+    normal = _stratified_normal(count, len(names), rng)
+    errors = {n: USUAL_MODEL_ERRORS[n] * scale * normal[:, i] for i, n in enumerate(names)}
+    lengths = Discrepancy().slip_length, Discrepancy().log_load_length
+    smooth = SmoothFunctions.of(partial(_unit_columns, lengths), lengths, (0.0, slip_limit), LOADS)
+    weights = SMOOTH * scale[:, None, None] * rng.standard_normal((count, 2, smooth.count))
+    lug = LUG_SHEARING[0] + (LUG_SHEARING[1] - LUG_SHEARING[0]) * _stratified(count, rng)
+    return DrawnWorlds(
+        soil, kind, kinds, errors, scale, effect, size, lug, smooth, weights, tuple(remarks)
+    )
+
+
+_WHEEL = Wheel(radius=0.1, width=0.1)
+
+
+def _unit_columns(lengths: tuple[float, float], slip: Floats, load: Floats) -> Floats:
+    return process_columns(slip_load_points(slip, load, *lengths))
+
+
+def _soils(
+    question: SoilQuestion, count: int, rng: np.random.Generator
+) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
+    """Parameters (n,), kinds (n,) and their names, parameters that vary, remarks."""
+    if question.rows is not None:
+        return _posterior(question, count, rng)
+    own = {name: entry.soil for name, entry in question.entries.items()}
+    if question.soil is not None:
+        own = {"the soil of the file": question.soil}
+    kind = rng.permutation(np.arange(count) % len(own)).astype(np.int64)
+    values = {name: np.empty(count) for name in declared(Soil)}
+    varied: list[str] = []
+    remarks = []
+    for number, (name, base) in enumerate(own.items()):
+        entry = question.entries.get(name)
+        spread = {} if entry is None else {k: Prior(*ends) for k, ends in entry.spread.items()}
+        prior = {**spread, **question.prior}
+        rows = np.flatnonzero(kind == number)
+        for key in values:
+            values[key][rows] = getattr(base, key)
+        if prior:
+            case = Case(Model(_WHEEL), base, prior=dict(prior), soil_tests=question.tests)
+            draws = prior_draws(select_free(case, None), rows.size, case)
+            for i, path in enumerate(draws.names):
+                values[path][rows] = draws.values[:, i]
+        varied += prior.keys()
+        missing = [] if entry is None else [k for k in entry.assumed if k not in prior]
+        if missing:
+            text = f"{name} prints no {', '.join(missing)}: assumed; give ranges in [soil.prior]"
+            remarks.append(Remark("assumed-soil", text, (name, *missing)))
+    if len(own) == 1 and not varied:
+        text = "the soil is taken at its stated values, without a spread: give [soil.prior]"
+        remarks.append(Remark("no-spread", text, tuple(own)))
+    common = [name for name in dict.fromkeys(varied) if varied.count(name) == len(own)]
+    return values, kind, tuple(own), common, remarks
+
+
+def _posterior(
+    question: SoilQuestion, count: int, rng: np.random.Generator
+) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
+    """The same of the posterior of measured rows, averaged over explanations of them."""
+    assert question.rows is not None
+    model, runs = question.rows
+    case = read_case(model, with_bias=True)
+    if case.gears:
+        raise InputError(f"{model} has several gears; needed is one with [gear]")
+    found = measured_soil(replace(case, rover=None), read_table(runs, RUNS))
+    index = rng.permutation(np.arange(count) % len(found.draws.values))
+    values = {name: np.full(count, float(getattr(case.soil, name))) for name in declared(Soil)}
+    varied = [name for name in found.draws.names if name in values]
+    for name in varied:
+        values[name] = found.draws.values[index, found.draws.names.index(name)]
+    return values, np.zeros(count, np.int64), (str(runs),), varied, list(found.warnings)
+
+
+def _hypotheses(count: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.str_], Floats]:
+    """Scale of the errors, name of the missing effect and its size, each (n,)."""
+    candidates = [n for n, e in EFFECTS.items() if e.applies_to(_WHEEL) and e is not Grousers]
+    options = [(EXACT, 0.0, "", 0.0), *((p, s, "", 0.0) for s, p in ERRORS.items())]
+    options += [(LAW / len(LAWS), 0.0, name, LAW_SIZE) for name in LAWS]
+    for scale, prior in EFFECT.items():
+        share = prior / (len(candidates) * len(SIZES))
+        options += [(share, scale, name, std) for name in candidates for std in SIZES]
+    ends = np.cumsum([o[0] for o in options])
+    chosen = np.searchsorted(ends / ends[-1], _stratified(count, rng), side="right")
+    fraction = rng.random(count)
+    size = np.zeros(count)
+    effect = np.full(count, "", dtype=f"<U{max(map(len, EFFECTS))}")
+    for number in np.unique(chosen):
+        _, _, name, std = options[number]
+        if not name or not _acts_on_a_rover(EFFECTS[name]):
+            continue
+        about = EFFECTS[name].about
+        bounds, std = declared(EFFECTS[name])[about.size], std * abs(about.reference[about.size])
+        ends_of_size = max(bounds.lower, -REACH * std), min(bounds.upper, REACH * std)
+        rows = np.flatnonzero(chosen == number)
+        effect[rows] = name
+        size[rows] = Prior(*ends_of_size, normal_std=std).at(fraction[rows])
+    return np.asarray([o[1] for o in options])[chosen], effect, size
+
+
+def _acts_on_a_rover(effect: type[Effect]) -> bool:
+    """Whether an effect is none of rig or sensors, and needs nothing that a rover does not tell."""
+    return effect.about.kind in ("soil", "wheel") and set(effect.about.needs) <= TOLD
+
+
+def _stratified(count: int, rng: np.random.Generator) -> Floats:
+    """Fractions (n,), one in each of n equal intervals, in random order."""
+    return (rng.permutation(count) + rng.random(count)) / count
+
+
+def _stratified_normal(count: int, columns: int, rng: np.random.Generator) -> Floats:
+    """Standard normal values (n, columns), stratified in each column."""
+    unit = Prior.normal(1.0)
+    parts = [unit.at(_stratified(count, rng)) for _ in range(columns)]
+    return np.stack(parts, axis=1) if parts else np.zeros((count, 0))

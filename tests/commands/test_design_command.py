@@ -1,0 +1,113 @@
+"""`soilml design`: JSON, tables, picture and page; faults are one line and status 2."""
+
+import json
+
+import pytest
+
+from soilml.cli import main
+
+STUDY = """
+[rover]
+mass = 12.0
+wheels = 4
+wheelbase = 0.40
+centre_of_mass = [0.0, 0.18]
+gravity = "earth"
+
+[wheel]
+radius = 0.09
+width = [0.05, 0.12]
+lug_height = 0.01
+
+[soil]
+name = "ding2015/hit_lss1"
+[soil.prior]
+friction_angle = [0.5, 0.7]
+
+[goal]
+slope = "3 deg"
+risk = 0.2
+"""
+FEW = ["--designs", "6", "--draws", "50", "--sweep-only"]
+
+
+@pytest.fixture
+def study(tmp_path):
+    path = tmp_path / "rover.toml"
+    path.write_text(STUDY)
+    return path
+
+
+@pytest.mark.slow
+def test_the_answer_is_json_in_a_pipe(study, capsys):
+    assert main(["design", str(study), *FEW]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["goal"]["slope_rad"] == pytest.approx(0.05236, abs=1e-5)
+    assert content["soils"] == ["ding2015/hit_lss1"]
+    assert len(content["designs"]["width"]) == len(content["designs"]["probability"]) == 6
+    best = content["best"]
+    assert best["margin_N_p05"] < best["margin_N"] < best["margin_N_p95"]
+    assert 0.0 < best["probability"] <= best["probability_climbed"] <= 1.0
+    assert "friction_angle" in content["variance_shares"]
+    assert content["tests"][0]["share"] > 0.1
+
+
+@pytest.mark.slow
+def test_files_and_the_verdict(study, tmp_path, capsys):
+    folder, out, png = tmp_path / "report", tmp_path / "d.json", tmp_path / "d.png"
+    outputs = ["--report", str(folder), "--out", str(out), "--picture", str(png)]
+    assert main(["design", str(study), *FEW, *outputs]) == 0
+    said = capsys.readouterr().out
+    first = said.splitlines()[0]
+    assert "width" in first and "climbs 3 deg with" in first and "margin" in first
+    assert "removes_%" in said and "lugs are taken to be close enough" in said
+    assert png.read_bytes().startswith(b"\x89PNG")
+    page = (folder / "report.html").read_text()
+    assert first.split(":")[0] in page and "<img" in page
+    content = json.loads((folder / "report.json").read_text())
+    assert content["report"]["kind"] == "design"
+    assert content["best"] == json.loads(out.read_text())["best"]
+
+
+@pytest.mark.slow
+def test_options_change_slope_gravity_and_soils(study, capsys):
+    options = ["--slope", "20", "--gravity", "moon", "--soil", "moore1999/drift"]
+    assert main(["design", str(study), *FEW, *options]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert content["gravity_m_s2"] == 1.62 and content["soils"] == ["moore1999/drift"]
+    codes = {one["code"] for one in content["warnings"]}
+    assert {"other-gravity", "assumed-soil", "goal-not-met"} <= codes
+    assert not content["met"]
+
+
+@pytest.mark.slow
+def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
+    runs = "run,slip,load_N,torque_Nm\na,0.1,20,0.6\na,0.2,30,1.4\na,0.4,30,2.0\n"
+    (tmp_path / "runs.csv").write_text(runs)
+    start, end = STUDY.index("[soil]"), STUDY.index("[goal]")
+    text = f'[soil]\nmodel = "{model_file.name}"\nruns = "runs.csv"\n\n'
+    study.write_text(STUDY[:start] + text + STUDY[end:])
+    if model_file.parent != tmp_path:
+        (tmp_path / model_file.name).write_text(model_file.read_text())
+    assert main(["design", str(study), *FEW]) == 0
+    content = json.loads(capsys.readouterr().out)
+    assert any(one["code"] == "errors-before-rows" for one in content["warnings"])
+    assert content["soils"] == [str(tmp_path / model_file.name), str(tmp_path / "runs.csv")]
+
+
+@pytest.mark.parametrize(
+    ("change", "options", "said"),
+    [
+        (("mass = 12.0\n", ""), [], "mass is missing; needed is a number in kg"),
+        (("0.18]", "9.0]"), [], "of axle 1 leaves the ground on a slope of 3 deg"),
+        (("", ""), ["--slope", "70"], "--slope is 1.222 rad"),
+        (("", ""), ["--gravity", "pluto"], "gravity is 'pluto'"),
+        (("", ""), ["--soil", "moon"], "no soil 'moon'"),
+        (("", ""), ["--draws", "3"], "needed is a whole number from 50 to 20000"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_two(study, change, options, said, capsys):
+    study.write_text(STUDY.replace(*change) if change[0] else STUDY)
+    assert main(["design", str(study), "--designs", "4", *options]) == 2
+    message = capsys.readouterr().err
+    assert said in message and message.count("\n") == 1

@@ -1,0 +1,108 @@
+"""Sweep, optimisation, front and the best design."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from design_files import STUDY
+
+from soilml import design
+from soilml.rover_design.search import Designs, best_design, meets, pareto_front, swept
+from soilml.rover_design.study import read_study
+from soilml.rover_design.worlds import draw_worlds
+
+
+@pytest.fixture
+def study(tmp_path):
+    (tmp_path / "rover.toml").write_text(STUDY)
+    return read_study(tmp_path / "rover.toml")
+
+
+def designs_of(width, margin, probability):
+    results = {
+        "probability": np.asarray(probability),
+        "margin_at_risk_N": np.asarray(margin),
+        "lugs_needed": np.full(len(width), np.nan),
+    }
+    return Designs({"width": np.asarray(width)}, results)
+
+
+def test_the_front_is_what_no_other_design_beats(study):
+    rng = np.random.default_rng(3)
+    width, margin = rng.random((2, 60)).round(1)  # with ties
+    found = set(pareto_front(study, designs_of(width, margin, margin)).tolist())
+    points = {(width[i], margin[i]) for i in found}
+    for i in range(60):
+        beaten = np.any(
+            (width <= width[i])
+            & (margin >= margin[i])
+            & ((width < width[i]) | (margin > margin[i]))
+        )
+        assert ((width[i], margin[i]) in points) == (not beaten)
+
+
+def test_the_best_design_is_the_least_one_that_meets_the_goal(study):
+    own = designs_of([0.05, 0.08, 0.10], [-1.0, 1.0, 2.0], [0.90, 0.96, 0.99])
+    assert meets(study, own).tolist() == [False, True, True]
+    assert best_design(study, own) == 1
+    likeliest = designs_of([0.05, 0.08], [-3.0, -1.0], [0.2, 0.7])
+    assert not meets(study, likeliest).any() and best_design(study, likeliest) == 1
+
+
+def test_a_design_with_too_few_lugs_does_not_count(study):
+    own = designs_of([0.05, 0.08], [1.0, 1.0], [0.99, 0.99])
+    own = replace(
+        own,
+        dimensions={**own.dimensions, "lug_count": np.asarray([10.0, 30.0])},
+        results={**own.results, "lugs_needed": np.asarray([20.0, 20.0])},
+    )
+    assert best_design(study, own) == 1
+    assert pareto_front(study, own).tolist() == [1]
+
+
+def test_a_sweep_is_a_grid_with_its_ends(study):
+    found = swept(study, draw_worlds(study.soil, 50, 0.6), 20)
+    assert set(found.dimensions["lug_height"]) == {0.0, 0.01}
+    width = np.unique(found.dimensions["width"])
+    assert len(width) == 10 and width[0] == 0.05 and width[-1] == 0.12
+    assert np.all(found.dimensions["mass"] == 12.0)
+
+
+@pytest.mark.slow
+def test_optimisation_finds_a_smaller_wheel_than_a_coarse_sweep(study):
+    study = replace(study, goal=replace(study.goal, slope=0.05, risk=0.2))
+    coarse = design(study, designs=8, draws=80, optimise=False)
+    fine = design(study, designs=8, draws=80)
+    assert meets(study, coarse.designs).any()
+    width = fine.best_dimensions["width"]
+    assert width <= coarse.best_dimensions["width"]
+    found = fine.designs
+    least = found.dimensions["width"][meets(study, found)].min()
+    assert width == least
+    assert fine.as_json()["best"]["width"] == width
+    # on the limit: a slightly narrower wheel of the same lugs does not meet it
+    same = found.dimensions["lug_height"] == fine.best_dimensions["lug_height"]
+    narrower = same & (found.dimensions["width"] < width - 1e-9)
+    assert not meets(study, found)[narrower].any()
+
+
+@pytest.mark.slow
+def test_more_than_two_dimensions_are_swept_by_sobol_points(tmp_path):
+    text = STUDY.replace("radius = 0.09", "radius = [0.07, 0.12]").replace(
+        "wheels = 4", "wheels = { values = [4, 6] }"
+    )
+    (tmp_path / "rover.toml").write_text(text)
+    progress = []
+    found = design(
+        tmp_path / "rover.toml",
+        designs=24,
+        draws=60,
+        optimise=False,
+        progress=lambda *one: progress.append(one),
+    )
+    assert found.designs.count == 24
+    assert set(found.designs.dimensions["wheels"]) == {4.0, 6.0}
+    assert found.contours is not None and found.contours.count > 50
+    assert progress[-1][1:] == (144, 144)
+    axes = found.plot()
+    assert axes.shape == (2, 2) and axes[0, 0].get_title() == "probability of meeting the goal"

@@ -1,0 +1,88 @@
+"""A question of a design as a file: nothing is assumed, every fault is one line."""
+
+import math
+
+import numpy as np
+import pytest
+from design_files import STUDY
+
+from soilml.config.wheeled_rover import RoverWheel, WheeledRover
+from soilml.errors import InputError
+from soilml.rover_design.study import Dimension, read_study, with_changes
+
+
+def study_of(tmp_path, text=STUDY):
+    path = tmp_path / "rover.toml"
+    path.write_text(text)
+    return read_study(path)
+
+
+def test_a_file_is_read_with_its_units(tmp_path):
+    study = study_of(tmp_path)
+    assert study.varied == ["width", "lug_height"]
+    assert study.dimensions["lug_height"] == Dimension((0.0, 0.01))
+    assert study.dimensions["width"] == Dimension((0.05, 0.12), searched=True)
+    assert study.goal.slope == pytest.approx(math.radians(10.0))
+    assert study.goal.risk == 0.05 and study.goal.least == "width"
+
+
+@pytest.mark.parametrize(
+    ("given", "instead", "said"),
+    [
+        ("mass = 12.0\n", "", r"\[rover\]: mass is missing; needed is a number in kg"),
+        ("wheelbase = 0.40\n", "", r"\[rover\]: wheelbase is missing"),
+        ("centre_of_mass = [0.02, 0.18]\n", "", r"centre_of_mass is missing"),
+        ('gravity = "earth"\n', "", r"gravity is missing; needed is earth, moon, mars"),
+        ("radius = 0.09\n", "", r"\[wheel\]: radius is missing"),
+        ('slope = "10 deg"\n', "", r"\[goal\]: slope is missing"),
+        ('"10 deg"', "10", r"if 10 are degrees, write '10 deg'"),
+        ("wheels = 4", "wheels = 5", r"wheels is 5; needed is an even number"),
+        ("[0.05, 0.12]", "[0.12, 0.05]", r"with lower below upper"),
+        ("[0.05, 0.12]", "5", r"width is 5 m; needed is 0.005 to 2"),
+        ("width = [0.05", "widht = [0.05", r"misspell it as 'widht'"),
+        ('least = "width"', 'least = "cost"', r"least is 'cost'; needed is one of energy"),
+        ("ding2015/hit_lss1", "ding2015/hit", r"no soil 'ding2015/hit'"),
+        ('name = "ding2015/hit_lss1"', 'names = ["a/b"]', r"no soil 'a/b'"),
+        ("{ values = [0.0", "{ value = [0.0", r"\{ values = \[...\] \}"),
+    ],
+)
+def test_what_is_missing_or_wrong_is_one_line(tmp_path, given, instead, said):
+    with pytest.raises(InputError, match=said) as caught:
+        study_of(tmp_path, STUDY.replace(given, instead))
+    assert "\n" not in str(caught.value)
+
+
+def test_axle_loads_are_those_of_the_rover_of_a_model_file(tmp_path):
+    study = study_of(tmp_path)
+    places = {"a": 0.2, "b": 0.0, "c": -0.2}
+    wheels = {
+        f"{name}{side}": RoverWheel(x, side * 0.3) for name, x in places.items() for side in (-1, 1)
+    }
+    rover = WheeledRover(12.0, (0.02, 0.0, 0.18), wheels)
+    slope = math.radians(12.0)
+    expected = rover.loads(slope).reshape(3, 2)
+    assert 12.0 * study.axle_loads(6, slope) == pytest.approx(expected[:, 0])
+    assert expected[:, 0] == pytest.approx(expected[:, 1])
+
+
+def test_a_wheel_that_leaves_the_ground_is_said(tmp_path):
+    study = study_of(tmp_path, STUDY.replace("0.18]", "0.5]"))
+    with pytest.raises(InputError, match="of axle 1 leaves the ground on a slope of 50 deg"):
+        study.axle_loads(4, math.radians(50.0))
+
+
+def test_options_change_the_question(tmp_path):
+    changed = with_changes(
+        study_of(tmp_path), slope=0.2, gravity="moon", soils=["scott1970/apollo12"], risk=0.2
+    )
+    assert changed.goal.slope == 0.2 and changed.gravity == 1.62 and changed.goal.risk == 0.2
+    assert list(changed.soil.entries) == ["scott1970/apollo12"]
+    with pytest.raises(InputError, match="--slope is 2 rad"):
+        with_changes(changed, slope=2.0)
+
+
+def test_counted_dimensions_take_whole_steps():
+    six = Dimension((4.0, 8.0), searched=True).at(np.linspace(0.0, 1.0, 7), step=2)
+    assert set(six) == {4.0, 6.0, 8.0}
+    listed = Dimension((0.0, 0.01)).at(np.asarray([0.0, 0.49, 0.5, 1.0]))
+    assert listed.tolist() == [0.0, 0.0, 0.01, 0.01]
