@@ -123,8 +123,8 @@ def variance_shares(worlds: DrawnWorlds, outcome: Outcomes) -> list[VarianceShar
 def possible_tests(worlds: DrawnWorlds, outcome: Outcomes) -> list[PossibleTest]:
     """Tests by the share of the margin's variance that each would remove at most, largest first.
 
-    It would do so if it determined its inputs exactly. Tests of nothing that is uncertain are left out.
-    Which of several soils it is, is found by both tests of the soil together.
+    It would do so if it determined its inputs exactly. Tests of nothing that is uncertain are left
+    out. Which of several soils it is, is found by both tests of the soil together.
     """
     inputs, margin = _inputs(worlds, outcome), _finite(outcome.margin[0])
     found = []
