@@ -12,8 +12,12 @@ import numpy as np
 
 ROOT = Path(__file__).parents[1]
 #: Warnings that an exported file must not cause.
-WARNINGS = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion"]
+WARNINGS = [
+    *("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror"),
+    *("-Wconversion", "-Wfloat-equal"),
+]
 COMPILERS = [name for name in ("gcc", "clang") if shutil.which(name)]
+PLAIN = (int, ctypes.Array, ctypes.c_float)  # Arguments that are not passed by reference
 TYPES = {
     "float": ctypes.c_float,
     "double": ctypes.c_double,
@@ -48,8 +52,11 @@ class CompiledModel:
             members = [(field, self._type(kind, sizes)) for kind, field, sizes in fields]
             self.structs[name] = type(name, (ctypes.Structure,), {"_fields_": members})
         self.library = ctypes.CDLL(str(library))
-        getattr(self.library, f"{self.name}_empty_row").restype = self.structs[f"{self.name}_row"]
-        self.work = self.new("work")
+        for function, struct in (("empty_row", "row"), ("usual_context", "context")):
+            if made := self.structs.get(f"{self.name}_{struct}"):
+                getattr(self.library, f"{self.name}_{function}").restype = made
+        if f"{self.name}_work" in self.structs:
+            self.work = self.new("work")
 
     def _type(self, kind, sizes):
         found = TYPES.get(kind) or self.structs[kind]
@@ -59,10 +66,10 @@ class CompiledModel:
 
     def new(self, struct, **values):
         """A struct of this model, with fields set."""
-        made = self.structs[f"{self.name}_{struct}"]()
         if struct == "context":  # what is not given has its usual value
-            for field, _ in made._fields_:
-                setattr(made, field, float("nan"))
+            made = getattr(self.library, f"{self.name}_usual_context")()
+        else:
+            made = self.structs[f"{self.name}_{struct}"]()
         for name, value in values.items():
             setattr(made, name, value)
         return made
@@ -82,10 +89,7 @@ class CompiledModel:
 
     def call(self, function, *arguments):
         """The code that a function returns; structs and arrays are passed by reference."""
-        passed = [
-            a if a is None or isinstance(a, (int, ctypes.Array)) else ctypes.byref(a)
-            for a in arguments
-        ]
+        passed = [a if a is None or isinstance(a, PLAIN) else ctypes.byref(a) for a in arguments]
         return getattr(self.library, f"{self.name}_{function}")(*passed)
 
     def single(self, row):

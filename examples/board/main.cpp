@@ -3,7 +3,6 @@
 //   soilml export-c exported/any_wheel.onnx any_wheel.c
 //   gcc -std=c99 -O3 -c any_wheel.c
 //   g++ -std=c++11 -O3 -I. examples/board/main.cpp any_wheel.o -lm -o board && ./board
-#include <cmath>
 #include <cstdio>
 #include <exception>
 
@@ -11,7 +10,7 @@
 
 static any_wheel_context wheel_on_dry_sand(float radius, float width)
 {
-    any_wheel_context wheel;
+    any_wheel_context wheel = any_wheel_usual_context(); // errors of sensors and of the model
     wheel.wheel_radius = radius;
     wheel.wheel_width = width;
     wheel.bearing_modulus = 1.537e6f;
@@ -19,10 +18,6 @@ static any_wheel_context wheel_on_dry_sand(float radius, float width)
     wheel.bearing_std = 0.1f;
     wheel.cohesion_max = 3000.0f;
     wheel.shear_modulus_max = 0.03f;
-    // NAN: the value of the file, typical errors of sensors and the averaged answer
-    wheel.slip_bias = wheel.load_gain = wheel.torque_gain = NAN;
-    wheel.sinkage_bias = wheel.drawbar_pull_bias = NAN;
-    wheel.model_error = NAN; // 0: the model is right
     return wheel;
 }
 

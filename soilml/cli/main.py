@@ -31,7 +31,7 @@ friction angle and shear modulus, each with its uncertainty.
   from a log to a table        soilml import
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
-  from a model file to C       soilml export-c
+  from a model file to C       soilml export-c, export-fusion
   to a graph of fixed shapes   soilml export-step
   from a campaign to a file    soilml adapt
   from measurements to soil    soilml estimate (trained model, as on board)
@@ -64,6 +64,7 @@ COMMANDS = {
     "generate": "datagen.commands.generate",
     "train": "training.commands.train",
     "export-c": "training.commands.export_c",
+    "export-fusion": "training.commands.export_fusion",
     "export-step": "training.commands.export_step",
     "estimate": "soilml.cli.commands.estimate",
     "advise": "soilml.cli.commands.advise",

@@ -55,6 +55,7 @@ ELSEWHERE = {
     "generate",
     "train",
     "export-c",
+    "export-fusion",
     "export-step",
     "adapt",
     "compare",

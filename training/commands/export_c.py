@@ -50,6 +50,15 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     return output_files(args.out, ".c", ".h")
 
 
+def check_c_name(file: Path) -> None:
+    """Raise `InputError` unless the name of a C file can begin the names of its functions."""
+    if not re.fullmatch(r"[a-z_][a-z0-9_]*", file.stem):
+        raise InputError(
+            f"{file}: {file.stem!r} begins the names of the C functions; needed are lower-case "
+            "letters, digits and underscores, and a letter first, as in wheel.c"
+        )
+
+
 def run(args: argparse.Namespace) -> int:
     """Translate a model file."""
     from soilml.optional_imports import need
@@ -62,11 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from training.export_c.c_file import write_c
 
     out = Path(args.out)
-    if not re.fullmatch(r"[a-z_][a-z0-9_]*", out.stem):
-        raise InputError(
-            f"{args.out}: {out.stem!r} begins the names of the C functions; needed are lower-case "
-            "letters, digits and underscores, and a letter first, as in wheel.c"
-        )
+    check_c_name(out)
     file = find_model(args.model)
     metadata = Estimator.load(file).metadata
     written = write_c(onnx.load(str(file)), metadata, out.stem, file.name, args.rows)

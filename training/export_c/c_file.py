@@ -10,7 +10,7 @@ from typing import Any
 
 from soilml import __version__
 from soilml.onboard.metadata import read_fields
-from soilml.onboard.set_contract import MEMORY_INPUTS
+from soilml.onboard.set_contract import MEMORY_INPUTS, SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 from training.export_c.c_text import array, number
 from training.export_c.functions import (
@@ -25,6 +25,7 @@ from training.export_c.functions import (
 from training.export_c.graph_translation import rows_are_apart
 from training.export_c.interface import Interface, read_interface
 from training.export_c.program import Constant, SharedParts
+from training.export_c.single_precision import in_single_precision
 
 #: Bytes of an element, as all usual compilers have them; the C file checks what follows from it.
 BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
@@ -33,6 +34,11 @@ ROWS_PER_CALL = 32
 TEMPLATES = Path(__file__).parent / "templates"
 #: Functions of the C library in the kernels, by element type.
 _MATH = {"EXP": {"float": "expf", "double": "exp"}}
+#: Entries of the metadata that tell one file from another, and what they were trained from.
+IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")
+#: Outputs that are one number for a row or set; others have one for each estimated quantity, or for
+#: each pair of them.
+SCALARS = ("in_range", "misfit")
 
 
 @dataclass(frozen=True)
@@ -61,8 +67,7 @@ def write_c(
 
     Raises `ModelFileError` for a graph with an operator, a type or a shape that is not known.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
+    model = in_single_precision(model, metadata)
     interface, shared = read_interface(model, metadata), SharedParts()
     functions: dict[str, GraphFunction] = {}
     if interface.single:
@@ -75,15 +80,8 @@ def write_c(
         functions["answer"] = answer_function(model, interface, shared)
     used = frozenset().union(*(function.constants for function in functions.values()))
     constants = [parts for parts in shared.constants.values() if parts[0] in used]
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
-    environment.filters["float"] = lambda x: number(x, "float")
+    environment = template_environment()
+    environment.filters["scalar"] = lambda output: output.removeprefix(SET_PREFIX) in SCALARS
     environment.globals["arguments"] = lambda function: _arguments(interface, function)
     sizes = _sizes(interface, functions, constants, rows)
     fields = read_fields(metadata)
@@ -92,6 +90,8 @@ def write_c(
         "NAME": name.upper(),
         "origin": origin,
         "version": __version__,
+        "identity": {key: metadata[key] for key in IDENTITY if key in metadata},
+        "noise": fields["sets"].noise if fields["sets"] else {},
         "sha": metadata["graph_sha256"],
         "interface": interface,
         "functions": functions,
@@ -111,6 +111,23 @@ def write_c(
         environment.get_template(f"{part}.j2").render(values) for part in ("source.c", "header.h")
     )
     return CFile(source, header, **sizes)
+
+
+def template_environment() -> Any:
+    """Jinja for the templates of C files, with a filter for numbers of float."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    environment.filters["float"] = lambda x: number(x, "float")
+    environment.filters["floats"] = lambda many: ", ".join(number(x, "float") for x in many)
+    return environment
 
 
 def _arrays(functions: Mapping[str, GraphFunction]) -> dict[str, tuple[str, int]]:
@@ -135,7 +152,7 @@ def _sizes(
         work += interface.columns * max(interface.columns * BYTES["float"], BYTES["double"])
         work += interface.columns * BYTES["double"]
     triangle = interface.columns * (interface.columns + 1) // 2
-    memory = triangle * BYTES["double"] + (3 + len(interface.context)) * BYTES["float"] + 16
+    memory = triangle * BYTES["double"] + (4 + len(interface.context)) * BYTES["float"] + 16
     return {
         "memory_bytes": -(-memory // 8) * 8 if interface.sets else 0,
         "work_bytes": -(-work // 8) * 8,

