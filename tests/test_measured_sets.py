@@ -80,9 +80,10 @@ def report(status="suspected", *names):
 
 
 def test_a_verdict_survives_where_all_priors_give_the_same_first_explanation():
-    assert real._survives(["slip-sinkage"] * 3) == "yes"
-    assert real._survives(["slip-sinkage", "slip-sinkage", ""]) == "**no**"
-    assert real._survives(["", "", ""]) == "no cause"
+    assert real._survives(["slip-sinkage"] * 3, [1.0, -1.0, -2.0]) == "yes"
+    assert real._survives(["slip-sinkage", "slip-sinkage", ""], [0.1, -1.0, None]) == "**no**"
+    assert real._survives(["slip-sinkage", "slope", ""], [-0.1, -1.0, None]) == "undecided"
+    assert real._survives(["", "", ""], [None, None, None]) == "no cause"
     assert real.first_of(report("suspected", "slip-sinkage", "slope")) == "slip-sinkage"
     assert real.first_of({"status": "crash"}) == ""
     named = report("named", "slope") | {"cause_set": [["grousers", "exit-angle"]]}

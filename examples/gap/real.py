@@ -33,6 +33,7 @@ HERE = Path(__file__).parent
 OUT = Path("demo/gap/real")
 PAGE = page_file("gap-measured")
 SUSPECTED = "suspected"  # The status of a report that ranks suspects and states no cause
+UNDECIDED = "undecided"
 #: Held-out parts, the first of which a report has is shown.
 PARTS = {"held_out_runs": "runs", "held_out_slips": "slips", "held_out_region": "region"}
 
@@ -136,27 +137,37 @@ def page(sets: list[MeasuredSet], found: Found) -> str:
     firsts = {s.name: [first_of(found[s.name][p]) for p in PRIORS] for s in sets}
     rows = []
     for one in sets:
+        reports = [found[one.name][p] for p in PRIORS]
+        odds = [_log_odds_of_first(report) for report in reports]
         cells = [
-            f"{first or '-'} (`{found[one.name][p]['status']}`)"
-            for p, first in zip(PRIORS, firsts[one.name], strict=True)
+            f"{first} ({_odds(own)})" if first and own is not None else f"`{report['status']}`"
+            for first, own, report in zip(firsts[one.name], odds, reports, strict=True)
         ]
-        rows.append([one.title, *cells, _survives(firsts[one.name])])
-    agree = sum(row[-1] == "yes" for row in rows)
+        rows.append([one.title, *cells, _survives(firsts[one.name], odds)])
+    agree, open_ = (sum(row[-1] == text for row in rows) for text in ("yes", UNDECIDED))
     return template.render(
         title=TITLES[PAGE.stem],
         machine=machine(),
         sets=[{"name": s.name, "title": s.title, "table": _set_table(found[s.name])} for s in sets],
         beliefs=tomllib.loads((HERE / "beliefs.toml").read_text()),
         summary=_table(["set", *PRIORS, "survives"], rows),
-        count=f"The first explanation is the same with all three in {agree} of {len(rows)} sets.",
+        count=f"The first explanation is the same with all three in {agree} of {len(rows)} sets; "
+        f"in {open_} others, none is likelier than not with any of them.",
     )
 
 
-def _survives(firsts: list[str]) -> str:
-    """Whether all sets of priors give the same first explanation."""
+def _log_odds_of_first(report: dict[str, Any]) -> float | None:
+    """Logarithm of the odds of the first suspect; None without one."""
+    return next((float(s["log_odds"]) for s in report.get("suspects") or ()), None)
+
+
+def _survives(firsts: list[str], log_odds: list[float | None]) -> str:
+    """Whether all sets of priors give the same first explanation, or none that is likely."""
     if not any(firsts):
         return "no cause"
-    return "yes" if len(set(firsts)) == 1 else "**no**"
+    if len(set(firsts)) == 1:
+        return "yes"
+    return UNDECIDED if all(own is None or own < 0.0 for own in log_odds) else "**no**"
 
 
 def _set_table(reports: dict[str, dict[str, Any]]) -> str:

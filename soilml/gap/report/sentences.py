@@ -86,7 +86,8 @@ def headline(report: GapReport) -> str:
 def _faults(report: GapReport) -> str:
     """The first fault, if it can be said shortly, and how many there are."""
     count = len(report.reasons)
-    text = report.reasons[0].text + (f"; {count - 1} more" if count > 1 else "")
+    more = f"; {count - 1} more fault{'s' if count > 2 else ''}" if count > 1 else ""
+    text = report.reasons[0].text + more
     if len(text.split()) <= HEADLINE_WORDS:
         return text
     return f"{count} fault{'s' if count > 1 else ''} in the data or the model file."
