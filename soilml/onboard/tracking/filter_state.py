@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError
 from soilml.onboard.memory import Memory
-from soilml.onboard.set_contract import ABSENT_STD, OPTIONAL_READINGS
+from soilml.onboard.set_contract import ABSENT_STD, OPERATING_NOISE, OPTIONAL_READINGS
 from soilml.onboard.tracking.misfit import ROWS_JUDGED, Rows
 
 BLOCKS = 16  # Blocks of a window that is full; one more grows until the oldest is forgotten
@@ -21,13 +21,16 @@ LEAST_ROWS = 3
 #: Rows in succession that disagree with those before, after which these are given up even if the
 #: new ones do not agree with each other.
 GIVE_UP_AFTER = 25
-#: Sensors that can be found stuck. Slip and load are often set, and then constant by intention.
-WATCHED = ("torque", *OPTIONAL_READINGS)
+#: Sensors that can be found stuck: those of torque, sinkage and pull, and those of slip and load
+#: where they have noise. Without noise they are set, and constant by intention.
+WATCHED = ("torque", *OPTIONAL_READINGS, *OPERATING_NOISE)
+#: Last rows that are kept one by one, so that a change among them is found where it began.
+RECENT_ROWS = 24
 #: Exact repetitions in succession after which a sensor is stuck.
 REPETITIONS = 2
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 1  # Version of the arrays
+FORMAT = 2  # Version of the arrays
 
 
 @dataclass(frozen=True)
@@ -37,43 +40,69 @@ class RowWindow:
     All rows of a window have the same weight, as in the likelihood. With weights that fade
     exponentially, the posterior would claim twice the variance that the estimate has.
 
-    blocks: Consecutive rows, the oldest first; the last grows.
+    blocks: Consecutive rows, the oldest first; the last ones are of one row each.
     memory: All rows of the blocks, packed.
-    rows_per_block: Rows after which another block begins.
+    length: Rows that are remembered at least, once there were so many.
+    added: What each of the last rows added to the misfit, (recent,).
     """
 
     blocks: tuple[Memory, ...]
     memory: Memory
-    rows_per_block: int
+    length: int
+    added: tuple[float, ...] = ()
 
     @staticmethod
     def empty(start: Memory, length: int) -> RowWindow:
         """A window that remembers between `length` rows and a block more."""
-        return RowWindow((), start, -(-length // BLOCKS))
+        return RowWindow((), start, length)
+
+    @property
+    def rows_per_block(self) -> int:
+        """Rows after which another block begins, but for the last rows."""
+        return -(-self.length // BLOCKS)
 
     @property
     def is_full(self) -> bool:
         """Whether the oldest block is to be forgotten."""
-        return len(self.blocks) > BLOCKS + 1
+        return self.memory.rows > self.length + self.rows_per_block
 
-    def with_rows(self, after: Memory) -> RowWindow:
-        """The window with further rows, from its memory after them, not packed."""
+    def with_rows(self, after: Memory, added: float = 0.0) -> RowWindow:
+        """The window with one more row, or its first ones, from its memory after them, not packed.
+
+        added: What the row added to the misfit.
+        """
         system = after.system[len(self.memory.system) :]
-        added = replace(after, system=system, counts=after.counts - self.memory.counts)
-        if not self.blocks or self.blocks[-1].rows >= self.rows_per_block:
-            blocks = (*self.blocks, added)
-        else:
-            blocks = (*self.blocks[:-1], join((self.blocks[-1], added)))
-        return replace(self, blocks=blocks, memory=after.packed())
+        last = replace(after, system=system, counts=after.counts - self.memory.counts)
+        blocks, rises = (*self.blocks, last), (*self.added, added)
+        if len(rises) > min(RECENT_ROWS, self.length // 2):
+            first, rises = len(blocks) - len(rises), rises[1:]
+            older, one = blocks[:first], blocks[first]
+            if older and older[-1].rows < self.rows_per_block:
+                older, one = older[:-1], join((older[-1], one))
+            blocks = (*older, one, *blocks[first + 1 :])
+        return replace(self, blocks=blocks, memory=after.packed(), added=rises)
 
     def since(self, block: int) -> RowWindow:
         """The window without the blocks before this one."""
         blocks = self.blocks[block:]
-        return replace(self, blocks=blocks, memory=join(blocks))
+        return replace(self, blocks=blocks, memory=join(blocks), added=self.added[-len(blocks) :])
 
     def before(self, block: int) -> Memory:
         """The memory of the rows before this block."""
         return join(self.blocks[:block])
+
+    def with_another_soil(self) -> RowWindow:
+        """The window whose rows are all of one soil: what they added to the misfit is forgotten."""
+        return replace(self, added=(0.0,) * len(self.added))
+
+    def suspect(self, excess: float) -> int:
+        """The block with which another soil begins most likely: the last ones added most.
+
+        excess: What a sound row adds to the misfit on the mean.
+        """
+        over = np.cumsum(np.asarray(self.added[::-1]) - excess)[LEAST_ROWS - 1 :]
+        most = LEAST_ROWS + int(np.argmax(over)) if over.size else LEAST_ROWS
+        return len(self.blocks) - most
 
 
 def join(memories: Sequence[Memory]) -> Memory:
@@ -172,7 +201,8 @@ class RepeatedReadings:
 
 
 def _measured(row: Rows, name: str) -> bool:
-    return bool(row[f"{name}_std"][0] < ABSENT_STD)
+    std = float(row[f"{name}_std"][0]) if f"{name}_std" in row else 0.0
+    return 0.0 < std < ABSENT_STD
 
 
 @dataclass(frozen=True)
@@ -185,6 +215,7 @@ class FilterState:
     increases: What each of the last rows added to the misfit, over its median for sound rows.
     rows_since_change: Rows used since the soil changed.
     rows_since_drift: Rows used since a drift was last found; -1: never, on this soil.
+    variance: Variance of the noise that the rows show, over that stated, 1 or more.
     """
 
     window: RowWindow
@@ -193,6 +224,7 @@ class FilterState:
     increases: tuple[float, ...] = ()
     rows_since_change: int = 0
     rows_since_drift: int = -1
+    variance: float = 1.0
 
     def with_increase(self, value: float) -> FilterState:
         """The state after a row that added so much to the misfit, over its median."""
@@ -206,6 +238,7 @@ class FilterState:
             repeated=self.repeated,
             increases=self.increases[: max(kept, 0)],
             rows_since_change=window.memory.rows,
+            variance=self.variance,
         )
 
     def as_arrays(self, identity: str) -> Arrays:
@@ -224,11 +257,13 @@ class FilterState:
             "names": np.asarray(names, dtype=np.str_),
             "rows": np.reshape([row[n][0] for row in rows for n in names], (len(rows), len(names))),
             "disagree": np.asarray(self.question.disagree, dtype=np.bool_),
+            "added": np.asarray(self.window.added, dtype=np.float64),
             "increases": np.asarray(self.increases, dtype=np.float64),
+            "variance": np.asarray(self.variance),
             "repeated": np.asarray(self.repeated.times, dtype=np.int64),
             "numbers": np.asarray(
                 [
-                    self.window.rows_per_block,
+                    self.window.length,
                     self.question.in_succession,
                     self.rows_since_change,
                     self.rows_since_drift,
@@ -278,8 +313,11 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
     blocks = tuple(
         replace(start, system=part, counts=np.asarray(count, np.float32)) for part, count in parts
     )
-    per_block, in_succession, since_change, since_drift = (int(n) for n in arrays["numbers"])
-    window = RowWindow(blocks, join(blocks) if blocks else start, per_block)
+    length, in_succession, since_change, since_drift = (int(n) for n in arrays["numbers"])
+    added = tuple(float(value) for value in arrays["added"])
+    if not len(added) <= len(blocks) or not np.isfinite(added).all():
+        raise ValueError(f"it has {len(added)} last rows in {len(blocks)} blocks")
+    window = RowWindow(blocks, join(blocks) if blocks else start, length, added)
     rows: list[Rows] = [
         {str(n): np.asarray([float(v)]) for n, v in zip(arrays["names"], row, strict=True)}
         for row in arrays["rows"]
@@ -291,4 +329,7 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
         raise ValueError(f"it has {len(question.rows)} rows in question and {len(flags)} flags")
     repeated = RepeatedReadings(previous, tuple(int(n) for n in arrays["repeated"]))
     increases = tuple(float(value) for value in arrays["increases"])
-    return FilterState(window, question, repeated, increases, since_change, since_drift)
+    variance = float(arrays["variance"])
+    if not 1.0 <= variance < np.inf:
+        raise ValueError(f"its noise is {variance:g} times that stated")
+    return FilterState(window, question, repeated, increases, since_change, since_drift, variance)

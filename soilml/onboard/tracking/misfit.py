@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.onboard.set_posterior import estimate_of_set
 
 QUANTILE = 3.72  # Standard normal quantile beyond which a misfit is not chance: 1 in 10 000
+#: The same for the last rows together, of which one number is tried after each row: 1 in 1000.
+CHANGE_QUANTILE = 3.09
 #: Degrees of freedom by which two spans of a drive differ: those of the unknowns, and so many of
 #: the errors of sensors, which each span may explain in its own way.
 ERROR_DEGREES = 1.0
@@ -25,6 +27,8 @@ ASSUMED_READINGS, ASSUMED_ROWS = 8.0, 3
 ROWS_JUDGED = 16  # Rows from whose misfit the size of the model error is estimated
 #: Most variance of the residuals over that of the stated noise for which a model is still used.
 MOST_EXCESS = 10.0
+#: The same for noise that an estimate takes from the rows: above it no soil explains them.
+MOST_VARIANCE = 3.0
 #: Size of the errors of a model that is all but right, whose memories have their columns.
 ALL_BUT_RIGHT = 1e-6
 Rows = dict[str, NDArray[np.float64]]  # Row inputs of the graph (m,) by name
@@ -73,9 +77,14 @@ def fit_memory(estimator: Estimator, memory: Memory) -> JointFit:
     return fit_rows(estimator, estimator.sets.rows(nothing) if estimator.sets else {}, memory)
 
 
-def chi_squared_limit(degrees: float) -> float:
-    """The value that a chi-squared variable exceeds as rarely as a normal one its `QUANTILE`."""
-    return chi_squared_quantile(degrees, QUANTILE)
+def with_noise(memory: Memory, variance: float) -> Memory:
+    """The memory of the same rows with noise of so many times the stated variance."""
+    return replace(memory, system=memory.system / np.sqrt(variance))
+
+
+def chi_squared_limit(degrees: float, quantile: float = QUANTILE) -> float:
+    """The value that a chi-squared variable exceeds as rarely as a normal one its quantile."""
+    return chi_squared_quantile(degrees, quantile)
 
 
 def excess_noise(misfit: float, readings: float, unknowns: int) -> float:

@@ -17,7 +17,9 @@ from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
 from soilml.onboard.tracking.filter_state import GIVE_UP_AFTER, Arrays, FilterState, RowWindow
 from soilml.onboard.tracking.misfit import (
+    CHANGE_QUANTILE,
     ERROR_DEGREES,
+    MOST_VARIANCE,
     JointFit,
     Rows,
     chi_squared_limit,
@@ -27,10 +29,11 @@ from soilml.onboard.tracking.misfit import (
     judging,
     over_median,
     usual_excess,
+    with_noise,
 )
 
-#: Blocks of recent rows that are compared with all earlier ones, one number after another.
-RECENT_BLOCKS = (2, 4, 8)
+#: After so many rows the last half of the rows is compared with the first, for a slow drift.
+HALVES_EVERY = 4
 DEFAULT_LENGTH = 100  # Rows that a tracker remembers by default
 
 
@@ -93,10 +96,11 @@ class SoilTracker:
     A row whose misfit with the rows remembered is not chance is set aside. Where several such rows
     agree with each other, the soil has changed, and the tracker begins anew with them; where the
     next rows agree with those before, it was a glitch. Rows that differ from earlier ones only
-    taken together are a drift; the earlier ones are forgotten. Of the others, the last `length`
-    are remembered. Memory and time per row are bounded: at most four calls of the graph, and one
-    more where rows are forgotten. Rows are judged with a model that is right but for more noise;
-    the estimate has the errors of the estimator's model.
+    taken together are a drift, or a small change; the earlier ones are forgotten. Of the others,
+    the last `length` are remembered. Memory and time per row are bounded: at most four calls of the
+    graph, and one more where rows are forgotten. Rows are judged with a model that is right but for
+    more noise; the estimate has the errors of the estimator's model, and noise as large as the rows
+    show.
 
     Parameters
     ----------
@@ -196,10 +200,10 @@ class SoilTracker:
         """
         tracker = SoilTracker(estimator, length)
         state = FilterState.from_arrays(arrays, estimator.memory_id, tracker._empty)
-        if state.window.rows_per_block != tracker._filter.window.rows_per_block:
+        if state.window.length != length:
             raise InputError(
-                f"length is {length}, but this state of a tracker has blocks of "
-                f"{state.window.rows_per_block} rows: give the length that it was made with"
+                f"length is {length}, but this state of a tracker has length "
+                f"{state.window.length}: give the length that it was made with"
             )
         tracker._begin(state)
         return tracker
@@ -243,7 +247,7 @@ class SoilTracker:
         since_drift = state.rows_since_drift
         self._filter = replace(
             state,
-            window=window.with_rows(fit.memory),
+            window=window.with_rows(fit.memory, misfit),
             question=question,
             rows_since_change=state.rows_since_change + 1,
             rows_since_drift=since_drift + 1 if 0 <= since_drift < self.length else -1,
@@ -279,18 +283,19 @@ class SoilTracker:
         """Compare recent rows with earlier ones, and forget what is too old."""
         state, words = self._filter, "agrees with the rows before"
         window, blocks = state.window, len(state.window.blocks)
-        splits = [count for count in RECENT_BLOCKS if count < blocks]
-        if splits and not state.question.rows:
-            first = blocks - splits[state.rows_since_change % len(splits)]
+        first = self._split(window)
+        if 0 < first < blocks:
             recent = window.since(first)
             old = fit_memory(self._judge, window.before(first))
             new = fit_memory(self._judge, recent.memory)
             apart = old.misfit + new.misfit
             unknowns = len(self.estimator.names)
-            excess = self._excess(apart, self._fit.readings, 2 * unknowns)
-            limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES)
+            # not that of the last rows one by one, which another soil raises
+            excess = max(excess_noise(apart, self._fit.readings, 2 * unknowns), 1.0)
+            limit = excess * chi_squared_limit(unknowns + ERROR_DEGREES, CHANGE_QUANTILE)
             if self._fit.misfit - apart > limit:
-                self._filter = replace(state, window=recent, rows_since_drift=0)
+                window = recent.with_another_soil()
+                self._filter = replace(state, window=window, rows_since_drift=0)
                 self._fit = new
                 words = (
                     f"the last {recent.memory.rows} rows together differ from {old.memory.rows} "
@@ -302,6 +307,14 @@ class SoilTracker:
             self._fit = fit_memory(self._judge, self._filter.window.memory)
         return self._answer(Event.ACCEPTED, words)
 
+    def _split(self, window: RowWindow) -> int:
+        """The block with which other rows are compared with those before."""
+        if self._filter.rows_since_change % HALVES_EVERY:
+            excess = excess_noise(self._fit.misfit, self._fit.readings, len(self.estimator.names))
+            return window.suspect(max(excess, 1.0))
+        rows = np.cumsum([block.rows for block in window.blocks])
+        return int(np.searchsorted(rows, 0.5 * rows[-1]))
+
     def _excess(self, misfit: float, readings: float, unknowns: int | None = None) -> float:
         """Variance of residuals over that of the stated noise, 1 or more: of a fit, or of rows."""
         unknowns = len(self.estimator.names) if unknowns is None else unknowns
@@ -309,9 +322,9 @@ class SoilTracker:
         return max(excess_noise(misfit, readings, unknowns), usual)
 
     def _answer(self, event: Event, words: str) -> TrackerState:
-        state = self._filter
+        estimate, state = self._estimate(), self._filter
         self.state = TrackerState(
-            estimate=self._estimate(),
+            estimate=estimate,
             event=event,
             words=words,
             rows_since_change=state.rows_since_change,
@@ -322,10 +335,12 @@ class SoilTracker:
         return self.state
 
     def _estimate(self) -> Estimate:
-        """From the rows that are remembered, with errors of the model."""
-        if self._judge is self.estimator:
-            return self._fit.estimate
-        memory = self._filter.window.memory
+        """From the rows that are remembered, with errors of the model and noise as rows show it."""
+        memory, variance = self._filter.window.memory, self._filter.variance
         if self._estimated is None or self._estimated[0] is not memory:
-            self._estimated = memory, fit_memory(self.estimator, memory).estimate
+            fit = fit_memory(self.estimator, with_noise(memory, variance))
+            self._estimated = memory, fit.estimate
+            shown = variance * excess_noise(fit.misfit, fit.readings, len(self.estimator.names))
+            variance = float(np.clip(shown, 1.0, MOST_VARIANCE))
+            self._filter = replace(self._filter, variance=variance)
         return self._estimated[1]

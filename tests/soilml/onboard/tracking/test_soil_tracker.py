@@ -17,7 +17,7 @@ from soilml import Estimator, SoilTracker
 from soilml.errors import InputError
 from soilml.onboard.tracking import Event, soil_tracker
 from soilml.onboard.tracking.filter_state import FilterState, RowWindow
-from soilml.onboard.tracking.misfit import chi_squared_limit
+from soilml.onboard.tracking.misfit import CHANGE_QUANTILE, MOST_VARIANCE, chi_squared_limit
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +101,43 @@ def test_a_stuck_torque_is_told_and_sound_rows_are_used_again(settled, wheel_pos
     assert {state.event for state in driven(settled, rows[10:])} == {Event.ACCEPTED}
 
 
+def test_a_stuck_slip_is_told_where_slip_has_noise(estimator, wheel_posterior):
+    rows = rows_of(wheel_posterior, 60)
+    noisy, exact = SoilTracker(estimator.on(noise={"slip": (0.02, 0.0)})), SoilTracker(estimator)
+    driven(noisy, rows[:40])
+    slip = rows[39]["slip"]
+    stuck = [noisy.read(**row | {"slip": slip}) for row in rows[40:55]]
+    assert {state.event for state in stuck[1:]} == {Event.STUCK}
+    assert "slip repeats" in stuck[-1].words
+    assert Event.STUCK not in {exact.read(**row | {"slip": slip}).event for row in rows[:9]}
+
+
+def test_noise_above_that_stated_widens_the_estimate_up_to_a_limit(estimator, wheel_posterior):
+    rng, rows = np.random.default_rng(0), rows_of(wheel_posterior, 60)
+    widths = {}
+    for times in (1.0, 1.6, 4.0):
+        tracker = SoilTracker(estimator)
+        more = 0.02 * np.sqrt(times**2 - 1.0) * rng.standard_normal(len(rows))
+        noisy = [
+            row | {"torque": row["torque"] * (1.0 + part)}
+            for row, part in zip(rows, more, strict=True)
+        ]
+        states = driven(tracker, noisy)
+        widths[times] = states[-1].estimate.std, tracker._filter.variance
+        if times < 2.0:
+            used = [s for s in states[20:] if s.event is Event.ACCEPTED]
+            assert len(used) > 35 and all(bool(s.estimate.in_range) for s in used)
+    assert widths[1.0][1] < 1.3 < widths[1.6][1] < MOST_VARIANCE
+    assert (widths[1.6][0] > widths[1.0][0]).all()
+    assert widths[4.0][1] == MOST_VARIANCE
+
+
+def test_a_small_change_is_found_soon_and_its_first_rows_are_kept(settled, wheel_posterior):
+    states = driven(settled, rows_of(wheel_posterior, 20, seed=3, x=(0.2, -0.05, 0.1)))
+    found = next(i for i, s in enumerate(states) if s.event in (Event.DRIFT, Event.SOIL_CHANGED))
+    assert states[found].rows_remembered <= found + 3
+
+
 def test_the_same_row_again_counts_once(settled, wheel_posterior):
     row = rows_of(wheel_posterior, 1, seed=5)[0]
     count = settled.read(**row).rows_remembered
@@ -180,6 +217,8 @@ def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator)
         ("format", np.inf),
         ("repeated", np.ma.array([1], mask=[1])),
         ("system", np.full(arrays["system"].shape, 1e300)),
+        ("variance", np.asarray(np.nan)),
+        ("added", np.zeros(99)),
         ("counts", np.full(arrays["counts"].shape, -np.inf)),
     ):
         with pytest.raises(InputError, match="this state of a tracker is damaged"):
@@ -240,14 +279,14 @@ def test_drift_is_a_misfit_of_all_rows_above_that_of_their_parts(
 ):
     """Three unknowns, and one degree more for errors that the parts share."""
     tracker = SoilTracker(estimator)
-    start = tracker.estimator.start()
-    window = RowWindow((start,) * 4, start, 4)
+    start = replace(tracker.estimator.start(), counts=np.ones(3, np.float32))
+    window = RowWindow((start,) * 4, start, 64)
     tracker._filter = FilterState(window, rows_since_change=16)
     part = SimpleNamespace(misfit=10.0, readings=13.0, memory=start)
     monkeypatch.setattr(soil_tracker, "fit_memory", lambda *_: part)
     monkeypatch.setattr(SoilTracker, "_answer", lambda self, event, words: event)
     # 26 readings less six unknowns explain a misfit of 20: no excess noise
-    misfit = 20.0 + factor * chi_squared_limit(4.0)
+    misfit = 20.0 + factor * chi_squared_limit(4.0, CHANGE_QUANTILE)
     tracker._fit = SimpleNamespace(misfit=misfit, readings=26.0)
     assert tracker._look_for_drift() == event
     assert (tracker._filter.window.blocks == window.blocks) == (event == Event.ACCEPTED)

@@ -10,7 +10,9 @@ from scipy.stats import chi2, norm
 from soilml.onboard.memory import Memory
 from soilml.onboard.tracking.filter_state import (
     BLOCKS,
+    LEAST_ROWS,
     MOST_ROWS,
+    RECENT_ROWS,
     RepeatedReadings,
     RowsInQuestion,
     RowWindow,
@@ -101,6 +103,17 @@ def test_a_window_forgets_whole_blocks_and_keeps_the_likelihood_of_the_others():
     half = np.asarray(kept[-window.since(4).memory.rows :])
     system = window.since(4).memory.system
     assert system.T @ system == pytest.approx(half.T @ half, rel=1e-4, abs=1e-3)
+
+
+def test_another_soil_is_suspected_where_rows_began_to_add_more():
+    start = Memory(np.zeros((0, 3), np.float32), np.zeros(3, np.float32))
+    window = RowWindow.empty(start, 100)
+    for i in range(60):
+        system = np.concatenate([window.memory.system, np.ones((1, 3))])
+        window = window.with_rows(Memory(system, window.memory.counts + 1.0), 5.0 * (i >= 53))
+    assert len(window.added) == RECENT_ROWS and window.memory.rows == 60
+    assert window.since(window.suspect(1.0)).memory.rows == 7
+    assert window.with_another_soil().suspect(1.0) == len(window.blocks) - LEAST_ROWS
 
 
 def test_the_tracker_needs_numpy_and_onnxruntime_only():
