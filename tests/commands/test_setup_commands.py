@@ -13,7 +13,26 @@ SIZE = ["--radius", "0.1", "--width", "0.1"]
 
 
 @pytest.mark.parametrize("soil", [[], ["--soil", "wong1989/dry_sand"]])
-@pytest.mark.parametrize("rover", [[], ["--mass", "12", "--wheels", "6"]])
+@pytest.mark.parametrize(
+    "rover",
+    [
+        [],
+        [
+            *[
+                "--mass",
+                "12",
+                "--wheels",
+                "6",
+                "--wheelbase",
+                "0.8",
+                "--track",
+                "0.6",
+                "--height",
+                "0.3",
+            ]
+        ],
+    ],
+)
 def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
     file = tmp_path / "model.toml"
     words = ["init", str(file), "--radius", "0.1", "--width", "0.08", *soil, *rover]
@@ -41,6 +60,7 @@ def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
         ),
         (["--radius", "0.1", "--width", "0.1", "--torque-noise", "2 per cent"], "torque_Nm"),
         (["--radius", "0.1", "--width", "0.1", "--mass", "5", "--wheels", "3"], "an even number"),
+        (["--radius", "0.1", "--width", "0.1", "--mass", "5"], "--wheelbase is missing; needed is"),
     ],
 )
 def test_what_is_wrong_is_told_and_nothing_is_written(tmp_path, capsys, words, said):
@@ -127,8 +147,13 @@ def test_a_misspelt_name_is_answered_with_the_nearest(capsys, words, said):
 
 def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["init", "a.toml", "--radius", "150 mm", "--width", "12 cm", "--mass", "8 kg"]) == 0
-    assert main(["init", "b.toml", "--radius", "0.15", "--width", "0.12", "--mass", "8"]) == 0
+    names = ("--radius", "--width", "--mass", "--wheelbase", "--track", "--height")
+    for file, sizes in {
+        "a.toml": ("150 mm", "12 cm", "8 kg", "60 cm", "500 mm", "0.2 m"),
+        "b.toml": ("0.15", "0.12", "8", "0.6", "0.5", "0.2"),
+    }.items():
+        words = [word for pair in zip(names, sizes, strict=True) for word in pair]
+        assert main(["init", file, *words]) == 0
     assert (tmp_path / "a.toml").read_text() == (tmp_path / "b.toml").read_text()
     assert main(["init", "c.toml", "--radius", "15 inch", "--width", "0.1"]) == 2
     said = capsys.readouterr().err
@@ -136,3 +161,9 @@ def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
         "--radius is '15 inch'; needed is a number in m, or a text with one of the units m" in said
     )
     assert not (tmp_path / "c.toml").exists()
+
+
+def test_a_soil_shows_the_ranges_that_its_paper_prints(capsys):
+    assert main(["soils", "scott1970/apollo12"]) == 0
+    said = capsys.readouterr().out
+    assert "published, 35 to 39" in said and "published, 0.35 to 0.7" in said

@@ -17,11 +17,13 @@ of the sensors, and the other sections as comments.
 
   soilml init MODEL.toml                       asks a few questions on a terminal
   soilml init MODEL.toml --radius 0.15 --width 0.12 --soil wong1989/dry_sand
-  soilml init MODEL.toml --radius 0.1 --width 0.08 --mass 12 --wheels 4
+  soilml init MODEL.toml --radius 0.1 --width 0.08 --mass 12 --wheels 4 \\
+      --wheelbase 0.4 --track 0.35 --height 0.18
 
 Without --soil the bearing of the soil is unknown too, and has a prior. With
---mass the file describes a rover on --wheels wheels, whose positions are to be
-corrected. An existing file is not replaced.
+--mass the file describes a rover on --wheels wheels in two rows, over its
+wheelbase and track, with the centre of mass above their middle at --height. An
+existing file is not replaced.
 """
 #: The question for each option that is asked for, and the default answer.
 QUESTIONS = {
@@ -30,8 +32,12 @@ QUESTIONS = {
     "soil": ("soil whose bearing is known, such as wong1989/dry_sand; blank if unknown", ""),
     "torque_noise": ("standard deviation of torque, such as 2 % or 2 % + 0.05 (N m)", "2 %"),
 }
-#: Rows of wheels along a rover whose positions are not known, over its length of 1 m.
-LENGTH, TRACK, HEIGHT = 1.0, 0.8, 0.35
+#: Lengths that a rover has, and what each is.
+LENGTHS = {
+    "wheelbase": "distance of the first axle from the last",
+    "track": "distance of the left wheels from the right ones",
+    "height": "height of the centre of mass above the ground",
+}
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,6 +57,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--mass", metavar="KG", help="mass of a rover in kg")
     parser.add_argument("--wheels", type=int, metavar="N", help="its number of wheels (default: 4)")
+    for name, text in LENGTHS.items():
+        parser.add_argument(f"--{name}", metavar="M", help=f"its {text}, in m or such as '40 cm'")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -70,8 +78,8 @@ def run(args: argparse.Namespace) -> int:
         if given[key] is None:
             raise InputError(f"--{key} is missing; needed is the {QUESTIONS[key][0]}")
     sizes = {key: _size(key, str(given[key])) for key in ("radius", "width")}
-    mass = None if args.mass is None else _size("mass", args.mass)
-    text = _text(given | sizes, mass, args.wheels)
+    rover = None if args.mass is None else _rover(args)
+    text = _text(given | sizes, rover)
     _check(text)
     save_text(file, text)
     print(f"{file} written. Next: soilml identify {file} RUNS.csv")
@@ -109,7 +117,7 @@ def _check(text: str) -> None:
             raise InputError(str(error).replace(f"{trial} ", "").replace(str(trial), "")) from None
 
 
-def _text(given: dict[str, str | float | None], mass: float | None, wheels: int | None) -> str:
+def _text(given: dict[str, str | float | None], rover: str | None) -> str:
     """The model file."""
     from soilml.physics.soils import soil_catalogue
 
@@ -129,8 +137,8 @@ def _text(given: dict[str, str | float | None], mass: float | None, wheels: int 
         f"torque_Nm = {written}\n"
         '# drawbar_pull_N = "2 % + 0.5"\n# sinkage_m = 0.001\n# slip = 0.01\n# load_N = "1 %"',
     ]
-    if mass is not None:
-        parts.append(_rover(mass, 4 if wheels is None else wheels))
+    if rover is not None:
+        parts.append(rover)
     parts.append(
         "# [discrepancy] # typical error of the model, beyond the noise\n"
         '# torque_Nm = "2 %"\n\n'
@@ -159,17 +167,23 @@ def _soil(name: str | None) -> str:
     )
 
 
-def _rover(mass: float, wheels: int) -> str:
+def _rover(args: argparse.Namespace) -> str:
+    """The tables of the rover, of which no length is assumed."""
+    mass, wheels = _size("mass", args.mass), 4 if args.wheels is None else args.wheels
     if wheels < 2 or wheels % 2:
         raise InputError(f"--wheels is {wheels}; needed is an even number, 2 or more")
+    missing = [name for name in LENGTHS if getattr(args, name) is None]
+    if missing:
+        raise InputError(f"--{missing[0]} is missing; needed is the {LENGTHS[missing[0]]} in m")
+    length, track, height = (_size(name, getattr(args, name)) for name in LENGTHS)
     rows = wheels // 2
     lines = [
         f"[rover]\nmass = {mass} # kg",
-        f"centre_of_mass = [0.0, 0.0, {HEIGHT}] # m: forward, to the left, above the ground",
-        'gravity = "earth"\n\n[rover.wheels] # correct the positions, m: forward, to the left',
+        f"centre_of_mass = [0.0, 0.0, {height}] # m: forward, to the left, above the ground",
+        'gravity = "earth"\n\n[rover.wheels] # position in m: forward, to the left',
     ]
     for row in range(rows):
-        x = 0.0 if rows == 1 else LENGTH * (0.5 - row / (rows - 1))
-        for side, y in (("left", 0.5 * TRACK), ("right", -0.5 * TRACK)):
+        x = 0.0 if rows == 1 else length * (0.5 - row / (rows - 1))
+        for side, y in (("left", 0.5 * track), ("right", -0.5 * track)):
             lines.append(f"row{row + 1}-{side} = {{ position = [{x:g}, {y:g}] }}")
     return "\n".join(lines)

@@ -78,7 +78,7 @@ def _one(entry: SoilEntry) -> str:
     from soilml.io.text_tables import format_table
     from soilml.parameters import declared
     from soilml.physics.soils import Soil
-    from soilml.report.terminal import shown_unit
+    from soilml.report.terminal import shown_unit, significant
 
     rows = []
     for name, parameter in declared(Soil).items():
@@ -87,7 +87,10 @@ def _one(entry: SoilEntry) -> str:
             note = "default"
         if entry.published.get(name, 0.0) < 0.0 == getattr(entry.soil, name):
             note = f"published as {entry.published[name]:g}: models use 0"
-        unit = shown_unit(parameter.unit, float(getattr(entry.soil, name)))[1]
+        factor, unit = shown_unit(parameter.unit, float(getattr(entry.soil, name)))
+        if name in entry.spread:
+            low, high = (significant(factor * end) for end in entry.spread[name])
+            note = f"published, {low} to {high}"
         rows.append((name, parameter.text, note, _text(entry, name), unit))
     table = format_table(("field", "what", "from", "value", "unit"), rows, text_columns=3)
     return f"{entry.name}: {entry.text}\n{entry.source}\n\n{table}"
@@ -98,4 +101,10 @@ def _as_json(entry: SoilEntry) -> dict[str, object]:
     from soilml.physics.soils import Soil
 
     values = {name: getattr(entry.soil, name) for name in declared(Soil)}
-    return {"text": entry.text, "source": entry.source, "assumed": entry.assumed, "values": values}
+    return {
+        "text": entry.text,
+        "source": entry.source,
+        "assumed": entry.assumed,
+        "values": values,
+        "ranges": entry.spread,
+    }
