@@ -17,7 +17,7 @@ from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_within_prior
 from soilml.quantities import Z_90
 from training.available_memory import available_memory
-from training.calibration.held_out import carry_errors
+from training.calibration.held_out import carry_errors, measure_held_out
 from training.calibration.recalibration import (
     CalibratedRegressor,
     Metrics,
@@ -38,6 +38,7 @@ from training.calibration.row_pooling import (
 from training.calibration.training_domain import TrainingDomain
 from training.dataset import Dataset, DataSplit, split_by_run
 from training.ensemble import fuse_members
+from training.few_rows import LeftOut, fit_few_rows
 from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
@@ -80,6 +81,8 @@ class TrainedModel:
     set_posterior: SetPosteriorGraph | None = None
     #: its metrics by number of rows
     set_figures: dict[int, SetFigures] = field(default_factory=dict)
+    #: of a campaign of few rows: estimates of all rows by fits that have not seen their runs
+    left_out: LeftOut | None = None
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Mean, standard deviation (n, q) and in-range flag (n,), as in the exported file.
@@ -103,7 +106,8 @@ def train(
 
     The calibration rows are cut in three by run. On the first part the members are recalibrated and
     the correlation of their errors is measured; on the second the fused estimate is recalibrated;
-    on the third all metrics are measured.
+    on the third all metrics are measured. Where they are too few for that, each row is judged by a
+    fit to the other runs instead (`training.few_rows`).
 
     spec: From `read_spec`; its regressors are fitted in place.
     data: From `read_dataset`, with the features and targets of the spec.
@@ -113,8 +117,7 @@ def train(
     -------
     TrainedModel
 
-    Raises `InputError` for too few rows to calibrate intervals on, and where a regressor does not
-    converge.
+    Raises `InputError` where a regressor does not converge, or needs more memory than is free.
 
     Examples
     --------
@@ -126,12 +129,12 @@ def train(
     array([0.943, 0.881, 0.688])
     """
     parts = split_by_run(data, spec.seed)
-    targets = parts.train.targets
-    prior = PriorSummary(targets.mean(axis=0), targets.std(axis=0), data.lower, data.upper)
     first, second, third = _split_in_three(parts.calibration.limit_rows_per_run(), spec.seed)
     scored = np.isin(parts.calibration.run, third.run)
     calibration = parts.calibration.rows(~scored)
-    _check_enough(data, calibration)
+    if len(row_groups(calibration.runs(), 1)) < LEAST_GROUPS:
+        return _train_on_few_rows(spec, data, progress)
+    prior = _prior(parts.train)
     labels = [_label(regressor, parts) for regressor in spec.regressors]
     members = []
     for regressor, label in zip(spec.regressors, labels, strict=True):
@@ -191,15 +194,57 @@ def _train_set_posterior(
     return posterior, validate_posterior(posterior, progress)
 
 
-def _check_enough(data: Dataset, calibration: Dataset) -> None:
-    """Raise `InputError` where intervals would be calibrated on too few rows."""
-    groups = len(row_groups(calibration.runs(), 1))
-    if groups < LEAST_GROUPS:
-        needed = int(1.1 * len(data) * LEAST_GROUPS / max(groups, 1)) + 1
-        raise InputError(
-            f"{len(data)} rows leave {groups} to calibrate the intervals on; needed are "
-            f"{LEAST_GROUPS}: generate about {needed} rows of such runs, or more"
-        )
+def _train_on_few_rows(spec: Spec, data: Dataset, progress: Progress) -> TrainedModel:
+    """The same where too few rows remain to calibrate on: all are learned from, and left out."""
+    parts, prior = DataSplit(data, data, data), _prior(data)
+    for regressor in spec.regressors:
+        _label(regressor, parts)  # refuses what does not fit into memory
+    estimator, members, left = fit_few_rows(
+        spec.regressors, spec.rule, data, prior, spec.seed, progress
+    )
+    *_, last = left
+    conditions, domain = (
+        run_conditions(data),
+        TrainingDomain.of(data.features, spec.features, spec.seed, few=True),
+    )
+    alone = spec.per_row or spec.set_posterior is not None
+    covariance = covariance_matrices(last.std, estimator.correlation)
+    calibrate = calibrate_single_rows if alone else calibrate_pooling
+    pooling = replace(
+        calibrate(last.mean, covariance, data, prior, conditions),
+        single_row_coverage_factor=last.factor,
+    )
+    if spec.per_row:
+        clipped = np.clip(last.mean, prior.lower, prior.upper)
+        answers = (clipped, last.std, np.ones(len(data), bool))
+        single = replace(data, run=np.arange(len(data)))  # few rows: all are carried
+        held_out = measure_held_out(lambda features: answers, single, conditions, last.factor)
+        pooling = replace(pooling, held_out=held_out)
+    names = [*(regressor.name for regressor in spec.regressors), "estimator"]
+    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
+    return TrainedModel(
+        spec=spec,
+        estimator=estimator,
+        domain=domain,
+        pooling=pooling,
+        prior=prior,
+        data=data,
+        parts=parts,
+        scores={
+            name: compute_metrics(data.targets, part.mean, part.std, prior.std)
+            for name, part in zip(names, [*left, last], strict=False)
+        },
+        pooled_scores={},
+        members=tuple(members),
+        set_posterior=set_posterior,
+        set_figures=set_figures,
+        left_out=last,
+    )
+
+
+def _prior(data: Dataset) -> PriorSummary:
+    """Mean and spread of the targets in the training rows, within the range of the recipe."""
+    return PriorSummary(data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper)
 
 
 def _label(regressor: FeatureSubset, parts: DataSplit) -> str:

@@ -11,10 +11,14 @@ import numpy as np
 from soilml.onboard.fusion_rules import best_linear
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.set_contract import Floats
+from soilml.quantities import Z_90
 
 #: Fewest held-out rows that two files must have in common, and fewest averages of repeated ones.
-LEAST_COMMON_ROWS, LEAST_AVERAGES = 200, 100
+LEAST_COMMON_ROWS, LEAST_AVERAGES = 12, 100
 BINS = 6  # Intervals are calibrated by the fused mean, in so many bins of equal numbers of rows
+#: With fewer common rows there are fewer bins, of so many rows or more; no gain is fitted, and the
+#: interval is widened for a scale that is known from few rows.
+MANY_ROWS, LEAST_ROWS_OF_BIN = 200, 40
 #: Estimates that differ by more than this many standard deviations of their difference widen the
 #: fused one in proportion: Birge's ratio, from which it would start at 1.
 DISAGREEMENT = 2.0
@@ -158,14 +162,17 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
     )
     ratio = np.ones(len(mean))
     away = plain.fuse(mean, std, ratio)[0] - centre
-    together = replace(plain, gain=float(away @ (truth - centre) / (away @ away)))
+    few = len(truth) < MANY_ROWS
+    gain = 1.0 if few else float(away @ (truth - centre) / (away @ away))
+    together = replace(plain, gain=gain)
     candidates = [together, *(replace(plain, alone=i) for i in range(len(mean)))]
     error = [np.mean((c.fuse(mean, std, ratio)[0] - truth) ** 2) for c in candidates]
     best = candidates[int(np.argmin(error))]
     fused, spread, _ = best.fuse(mean, std, ratio)
     scale = float(np.sqrt(np.mean(((truth - fused) / spread) ** 2)))
     residual = (truth - fused) / (scale * spread)
-    pieces = np.array_split(np.argsort(fused, kind="stable"), BINS)
+    bins = max(min(BINS, len(truth) // LEAST_ROWS_OF_BIN), 1) if few else BINS
+    pieces = np.array_split(np.argsort(fused, kind="stable"), bins)
     rule = replace(
         best,
         std_scale=scale,
@@ -175,6 +182,8 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
     )
     # an interval that contains its mean, and is interpolated between bins, covers more than 90 %
     factor = _reach(rule, truth, fused, scale * spread)
+    if few:  # Student's 95 % quantile over the Gaussian one, to first order
+        factor *= 1.0 + (Z_90**2 + 1.0) / (4.0 * (len(truth) - len(mean)))
     return replace(rule, low=factor * rule.low, high=factor * rule.high)
 
 

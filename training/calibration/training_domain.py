@@ -34,10 +34,13 @@ class ConditionalBounds:
     upper: Floats
 
     @staticmethod
-    def of(features: Floats, column: int, conditions: tuple[int, ...]) -> ConditionalBounds:
+    def of(
+        features: Floats, column: int, conditions: tuple[int, ...], slack: float = 0.0
+    ) -> ConditionalBounds:
         """The bounds at a knot are the extremes of all rows up to the adjacent knots, and a margin.
 
-        With few rows the number of knots is reduced in proportion along both conditions.
+        With few rows the number of knots is reduced in proportion along both conditions, and
+        `slack` is added to the margin.
         """
         knots_allowed = len(features) / LEAST_ROWS / np.prod(MOST_KNOTS)
         share = min(1.0, knots_allowed ** (1.0 / len(MOST_KNOTS)))
@@ -58,7 +61,7 @@ class ConditionalBounds:
             np.maximum.at(upper, at, values)
         empty = ~np.isfinite(lower)
         lower[empty], upper[empty] = values.min(), values.max()
-        margin = BOUNDS_MARGIN * (upper - lower)
+        margin = (BOUNDS_MARGIN + slack) * (upper - lower)
         conditions = conditions[: len(knots)]
         return ConditionalBounds(column, conditions, knots, lower - margin, upper + margin)
 
@@ -115,6 +118,7 @@ def _add_interpolation(graph: Graph, weights: list[str], bound: Floats) -> str:
 #: Number of balls, and of the rows that their centres are selected from: more cost time and bytes.
 CENTRES = 128
 CANDIDATES = 6000
+FEW = 1500  # Rows that gaps between rows are measured on, where few of them are independent
 CHUNK = 4096  # Rows whose distances to the centres are computed at a time
 #: Margin of box and balls, as a share of their size: rows do not reach the very ends of the range.
 MARGIN = 0.005
@@ -136,10 +140,14 @@ class TrainingDomain:
     bounds: tuple[ConditionalBounds, ...]
 
     @staticmethod
-    def of(features: Floats, names: Sequence[str], seed: int = 0) -> TrainingDomain:
+    def of(
+        features: Floats, names: Sequence[str], seed: int = 0, few: bool = False
+    ) -> TrainingDomain:
         """The domain of features (n, d) with these names.
 
         Ball centres are selected as farthest points; the radius is the least that covers all rows.
+        With `few` rows, extremes and distances of further rows are larger: each end of a range is
+        moved by two expected gaps between rows, and balls reach from any row to its nearest one.
         """
         conditions = tuple(
             i
@@ -161,13 +169,19 @@ class TrainingDomain:
             float(np.sqrt(_nearest_squared(z[i : i + CHUNK], centres).max()))
             for i in range(0, len(z), CHUNK)
         )
+        slack = 2.0 / (len(z) + 1.0) if few else 0.0
+        if few:
+            radius = max(radius, _largest_gap(candidates[:FEW]))
+        margin = (MARGIN + slack) * np.ptp(features, axis=0)
         return TrainingDomain(
-            lower=features.min(axis=0) - MARGIN * np.ptp(features, axis=0),
-            upper=features.max(axis=0) + MARGIN * np.ptp(features, axis=0),
+            lower=features.min(axis=0) - margin,
+            upper=features.max(axis=0) + margin,
             scaling=scaling,
             centres=centres,
             radius=radius * (1.0 + MARGIN),
-            bounds=tuple(ConditionalBounds.of(features, k, conditions) for k in sorted(measured)),
+            bounds=tuple(
+                ConditionalBounds.of(features, k, conditions, slack) for k in sorted(measured)
+            ),
         )
 
     def contains(self, features: Floats) -> NDArray[np.bool_]:
@@ -192,6 +206,14 @@ class TrainingDomain:
         for bounds in self.bounds:
             out = graph.op("Or", out, bounds.add_outside(graph, features))
         return graph.op("Not", out)
+
+
+def _largest_gap(z: Floats) -> float:
+    """Largest distance of a row of z (n, d) to the nearest different one, times 1.5."""
+    squared = ((z[:, None, :] - z[None, :, :]) ** 2).sum(axis=2)
+    squared[squared == 0.0] = np.inf  # a row itself, and the same readings again
+    nearest = squared.min(axis=1)
+    return float(np.sqrt(nearest.max(where=np.isfinite(nearest), initial=0.0))) * 1.5
 
 
 def _nearest_squared(z: Floats, centres: Floats) -> Floats:

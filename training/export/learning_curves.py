@@ -30,7 +30,10 @@ def plot_learning_curves(trained: TrainedModel, path: str | os.PathLike[str]) ->
     count = 1 + len(searched) + len(by_epochs)
     figure = Figure(figsize=(4.2 * count, 3.6), layout="constrained")
     axes = figure.subplots(1, count, squeeze=False)[0]
-    _plot_rows(axes[0], trained, regressors)
+    if trained.left_out is None:
+        _plot_rows(axes[0], trained, regressors)
+    else:
+        _plot_left_out(axes[0], trained)
     for axis, regressor in zip(axes[1:], searched, strict=False):
         _plot_search(axis, regressor)
     for axis, regressor in zip(axes[1 + len(searched) :], by_epochs, strict=True):
@@ -64,6 +67,30 @@ def _plot_rows(axis: Any, trained: TrainedModel, regressors: list[FeatureSubset]
     axis.set(xscale="log", xlabel="rows learned from", ylabel="RMSE / prior std, mean over outputs")
     count = len(trained.parts.validation)
     axis.set_title(f"error on {count} rows not learned from", fontsize=9)
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+
+
+def _plot_left_out(axis: Any, trained: TrainedModel) -> None:
+    """Estimates of a campaign of few rows by fits without their runs, against true values."""
+    left = trained.left_out
+    assert left is not None
+    lower, width = trained.prior.lower, trained.prior.upper - trained.prior.lower
+    mean = np.clip(left.mean, lower, trained.prior.upper)
+    for k, name in enumerate(trained.spec.targets):
+        axis.errorbar(
+            (trained.data.targets[:, k] - lower[k]) / width[k],
+            (mean[:, k] - lower[k]) / width[k],
+            left.factor[k] * left.std[:, k] / width[k],
+            fmt="o",
+            ms=3,
+            lw=0.6,
+            alpha=0.7,
+            label=name.replace("_", " "),
+        )
+    axis.plot([0.0, 1.0], [0.0, 1.0], "k:", lw=0.8)
+    axis.set(xlabel="true value, share of the prior's range", ylabel="estimate, same share")
+    axis.set_title(f"{len(mean)} rows, each left out; bars: 90 % intervals", fontsize=9)
     axis.legend(fontsize=8)
     axis.grid(alpha=0.3)
 

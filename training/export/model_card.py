@@ -31,6 +31,24 @@ REPEATED = (
     "of the model on this soil is common to them and does not average out. On runs that were not "
     "used for training or calibration."
 )
+MEASURED = (
+    "On {rows} rows that were not used for training or calibration. Error is RMSE / prior std; "
+    "-log p is the mean negative log density of the value over the prior std (prior alone: 1.42 as "
+    "a Gaussian); 90 % is the coverage of the 90 % interval."
+)
+LEFT_OUT = (
+    "A campaign of few rows: all {rows} rows were learned from. Each is judged by a fit without "
+    "its run, of which there are {runs}. Error is RMSE / prior std; -log p is the mean negative "
+    "log density of the value over the prior std (prior alone: 1.42 as a Gaussian). The intervals "
+    "are "
+    "calibrated on these same errors: the coverage of a Gaussian interval, 90 %, does not test "
+    "them. Rows of one run share a part of their error; together they are worth {freedom:.0f} "
+    "independent ones."
+)
+ONE_RUN = (
+    "All rows are of one run: the intervals are valid for readings of this run's soil, and nothing "
+    "is known of others."
+)
 HELD_OUT = (
     "The file carries its errors on {rows} held-out rows and {runs} averages of repeated readings: "
     "fused with another file that was trained from the same data, it is weighed by the correlation "
@@ -57,22 +75,28 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         *_validity(trained, metadata),
         "## Figures",
         "",
-        f"On {trained.scores['estimator'].rows} rows that were not used for training or "
-        "calibration. Error is RMSE / prior std; -log p is the mean negative log density of the "
-        "value over the prior std (prior alone: 1.42 as a Gaussian); 90 % is the coverage of the "
-        "90 % interval.",
+        *_judged_on(trained),
         "",
         *_metrics_table(trained.scores, targets),
         "",
     ]
     if trained.set_posterior is not None:
         lines += [SET_POSTERIOR, "", *table_of(trained.set_figures, targets)]
-    elif not trained.spec.per_row:
+    elif not trained.spec.per_row and trained.pooled_scores:
         lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]
     elif trained.pooling.held_out is not None:
         lines += _repeats(trained.pooling.held_out, trained.repeat_scores, targets)
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
+
+
+def _judged_on(trained: TrainedModel) -> list[str]:
+    """What the figures were measured on."""
+    rows, left = trained.scores["estimator"].rows, trained.left_out
+    if left is None:
+        return [MEASURED.format(rows=rows)]
+    text = LEFT_OUT.format(rows=rows, runs=left.runs, freedom=left.freedom.min() + 1.0)
+    return [text] if left.runs > 1 else [text, "", ONE_RUN]
 
 
 def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
@@ -118,10 +142,15 @@ def _validity(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
 
 
 def _provenance(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
-    parts = trained.parts
+    parts, dropped = trained.parts, trained.data.dropped
+    rows = (
+        f"{len(parts.train)} for training, {len(parts.validation)} for validation, "
+        f"{len(parts.calibration)} for calibration and metrics; {dropped} dropped"
+    )
+    if trained.left_out is not None:
+        rows = f"{len(trained.data)}, all for training; {dropped} dropped"
     return [
-        f"- rows: {len(parts.train)} for training, {len(parts.validation)} for validation, "
-        f"{len(parts.calibration)} for calibration and metrics; {trained.data.dropped} dropped",
+        f"- rows: {rows}",
         f"- training recipe sha256 `{metadata['recipe_sha256']}`",
         f"- data sha256 `{metadata['data_sha256']}`",
         f"- spec: `{metadata['spec']}`",

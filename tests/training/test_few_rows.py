@@ -1,0 +1,111 @@
+"""Campaigns of few rows: all rows are learned from, and each is judged by a fit without its run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Estimator
+from soilml.onboard.multi_sensor import fuse_estimates
+from training.dataset import read_dataset
+from training.export.model_card import model_card
+from training.export.model_file import export_model
+from training.few_rows import folds
+from training.spec import read_spec
+from training.train import train
+
+
+def strides(path, soils, rows, seed, soil_std=0.05):
+    """A campaign: slip is linear in torque over load and in vibration, with a shift of each soil."""
+    rng = np.random.default_rng(seed)
+    run = np.repeat(np.arange(soils), rows)
+    slip = rng.uniform(0.0, 0.6, soils * rows)
+    load = rng.uniform(15.0, 35.0, soils * rows)
+    shift = np.repeat(rng.normal(0.0, soil_std, soils), rows)
+    torque = load * (0.05 + 0.1 * (slip + shift + rng.normal(0.0, 0.04, slip.size)))
+    vibration = 1.0 + 10.0 * (slip + rng.normal(0.0, 0.05, slip.size))
+    columns = {
+        "run": run, "slip": slip, "load_N": load, "torque_Nm": torque, "vibration_m_s2": vibration,
+    }  # fmt: skip
+    values = np.stack(list(columns.values()), axis=1)
+    np.savetxt(path, values, delimiter=",", header=",".join(columns), comments="", fmt="%.9g")
+    return path
+
+
+def trained_on(path, name="slip_torque"):
+    spec = read_spec(name)
+    return train(spec, read_dataset(path, spec.features, spec.targets))
+
+
+def test_folds_leave_out_whole_runs_and_rows_of_a_single_run(tmp_path):
+    spec = read_spec("slip_torque")
+    four = read_dataset(strides(tmp_path / "a.csv", 4, 6, 0), spec.features, spec.targets)
+    parts = folds(four, 0)
+    assert len(parts) == 4
+    assert all(len(np.unique(four.run[out])) == 1 and out.sum() == 6 for out in parts)
+    one = read_dataset(strides(tmp_path / "b.csv", 1, 30, 0), spec.features, spec.targets)
+    parts = folds(one, 0)
+    assert len(parts) == 20 and np.sum(parts, axis=0).tolist() == [1] * 30
+
+
+@pytest.mark.parametrize(("soils", "rows"), [(20, 1), (60, 1), (4, 15)])
+def test_intervals_of_few_rows_hold_for_other_soils(tmp_path, soils, rows):
+    """The mean coverage over campaigns is near 90 %; that of the fit's own residuals is not."""
+    test = read_dataset(strides(tmp_path / "t.csv", 400, 1, 99), *features_of("slip_torque"))
+    held = []
+    for seed in range(24):
+        trained = trained_on(strides(tmp_path / "c.csv", soils, rows, seed))
+        mean, std, inside = trained.predict(test.features)
+        near = np.abs(test.targets - mean) <= trained.pooling.single_row_coverage_factor * std
+        held.append(near[inside].mean())
+        assert inside.mean() > 0.7
+    assert 0.85 <= np.mean(held) <= 0.95
+
+
+def features_of(name):
+    spec = read_spec(name)
+    return spec.features, spec.targets
+
+
+def test_rows_of_one_soil_count_for_less_where_they_share_their_error(tmp_path):
+    alike = trained_on(strides(tmp_path / "a.csv", 5, 12, 1, soil_std=0.1)).left_out
+    free = trained_on(strides(tmp_path / "b.csv", 5, 12, 1, soil_std=0.0)).left_out
+    assert 1.0 <= alike.freedom[0] < 15.0 < 40.0 < free.freedom[0] <= 60.0
+    assert alike.factor[0] * alike.std[0, 0] > 1.5 * free.factor[0] * free.std[0, 0]
+
+
+def test_files_of_few_rows_are_exported_and_fused_by_their_correlation(tmp_path):
+    path = strides(tmp_path / "a.csv", 4, 15, 7)
+    files = []
+    for name in ("slip_torque", "slip_vibration"):
+        trained = trained_on(path, name)
+        metadata = export_model(trained, tmp_path / f"{name}.onnx", path)
+        card = model_card(trained, metadata, name)
+        assert "campaign of few rows" in card and "all for training" in card
+        files.append(Estimator.load(tmp_path / f"{name}.onnx"))
+    assert [len(f.pooling.held_out.rows) for f in files] == [60, 60]
+    readings = files[0](torque=2.1, load=25.0), files[1](vibration=4.0, load=25.0)
+    fused = fuse_estimates(readings)
+    assert fused.rule == "correlated" and fused.used.all()
+    assert fused.estimate.std[0] < min(e.std[0] for e in readings)
+
+
+def test_a_campaign_on_one_soil_is_named_on_the_card(tmp_path):
+    path = strides(tmp_path / "a.csv", 1, 20, 3)
+    trained = trained_on(path)
+    metadata = export_model(trained, tmp_path / "m.onnx", path)
+    assert "All rows are of one run" in model_card(trained, metadata, "m")
+    many = replace(trained, left_out=replace(trained.left_out, runs=4))
+    assert "All rows are of one run" not in model_card(many, metadata, "m")
+
+
+def test_soil_from_few_runs_keeps_its_own_targets(small_data):
+    """Targets with one value for a run: whole runs are left out, and several rows are not pooled."""
+    spec = read_spec("linear")
+    data = read_dataset(small_data, spec.features, spec.targets)
+    some = data.rows(np.flatnonzero(np.isin(data.run, np.unique(data.run)[:30])))
+    trained = train(spec, some)
+    assert trained.left_out is not None and trained.left_out.runs == 30
+    assert (trained.left_out.freedom >= 1.0).all() and not trained.pooled_scores
