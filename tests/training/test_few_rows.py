@@ -18,7 +18,7 @@ from training.train import train
 
 
 def strides(path, soils, rows, seed, soil_std=0.05):
-    """A campaign: slip is linear in torque over load and in vibration, with a shift of each soil."""
+    """A campaign: slip is linear in torque over load and in vibration, shifted by soil."""
     rng = np.random.default_rng(seed)
     run = np.repeat(np.arange(soils), rows)
     slip = rng.uniform(0.0, 0.6, soils * rows)
@@ -102,7 +102,7 @@ def test_a_campaign_on_one_soil_is_named_on_the_card(tmp_path):
 
 
 def test_soil_from_few_runs_keeps_its_own_targets(small_data):
-    """Targets with one value for a run: whole runs are left out, and several rows are not pooled."""
+    """Targets with one value for a run: whole runs are left out, and rows are not pooled."""
     spec = read_spec("linear")
     data = read_dataset(small_data, spec.features, spec.targets)
     some = data.rows(np.flatnonzero(np.isin(data.run, np.unique(data.run)[:30])))

@@ -1,8 +1,5 @@
 """Training: split, calibration, specs, cards and plots."""
 
-import re
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -14,7 +11,6 @@ from training.dataset import read_dataset, split_by_run
 from training.ensemble import fuse_members
 from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec
-from training.train import train
 
 FEATURES = ("slip", "torque/load", "load")
 TARGETS = ("cohesion", "friction_angle", "shear_modulus")
