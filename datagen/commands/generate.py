@@ -122,6 +122,7 @@ def run(args: argparse.Namespace) -> int:
     from datagen.generate import generate, generate_folder
     from datagen.recipe import read_recipe
     from soilml.cli.options import available_effects
+    from soilml.cli.output import tell
     from soilml.cli.progress import progress_bar
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.physics.computing_device import computing_on
@@ -149,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
         print(f"{what} is in the rows: its mean, and one draw of its error a run", file=sys.stderr)
     note = f", {result.failed} without equilibrium" if result.failed else ""
     kept = f", {result.kept} of them there before" if result.kept else ""
-    print(f"{result.rows} rows{note} written to {args.out}{kept}", file=sys.stderr)
+    tell(f"{result.rows} rows{note} written to {args.out}{kept}")
     return 0
 
 

@@ -16,6 +16,7 @@ from soilml.cli.options import declared_outputs, input_files
 from soilml.cli.process import (
     StopSignals,
     Terminated,
+    check_memory_limit,
     fail,
     reserve_standard_descriptors,
     silence_stdout,
@@ -203,6 +204,7 @@ def _status(words: list[str]) -> int:
     args = parser(words[0] if words else "").parse_args(words)
     args.command_line, args.make_parser = words, parser
     check_outputs(args.outputs(args), input_files(args))
+    check_memory_limit()
     status = int(args.run(args) or 0)
     if sys.stdout is not None:
         sys.stdout.flush()

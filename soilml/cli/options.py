@@ -235,8 +235,14 @@ def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
 
     if args.effects is None:
         return dict(EFFECTS)
+    from soilml.io.toml_settings import read_settings
     from soilml.physics.user_effects import load_effects
 
+    for file in input_files(args):  # a file that is executed runs for no command that is refused
+        if file != args.effects and not Path(file).exists():
+            raise InputError(f"{file}: there is no such file")
+    if getattr(args, "model", None) is not None:
+        read_settings(args.model)
     return {**EFFECTS, **load_effects(args.effects)}
 
 

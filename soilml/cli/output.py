@@ -42,7 +42,7 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
     """Say how many rows were written to `out`; without one, print them as table or CSV."""
     if out is not None:
         count = len(next(iter(columns.values())))
-        print(f"{count} row{'' if count == 1 else 's'} written to {out}", file=sys.stderr)
+        tell(f"{count} row{'' if count == 1 else 's'} written to {out}")
         return
     for text in [f"{format_columns(columns)}\n"] if is_terminal() else csv_blocks(columns):
         write_stdout(text)

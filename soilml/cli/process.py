@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from typing import Any, NoReturn
 
 
+#: Address space that the numerical libraries reserve, bytes: at all, and for each core.
+_LEAST_MEMORY, _MEMORY_PER_CORE = 512 << 20, 48 << 20
+
+
 class Terminated(SystemExit):
     """A signal asked the process to stop; the exit status is 128 and the signal's number."""
 
@@ -112,3 +116,23 @@ def silence_stdout() -> None:
 
     with suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def check_memory_limit() -> None:
+    """Raise `InputError` where a limit of the process leaves the numerical libraries too little.
+
+    They ask for memory again and again where they get none, deaf to every signal.
+    """
+    try:
+        import resource
+    except ImportError:  # not on every system
+        return
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    needed = _LEAST_MEMORY + _MEMORY_PER_CORE * (os.cpu_count() or 1)
+    if limit != resource.RLIM_INFINITY and limit < needed:
+        from soilml.errors import InputError
+
+        raise InputError(
+            f"this process may use {limit >> 20} MB of memory; needed are {needed >> 20} MB: "
+            "raise the limit (ulimit -v)"
+        )

@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from soilml.errors import TableError
 from soilml.io.cell_text import cell_as_text, is_number, read_numbers
-from soilml.io.table import TEXT, Column, text_column
+from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
 
-#: Rows that a table may have: more do not fit into the memory of a usual machine.
-MOST_ROWS = 10_000_000
 BLOCK = 8192  # Rows whose cells are held as text at a time
 _LINE = 1_000_000  # Characters of a line; a longer one is not of a table
 #: Characters of a cell that a message shows.

@@ -5,14 +5,14 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from soilml.errors import MissingLibraryError, TableError
-from soilml.io.table import TEXT, Column, text_column
+from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
 
 
 def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
@@ -31,6 +31,7 @@ def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
     if not files:
         raise TableError(f"{path} is a folder without a Parquet file")
+    _check_rows(path, files)
     tables = [_read_file(file) for file in files]
     first = _metadata(tables[0])
     for file, table in zip(files, tables, strict=True):
@@ -70,8 +71,18 @@ def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
     return dict(zip(arrow.column_names, arrow.columns, strict=True))
 
 
-def _read_file(file: Path) -> Any:
-    """The content of one file as an Arrow table."""
+def _check_rows(path: Path, files: Sequence[Path]) -> None:
+    """Raise `TableError` for more than `MOST_ROWS` rows, before any of them is read.
+
+    A column that repeats one value takes hardly any room in a file, and all of it in memory.
+    """
+    rows = sum(_opened(file, lambda opened: int(opened.metadata.num_rows)) for file in files)
+    if rows > MOST_ROWS:
+        raise TableError(f"{path} has more than {MOST_ROWS} rows; split it, or thin it")
+
+
+def _opened(file: Path, read: Callable[[Any], Any]) -> Any:
+    """What a function reads of an opened file; raises `TableError` for a damaged one."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -79,10 +90,15 @@ def _read_file(file: Path) -> Any:
         # threads of Arrow that read from an object of Python abort the process where it ends first
         try:
             with pa.OSFile(os.fsencode(file)) as opened:
-                arrow = pq.ParquetFile(opened, page_checksum_verification=True).read()
+                return read(pq.ParquetFile(opened, page_checksum_verification=True))
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise TableError(f"{file} is not a complete Parquet file: {first}") from None
+
+
+def _read_file(file: Path) -> Any:
+    """The content of one file as an Arrow table."""
+    arrow = _opened(file, lambda opened: opened.read())
     names = arrow.column_names
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)

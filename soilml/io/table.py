@@ -17,6 +17,8 @@ Column = NDArray[Any]
 
 #: Columns that hold text; all others hold numbers, NaN where a cell is blank.
 TEXT = ("run", "status", "source", "wheel", "gear", "test")
+#: Rows that a table may have: more do not fit into the memory of a usual machine.
+MOST_ROWS = 10_000_000
 MOST_TEXT = 256  # Characters of a text; every row of a column takes the memory of the longest
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ from soilml.optional_imports import tomllib
 
 #: Tables and lists in one another that a settings file may have; none needs more than six.
 MOST_DEPTH = 20
+#: A part of a key, bare or in quotes, or another character.
+_TOKEN = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'|.""")
 #: Characters of a settings file; those of the project have some thousand.
 MOST_CHARACTERS = 4_000_000
 
@@ -110,6 +113,7 @@ def read_settings(path: str | os.PathLike[str], write: str = "") -> Settings:
                 f"{file} has more than {MOST_CHARACTERS / 1e6:.0f} million characters; needed are "
                 "settings in TOML"
             )
+        _check_keys(text, str(file))
         content = tomllib.loads(text)
         _check_depth(content, str(file))
         _check_whole_numbers(content, str(file))
@@ -129,6 +133,28 @@ def read_settings(path: str | os.PathLike[str], write: str = "") -> Settings:
     except RecursionError:
         raise InputError(f"{file} is not valid TOML: tables or lists are nested too deep") from None
     return Settings(content, str(file), file.parent)
+
+
+def _check_keys(text: str, where: str) -> None:
+    """Raise `InputError` for a dotted key of more than `MOST_DEPTH` parts.
+
+    Before the text is parsed: time and memory of the parser grow with the square of the parts.
+    """
+    for line in text.splitlines():
+        if line.count(".") < MOST_DEPTH:
+            continue
+        parts, after_dot = 0, False
+        for token in _TOKEN.findall(line):
+            if token in (" ", "\t"):
+                continue
+            if token in ("=", "]") and parts > MOST_DEPTH:
+                raise InputError(f"{where} is not valid: a key has more than {MOST_DEPTH} parts")
+            if token == ".":
+                after_dot = parts > 0
+                continue
+            is_part = len(token) > 1 or token.isalnum() or token in "-_"
+            parts = (parts + 1 if after_dot else 1) if is_part else 0
+            after_dot = False
 
 
 def _check_depth(content: Any, where: str) -> None:

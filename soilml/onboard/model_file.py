@@ -41,6 +41,8 @@ _INSIDE: dict[str, dict[int, str]] = {
 }
 #: Fields external_data and data_location of a tensor.
 _EXTERNAL, _LOCATION = 13, 14
+#: Fields graph and metadata_props of a model.
+_GRAPH, _METADATA = 7, 14
 _VARINT, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
 FORMAT = "3"  # Version of the file format: names of inputs and outputs, keys of the metadata
 #: Largest model file, bytes. Those that `soilml train` writes have some MB at most.
@@ -82,7 +84,7 @@ def find_model(path: str | os.PathLike[str]) -> Path:
 
 
 def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
-    """Open a model file and verify its checksums.
+    """Verify the checksums of a model file and open it: the runtime sees no damaged one.
 
     Returns: The session, on the CPU with one thread, and all metadata of the file.
     Raises `ModelFileError` for a file that cannot be read, was not written by `soilml train`, has
@@ -90,7 +92,7 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     """
     file = find_model(path)
     content = _read_content(file)
-    session, metadata = _create_session(file, content)
+    metadata = _read_metadata(file, content)
     if "soilml_format" not in metadata:
         raise ModelFileError(
             f"{file} is an ONNX model without soilml metadata; needed is one that soilml train "
@@ -114,7 +116,7 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         )
     if not _is_intact(content, metadata):
         raise ModelFileError(f"{file} is damaged: its checksum does not match; copy it again")
-    return session, metadata
+    return _create_session(file, content), metadata
 
 
 def metadata_checksum(metadata: Mapping[str, str]) -> str:
@@ -126,11 +128,11 @@ def metadata_checksum(metadata: Mapping[str, str]) -> str:
 def serialise_metadata(metadata: Mapping[str, str]) -> bytes:
     """The metadata as the bytes that follow the graph in the file.
 
-    Entries of field 14 (`metadata_props`) of the protobuf message ModelProto, sorted by key.
+    Entries of `metadata_props` of the protobuf message ModelProto, sorted by key.
     """
     content = b""
     for key, value in sorted(metadata.items()):
-        content += _field(14, _field(1, key.encode()) + _field(2, value.encode()))
+        content += _field(_METADATA, _field(1, key.encode()) + _field(2, value.encode()))
     return content
 
 
@@ -179,10 +181,28 @@ def _read_content(file: Path) -> bytes:
     )
 
 
-def _create_session(file: Path, content: bytes) -> tuple[Session, dict[str, str]]:
+def _read_metadata(file: Path, content: bytes) -> dict[str, str]:
+    """The metadata of an ONNX file (field 14 of its message), without the runtime."""
+    found: dict[str, str] = {}
+    has_graph = False
     try:
-        session = create_session(content)
-        return session, dict(session.get_modelmeta().custom_metadata_map)
+        for number, value in _fields(memoryview(content)):
+            has_graph |= number == _GRAPH
+            if number == _METADATA and not isinstance(value, int):
+                entry = {
+                    key: bytes(text) for key, text in _fields(value) if not isinstance(text, int)
+                }
+                found[entry.get(1, b"").decode()] = entry.get(2, b"").decode()
+    except ValueError as error:
+        raise ModelFileError(f"{file} is not a valid ONNX model: {error}") from None
+    if not has_graph:
+        raise ModelFileError(f"{file} is not a valid ONNX model: it has no graph")
+    return found
+
+
+def _create_session(file: Path, content: bytes) -> Session:
+    try:
+        return create_session(content)
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise ModelFileError(f"{file} is not a valid ONNX model: {first[:160]}") from None

@@ -30,9 +30,9 @@ REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; s
 def application(folder: Path, port: int) -> tuple[Application, Jobs]:
     """The application, whose files stand in `folder`, and its jobs."""
     uploads, jobs = Uploads(folder / "files"), Jobs(folder / "jobs")
-    shared = {"uploads": uploads, "jobs": jobs}
     # one thread: questions to the model are answered in order, and signals are not delayed
     pool = ThreadPoolExecutor(1)
+    shared = {"uploads": uploads, "jobs": jobs, "pool": pool}
     routes: list[Any] = [(r"/api/choices", Choices)]
     for name, function in (("controls", controls), ("forward", forward), ("model", model_text)):
         routes.append((rf"/api/{name}", Question, {"function": function, "pool": pool}))
@@ -133,12 +133,16 @@ class Files(GuardedHandler):
 
     def data_received(self, chunk: bytes) -> None:
         """Write a piece."""
-        assert self.opened is not None
+        assert self.opened is not None and self.upload is not None
+        if not self.uploads.has_come_on(self.upload):
+            raise RefusedError(408, "the file came too slowly, and was dropped: send it again")
         self.opened.write(chunk)
 
     def put(self) -> None:
         """All pieces are there."""
         assert self.upload is not None and self.opened is not None
+        if not self.uploads.has_come_on(self.upload):
+            raise RefusedError(408, "the file came too slowly, and was dropped: send it again")
         self.opened.close()
         whole, self.upload = self.uploads.add(self.upload), None
         self.answer(whole.as_json())
@@ -159,9 +163,9 @@ class Files(GuardedHandler):
 class StartJob(GuardedHandler):
     """Starts a job."""
 
-    def initialize(self, uploads: Uploads, jobs: Jobs) -> None:
+    def initialize(self, uploads: Uploads, jobs: Jobs, pool: ThreadPoolExecutor) -> None:
         """Take the stores."""
-        self.uploads, self.jobs = uploads, jobs
+        self.uploads, self.jobs, self.pool = uploads, jobs, pool
 
     async def post(self) -> None:
         """Start it on the files that the request names."""
@@ -175,7 +179,10 @@ class StartJob(GuardedHandler):
         if kind in ("estimate", "gap"):
             chosen = request.get("model") or {}
             check_parts(chosen)
-            request["model"] = model_text(chosen)["text"]
+            # in the other thread: a model file takes long to read, and others must not wait
+            loop = asyncio.get_running_loop()
+            found = await loop.run_in_executor(self.pool, model_text, chosen)
+            request["model"] = found["text"]
         job = await self.jobs.start(kind, request | {"names": [f.name for f in files]}, files)
         self.answer(job.as_json())
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -189,10 +188,9 @@ def _write(
 
 
 def _say_where(folder: Path, names: Sequence[str]) -> None:
-    print(
-        f"\nmore columns are in {names[0]} and {names[2]}; written: {folder}/{', '.join(names)}",
-        file=sys.stderr,
-    )
+    from soilml.cli.output import tell
+
+    tell(f"\nmore columns are in {names[0]} and {names[2]}; written: {folder}/{', '.join(names)}")
 
 
 def _released_files() -> list[Path]:
@@ -209,6 +207,7 @@ def _released_files() -> list[Path]:
 
 def _compute_limit(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
+    from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
     from soilml.quantities import SHEAR
     from training.benchmark.bayes_limit import benchmark_sets, compute_posteriors
@@ -223,7 +222,7 @@ def _compute_limit(args: argparse.Namespace) -> int:
     with stage_progress() as progress:
         summaries = list(compute_posteriors(sets, progress))
     save_limit(args.limit, sets, summaries)
-    print(f"written: {args.limit}, the Bayes limit of {len(sets)} sets", file=sys.stderr)
+    tell(f"written: {args.limit}, the Bayes limit of {len(sets)} sets")
     return 0
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import re
-import sys
 from pathlib import Path
 
 from soilml.cli.options import InputFile, whole_number_from
@@ -61,6 +60,7 @@ def check_c_name(file: Path) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Translate a model file."""
+    from soilml.cli.output import tell
     from soilml.optional_imports import need
 
     need("onnx", "export-c")
@@ -79,9 +79,8 @@ def run(args: argparse.Namespace) -> int:
         source.write_text(written.source, encoding="utf-8")
         header.write_text(written.header, encoding="utf-8")
     of_set = f"memory of a set {written.memory_bytes}, " if written.memory_bytes else ""
-    print(
+    tell(
         f"written: {out} ({len(written.source) / 1e3:.0f} kB), {out.with_suffix('.h')}; bytes of "
-        f"constants {written.constant_bytes}, {of_set}working memory {written.work_bytes}",
-        file=sys.stderr,
+        f"constants {written.constant_bytes}, {of_set}working memory {written.work_bytes}"
     )
     return 0

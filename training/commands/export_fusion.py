@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from soilml.cli.options import InputFile
@@ -44,6 +43,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Write the fusion of the files."""
+    from soilml.cli.output import tell
     from soilml.optional_imports import need
 
     need("jinja2", "export-fusion")
@@ -59,5 +59,5 @@ def run(args: argparse.Namespace) -> int:
     with atomic_outputs(outputs(args)) as written:
         for file, text in zip(written, texts, strict=True):
             file.write_text(text, encoding="utf-8")
-    print(f"written: {out}, {out.with_suffix('.h')}", file=sys.stderr)
+    tell(f"written: {out}, {out.with_suffix('.h')}")
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 
 from soilml.cli.options import InputFile, add_output, whole_number_from
 
@@ -36,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Write the graph."""
+    from soilml.cli.output import tell
     from soilml.optional_imports import need
 
     need("onnx", "export-step")
@@ -54,9 +54,8 @@ def run(args: argparse.Namespace) -> int:
     origin = {"soilml_kind": ONE_STEP, "step_of_graph_sha256": metadata["graph_sha256"]}
     write_model(graph, own | kept | origin, args.out)
     memory = next(v for v in graph.graph.input if v.name == "memory").type.tensor_type.shape.dim
-    print(
+    tell(
         f"written: {args.out}; {args.rows} rows a step, memory {memory[0].dim_value} x "
-        f"{memory[1].dim_value}, {len(graph.graph.node)} nodes",
-        file=sys.stderr,
+        f"{memory[1].dim_value}, {len(graph.graph.node)} nodes"
     )
     return 0

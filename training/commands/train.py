@@ -90,6 +90,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _any_wheel(args: argparse.Namespace) -> int:
     """Train the file for wheels of any size."""
+    from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
     from training.export.any_wheel_file import any_wheel_card, export_any_wheel
     from training.spec import read_any_wheel_spec
@@ -106,7 +107,7 @@ def _any_wheel(args: argparse.Namespace) -> int:
                 any_wheel_card(metadata, posterior.family.inputs(), figures), encoding="utf-8"
             )
     size = out.stat().st_size / 1e3
-    print(f"\nwritten: {out} ({size:.0f} kB), {out.with_suffix('.md')}", file=sys.stderr)
+    tell(f"\nwritten: {out} ({size:.0f} kB), {out.with_suffix('.md')}")
     return 0
 
 

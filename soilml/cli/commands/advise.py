@@ -118,16 +118,16 @@ def run(args: argparse.Namespace) -> int:
         need("matplotlib", "advise --picture")
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
+    table = None if args.runs is None else read_rows(args, RUNS)
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     free = select_free(case, parse_names(args.free))
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()
         for option, text in (("--slips", args.slips), ("--loads", args.loads))
     )
-    if args.runs is None:
+    if table is None:
         ranges, at = candidate_grid(slips, loads), None
     else:
-        table = read_rows(args, RUNS)
         print_table_hints(table, case)
         readings = usable_readings(case, table)
         case = _with_noise_of_rows(case, readings)

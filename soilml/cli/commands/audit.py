@@ -66,9 +66,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap.presentation import audit_text
     from soilml.report.page import json_text
 
+    design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
     effects = available_effects(args)
     case = read_case(args.model, effects)
-    design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
     with working(f"auditing {len(design)} rows"):
         found = audit(
             case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)

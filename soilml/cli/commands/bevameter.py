@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -78,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit the tests, print the result and write the files."""
     from soilml.cli.options import available_effects
-    from soilml.cli.output import show
+    from soilml.cli.output import show, tell
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
@@ -88,8 +87,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.picture is not None:
         need("matplotlib", "bevameter --picture")
-    case = None if args.model is None else read_case(args.model, available_effects(args))
     plates, shear = _tables(args)
+    case = None if args.model is None else read_case(args.model, available_effects(args))
     with working("fitting the tests"):
         result = bevameter(plates, shear, case)
     if args.picture is not None:
@@ -101,9 +100,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
         save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))
         if case is None and (missing := missing_values(result)):
-            print(
-                f"{args.out} lacks {', '.join(missing)}: add them, or give --model", file=sys.stderr
-            )
+            tell(f"{args.out} lacks {', '.join(missing)}: add them, or give --model")
     show(_text(result))
     return 0
 

@@ -103,9 +103,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap import gap
     from soilml.gap.presentation import gap_files, gap_text
 
+    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     effects = available_effects(args)
     case = read_case(args.model, effects, with_bias=True)
-    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(

@@ -97,8 +97,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.identification import identify
     from soilml.identification.presentation import Identification, identify_report
 
-    case = read_case(args.model, available_effects(args), with_bias=True)
     table = read_rows(args, RUNS)
+    case = read_case(args.model, available_effects(args), with_bias=True)
     print_table_hints(table, case)
     free = parse_names(args.free)
 

@@ -68,6 +68,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Ask for what is missing on a terminal, and write the file."""
+    from soilml.cli.output import show
+
     file = Path(args.out)
     if file.exists():
         raise InputError(f"{file} exists; give another name, or remove it")
@@ -82,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     text = _text(given | sizes, rover)
     _check(text)
     save_text(file, text)
-    print(f"{file} written. Next: soilml identify {file} RUNS.csv")
+    show(f"{file} written. Next: soilml identify {file} RUNS.csv")
     return 0
 
 

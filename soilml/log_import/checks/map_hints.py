@@ -191,7 +191,7 @@ def _torque(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Ite
         return
     role = "torque" if "torque" in wheel.channels else "motor_current"
     traction = float(np.median(np.abs(torque[good]) / load[good])) / wheel.radius.value
-    cause = traction_cause(traction)
+    cause = traction_cause(traction, float(np.median(load[good])))
     if traction > MOST_TRACTION:
         ratio = wheel.channels[role].gear_ratio.value
         if ratio > 1.0 and 0.02 < traction / ratio < 1.0:

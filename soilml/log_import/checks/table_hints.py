@@ -22,11 +22,14 @@ from soilml.remarks import Remark
 LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 _SLIPS = 0.05  # Slip from which a driving wheel has a torque worth judging
 _USUAL_SINKAGE = (0.02, 0.7)  # Range of the usual sinkage over the radius
-#: Mistakes that make T / (W r) too large, by factor.
+_LEAST_LOAD = 1.0  # Load, N, below which no wheel is driven: it is then rather in kN
+#: Mistakes that make T / (W r) too large, by factor; by which one of thousand, the load tells.
+_MILLI = "the torque is in mN m and was taken as N m"
+_KILO = "the load is in kN and was taken as N"
 _TOO_LARGE = (
     (9.80665, "the load is in kg and was taken as N"),
     (100.0, "the torque is in N cm and was taken as N m"),
-    (1000.0, "the torque is in mN m and was taken as N m"),
+    (1000.0, _MILLI),
 )
 _TOO_SMALL = (
     (1000.0, "the torque is in kN m, or the radius in mm"),
@@ -65,8 +68,11 @@ def table_hints(columns: Mapping[str, Floats], radius: Floats | float | None) ->
     return found
 
 
-def traction_cause(traction: float) -> str:
-    """The likely cause of T / (W r) outside of its range; "" where it is inside."""
+def traction_cause(traction: float, load: float) -> str:
+    """The likely cause of T / (W r) outside of its range; "" where it is inside.
+
+    traction, load: In the middle of the rows; load in N.
+    """
     if LEAST_TRACTION <= traction <= MOST_TRACTION:
         return ""
     if traction > MOST_TRACTION:
@@ -76,6 +82,8 @@ def traction_cause(traction: float) -> str:
         options = [(traction * factor, text) for factor, text in _TOO_SMALL]
         other = "the torque lacks a gear ratio, or its sensor is dead"
     distance, text = min((abs(np.log(max(q, 1e-30) / USUAL_TRACTION)), text) for q, text in options)
+    if text == _MILLI and load < _LEAST_LOAD:
+        text = _KILO
     return text if distance < np.log(4.0) else other
 
 
@@ -118,7 +126,7 @@ def _traction(columns: Mapping[str, Floats], radius: Floats | float | None) -> I
         return
     traction = np.abs(columns["torque_Nm"][judged]) / load[judged]
     middle = float(np.median(traction))
-    if cause := traction_cause(middle):
+    if cause := traction_cause(middle, float(np.median(columns["load_N"][judged]))):
         yield Remark(
             "traction-out-of-range",
             f"torque is {middle:.3g} times W r in the middle of the rows: probably {cause}",

@@ -157,3 +157,16 @@ def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, caps
 def rows_of_torque():
     slip = np.linspace(0.05, 0.6, 12)
     return slip, torque_law(slip)
+
+
+@pytest.mark.parametrize(("load", "torque", "cause"), [
+    (0.06, 3.0, "the load is in kN"), (60.0, 3000.0, "the torque is in mN m"),
+])  # fmt: skip
+def test_the_load_tells_which_of_two_units_is_a_thousand_times_off(load, torque, cause):
+    columns = {
+        "slip": np.array([0.1, 0.3, 0.5]),
+        "load_N": np.full(3, load),
+        "torque_Nm": torque * np.array([0.5, 1.0, 1.2]),
+    }
+    (hint,) = table_hints(columns, 0.15)
+    assert hint.code == "traction-out-of-range" and cause in hint.text

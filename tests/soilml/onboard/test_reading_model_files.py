@@ -143,3 +143,12 @@ def test_a_file_of_a_later_interface_is_refused(small_model, tmp_path, interface
             Estimator.load(tmp_path / "m.onnx")
     else:
         assert Estimator.load(tmp_path / "m.onnx").metadata["soilml_interface"] == interface
+
+
+def test_the_runtime_does_not_see_a_damaged_file(tmp_path, monkeypatch):
+    content = bytearray(WHEEL.read_bytes())
+    content[200] ^= 1
+    (tmp_path / "damaged.onnx").write_bytes(content)
+    monkeypatch.setattr(model_file, "create_session", lambda content: pytest.fail("it was opened"))
+    with pytest.raises(ModelFileError, match="its checksum does not match"):
+        model_file.open_model(tmp_path / "damaged.onnx")

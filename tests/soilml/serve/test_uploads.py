@@ -8,7 +8,7 @@ import pytest
 from served_page import page as page
 
 from soilml.errors import InputError
-from soilml.serve.uploads import LARGEST_FILE, LARGEST_SUM, Uploads
+from soilml.serve.uploads import LARGEST_FILE, LARGEST_SUM, STALLED_AFTER, Uploads
 
 COUNT = LARGEST_SUM // LARGEST_FILE
 
@@ -55,3 +55,18 @@ def test_the_page_takes_no_more_at_a_time_than_in_all(page):
 
 def test_a_long_name_in_any_script_is_taken(page):
     assert page.put("%E6%BC%A2" * 120 + ".csv", b"run,slip\n")
+
+
+def test_uploads_that_have_stalled_make_room(tmp_path):
+    now = [0.0]
+    uploads = Uploads(tmp_path, clock=lambda: now[0])
+    stalled, alive, *_ = [uploads.place("a.csv", LARGEST_FILE) for _ in range(COUNT)]
+    now[0] = STALLED_AFTER + 1.0
+    assert uploads.has_come_on(alive)
+    kept = uploads.place("b.csv", LARGEST_FILE)
+    assert not stalled.path.parent.exists() and not uploads.has_come_on(stalled)
+    assert uploads.has_come_on(alive) and uploads.has_come_on(kept)
+    uploads.place("c.csv", LARGEST_FILE)
+    uploads.place("d.csv", LARGEST_FILE)
+    with pytest.raises(InputError, match="1024 MB together"):
+        uploads.place("e.csv", LARGEST_FILE)  # none of these has stalled
