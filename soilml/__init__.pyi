@@ -29,6 +29,7 @@ from soilml.physics.operating_point import Operating as Operating
 from soilml.physics.soils import Soil as Soil
 from soilml.physics.soils import soil as soil
 from soilml.physics.soils import soil_catalogue as soil_catalogue
+from soilml.rover_design import design as design
 from soilml.row_status import Status as Status
 from training.adaptation import adapt as adapt
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from soilml.io.text_tables import format_table
+from soilml.io.text_tables import WIDTH, format_table
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import shown_unit, significant
@@ -21,7 +21,7 @@ FEWEST = 0.5  # Share of worlds that climb below which nothing is said of slip a
 MOST_ROWS = 10  # Most designs of the front in a table
 #: Results in the table of designs: column, heading on a terminal and on a page, factor.
 _COLUMNS = (
-    ("probability", "goal_met_%", "goal met, %", 100.0),
+    ("probability", "goal_%", "goal met, %", 100.0),
     ("margin_at_risk_N", "at_risk_N", "margin at risk, N", 1.0),
     ("margin_N", "margin_N", "margin, N", 1.0),
     ("margin_N_p05", "p05", "5 %", 1.0),
@@ -37,12 +37,10 @@ _WHERE_CLIMBED = ("slip", "energy_J_per_m", "torque_Nm", "lugs_needed")
 
 def design_text(report: DesignReport) -> str:
     """The verdict in one line, tables of designs, of uncertainties and tests, and remarks."""
-    head = [axis_label(name).replace(", ", "_").replace(" ", "_") for name in _named(report)]
-    header = ("", *head, *(title for _, title, _, _ in _columns(report)))
-    parts = [verdict(report), format_table(header, list(_rows(report)), text_columns=1)]
+    parts = [verdict(report), _designs_table(report)]
     if report.by_soil:
         cells = [(one.name, *_soil_cells(one)) for one in report.by_soil]
-        parts.append(format_table(("best on", "goal_met_%", "margin_N", "p05", "p95"), cells))
+        parts.append(format_table(("best on", "goal_%", "margin_N", "p05", "p95"), cells))
     if report.shares:
         lines = [(one.text, f"{100.0 * one.share:.0f}") for one in report.shares]
         parts.append(format_table(("the margin depends on", "%"), lines))
@@ -55,6 +53,21 @@ def design_text(report: DesignReport) -> str:
         parts.append(format_table(header, tests, last_left=True))
     parts.append("\n".join(f"! {remark}" for remark in report.remarks))
     return "\n\n".join(parts)
+
+
+def _designs_table(report: DesignReport) -> str:
+    """The table of designs; last columns that do not fit on a line are left out, and named."""
+    head = [axis_label(name).replace(", ", "_").replace(" ", "_") for name in _named(report)]
+    header = ["", *head, *(title for _, title, _, _ in _columns(report))]
+    rows = [list(row) for row in _rows(report)]
+    widths = [max(len(row[i]) for row in [header, *rows]) + 2 for i in range(len(header))]
+    shown = len(header)
+    while sum(widths[:shown]) - 2 > WIDTH:
+        shown -= 1
+    table = format_table(header[:shown], [row[:shown] for row in rows], text_columns=1)
+    if shown == len(header):
+        return table
+    return f"{table}\nnot shown here, but with --out: {', '.join(header[shown:])}"
 
 
 def verdict(report: DesignReport) -> str:

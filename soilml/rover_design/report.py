@@ -37,7 +37,7 @@ from soilml.rover_design.uncertainty import (
     possible_tests,
     variance_shares,
 )
-from soilml.rover_design.worlds import DrawnWorlds, draw_worlds
+from soilml.rover_design.worlds import DrawnWorlds, draw_worlds, soil_of_rows
 
 WORLDS = 1000  # Draws of soil and model error under which designs are compared
 SLICE = 144  # Designs of the contours through the best one
@@ -157,10 +157,11 @@ def design_report(
     optimise: Whether to search between the designs of the sweep.
     progress: Given a stage, the number of designs done and that of all.
 
-    Raises `InputError` where a wheel leaves the ground on the slope, and as `draw_worlds`.
+    Raises `InputError` where a wheel leaves the ground on the slope, and as `soil_of_rows`.
     """
     stage = _stages(progress)
-    worlds = draw_worlds(study.soil, draws, study.goal.slip_limit)
+    rows = soil_of_rows(study.soil)
+    worlds = draw_worlds(study.soil, draws, study.goal.slip_limit, rows=rows)
     found = swept(study, worlds, designs, stage("designs", designs))
     searched = any(study.dimensions[name].searched for name in study.varied)
     if optimise and searched and found.count > 1:
@@ -168,7 +169,7 @@ def design_report(
         found = optimised(study, worlds, found, more)
     best = best_design(study, found)
     dimensions = {name: float(values[best]) for name, values in found.dimensions.items()}
-    own = draw_worlds(study.soil, DRAWS, study.goal.slip_limit, seed=1)
+    own = draw_worlds(study.soil, DRAWS, study.goal.slip_limit, seed=1, rows=rows)
     outcome = evaluate(study, {k: np.asarray([v]) for k, v in dimensions.items()}, own)
     results = {name: float(values[0]) for name, values in summary(study, outcome).items()}
     enough = results["probability"] >= 1.0 - study.goal.risk

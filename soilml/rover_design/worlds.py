@@ -29,7 +29,7 @@ from soilml.physics.model import Model
 from soilml.physics.soils import Soil
 from soilml.remarks import Remark
 from soilml.rover_design.study import SoilQuestion
-from soilml.traction.soil_draws import measured_soil, prior_draws
+from soilml.traction.soil_draws import MeasuredSoil, measured_soil, prior_draws
 
 #: Range of lambda, the share of a lug's height by which the soil shears further out (Ding et al.
 #: 2011).
@@ -108,7 +108,11 @@ class DrawnWorlds:
 
 
 def draw_worlds(
-    question: SoilQuestion, count: int, slip_limit: float, seed: int = 0
+    question: SoilQuestion,
+    count: int,
+    slip_limit: float,
+    seed: int = 0,
+    rows: RowsSoil | None = None,
 ) -> DrawnWorlds:
     r"""Draws of the soil and of the model's errors, before any test of the design.
 
@@ -120,11 +124,10 @@ def draw_worlds(
     question: The soils.
     count: Number of draws, n.
     slip_limit: Highest slip at which errors are asked for.
-
-    Raises `InputError` and `FitError` as the posterior of the rows does.
+    rows: What `soil_of_rows` gives for the question.
     """
     rng = np.random.default_rng(seed)
-    soil, kind, kinds, free, remarks = _soils(question, count, rng)
+    soil, kind, kinds, free, remarks = _soils(question, count, rng, rows)
     names = [n for n in USUAL_MODEL_ERRORS if n not in without_errors(free, (), [_WHEEL])]
     scale, effect, size = _hypotheses(count, rng)
     normal = _stratified_normal(count, len(names), rng)
@@ -146,11 +149,11 @@ def _unit_columns(lengths: tuple[float, float], slip: Floats, load: Floats) -> F
 
 
 def _soils(
-    question: SoilQuestion, count: int, rng: np.random.Generator
+    question: SoilQuestion, count: int, rng: np.random.Generator, rows: RowsSoil | None
 ) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
     """Parameters (n,), kinds (n,) and their names, parameters that vary, remarks."""
-    if question.rows is not None:
-        return _posterior(question, count, rng)
+    if rows is not None:
+        return _posterior(rows, question.files[-1], count, rng)
     own = {name: entry.soil for name, entry in question.entries.items()}
     if question.soil is not None:
         own = {"the soil of the file": question.soil}
@@ -162,14 +165,14 @@ def _soils(
         entry = question.entries.get(name)
         spread = {} if entry is None else {k: Prior(*ends) for k, ends in entry.spread.items()}
         prior = {**spread, **question.prior}
-        rows = np.flatnonzero(kind == number)
+        of_kind = np.flatnonzero(kind == number)
         for key in values:
-            values[key][rows] = getattr(base, key)
+            values[key][of_kind] = getattr(base, key)
         if prior:
             case = Case(Model(_WHEEL), base, prior=dict(prior), soil_tests=question.tests)
-            draws = prior_draws(select_free(case, None), rows.size, case)
+            draws = prior_draws(select_free(case, None), of_kind.size, case)
             for i, path in enumerate(draws.names):
-                values[path][rows] = draws.values[:, i]
+                values[path][of_kind] = draws.values[:, i]
         varied += prior.keys()
         missing = [] if entry is None else [k for k in entry.assumed if k not in prior]
         if missing:
@@ -182,22 +185,39 @@ def _soils(
     return values, kind, tuple(own), common, remarks
 
 
-def _posterior(
-    question: SoilQuestion, count: int, rng: np.random.Generator
-) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
-    """The same of the posterior of measured rows, averaged over explanations of them."""
-    assert question.rows is not None
+@dataclass(frozen=True)
+class RowsSoil:
+    """The posterior of measured rows, averaged over explanations of them, and its model file."""
+
+    case: Case
+    found: MeasuredSoil
+
+
+def soil_of_rows(question: SoilQuestion) -> RowsSoil | None:
+    """The posterior of the rows that a question names; None for one without rows.
+
+    Raises `InputError` for a model file of several gears, and as `identify`.
+    """
+    if question.rows is None:
+        return None
     model, runs = question.rows
     case = read_case(model, with_bias=True)
     if case.gears:
         raise InputError(f"{model} has several gears; needed is one with [gear]")
-    found = measured_soil(replace(case, rover=None), read_table(runs, RUNS))
-    index = rng.permutation(np.arange(count) % len(found.draws.values))
-    values = {name: np.full(count, float(getattr(case.soil, name))) for name in declared(Soil)}
-    varied = [name for name in found.draws.names if name in values]
-    for name in varied:
-        values[name] = found.draws.values[index, found.draws.names.index(name)]
-    return values, np.zeros(count, np.int64), (str(runs),), varied, list(found.warnings)
+    return RowsSoil(case, measured_soil(replace(case, rover=None), read_table(runs, RUNS)))
+
+
+def _posterior(
+    rows: RowsSoil, name: str, count: int, rng: np.random.Generator
+) -> tuple[dict[str, Floats], NDArray[np.int64], tuple[str, ...], list[str], list[Remark]]:
+    """Draws of a posterior: what `_soils` gives."""
+    draws, soil = rows.found.draws, rows.case.soil
+    index = rng.permutation(np.arange(count) % len(draws.values))
+    values = {key: np.full(count, float(getattr(soil, key))) for key in declared(Soil)}
+    varied = [key for key in draws.names if key in values]
+    for key in varied:
+        values[key] = draws.values[index, draws.names.index(key)]
+    return values, np.zeros(count, np.int64), (name,), varied, list(rows.found.warnings)
 
 
 def _hypotheses(count: int, rng: np.random.Generator) -> tuple[Floats, NDArray[np.str_], Floats]:

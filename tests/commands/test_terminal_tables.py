@@ -45,6 +45,7 @@ WORDS = {
     "estimate": [LINEAR, "runs.csv"],
     "advise": ["m.toml", "runs.csv"],
     "pull": ["m.toml", "runs.csv", "--load", "60", "--slip-limit", "0.3"],
+    "design": ["rover.toml", "--designs", "9", "--draws", "50", "--sweep-only"],
     "papers": ["comin2017-slip"],
 }
 #: Commands whose tables have tests of their own, or that print none.
@@ -87,6 +88,7 @@ def test_tables_are_narrow_rounded_and_in_usual_units(command, tmp_path, monkeyp
     (tmp_path / "m.toml").write_text(THREE_CHANNEL_MODEL)
     (tmp_path / "runs.csv").write_text(RUNS)
     (tmp_path / "plates.csv").write_text(PLATES)
+    (tmp_path / "rover.toml").write_text((ROOT / "examples/design/rover.toml").read_text())
     monkeypatch.chdir(tmp_path)
     # not a function of the package: a module that is imported meanwhile would keep what replaces it
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
