@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import os
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from soilml.io.table import TEXT, Column, Table, text_column
 from soilml.quantities import COLUMNS
 
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
+_OTHERS = {"drawbar_pull_N", "sinkage_m"}  # Measured quantities that need no torque beside them
 RUNS = ("run", "slip", "load_N", "torque_Nm")
 FILLED = ("run", "slip", "load_N")  # Columns in which every row must have a value
 Limits = tuple[float, float, str]  # Lower and upper bound, and what is needed in words
@@ -135,6 +137,10 @@ def check_table(
     `need`, `filled` and `limits` are those of `read_table`. Raises `TableError` for the first
     column that is missing, cell that is blank, or value outside its limits.
     """
+    if "torque_Nm" in need and "torque_Nm" not in table and _OTHERS & table.columns.keys():
+        # a table of pulls or sinkages alone: its torque was not measured
+        unmeasured = {"torque_Nm": np.full(len(table), np.nan)}
+        table = replace(table, columns={**table.columns, **unmeasured})
     for name in need:
         if name not in table:
             raise TableError(f"{file}: column {name} is missing;{_instead(name, table)}")
@@ -233,7 +239,7 @@ def _check_values(table: Table, filled: Sequence[str], limits: Mapping[str, Limi
 
 def _instead(name: str, table: Table) -> str:
     if name == "torque_Nm":
-        return " add it, with blank cells where torque was not measured"
+        return " needed is a torque, a drawbar_pull_N or a sinkage_m"
     if name == "run":
         return " add it, with one name for all rows that were measured together"
     return f" found: {', '.join(table.columns) or 'no column'}"

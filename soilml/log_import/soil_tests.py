@@ -39,7 +39,12 @@ _QUANTITIES: tuple[tuple[str, str, set[str]], ...] = (
     ("angle_rad", "rad", _RING),
 )
 #: Columns by which a table is one of tests, and not of the runs of a wheel.
-_OF_TESTS = ({"shear_stress_Pa"}, {"torque_Nm", "angle_rad"}, {"pressure_Pa"})
+_OF_TESTS = (
+    {"shear_stress_Pa"}, {"torque_Nm", "angle_rad"}, {"torque_Nm", "outer_radius_m"},
+    {"pressure_Pa"},
+)  # fmt: skip
+#: Words of stresses and torques beside those of the strength.
+_SECOND = {"pre", "preshear", "consolidation", "consol", "residual", "rest", "ultimate", "end"}
 _PLATES = {"plate_radius_m", "plate_diameter", "plate_width_m", "plate_area_m2"}
 _TEST = {"test", "run", "trial", "probe", "sample", "versuch", "specimen", "no", "id", "name"}
 
@@ -76,7 +81,10 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         return None
     found: dict[str, np.ndarray] = {}
     taken, left_out = [], []
-    for name, values in own.columns.items():
+    # of two stresses, the strength comes before the residual one, and the shearing before what
+    # consolidated the sample
+    ordered = sorted(own.columns.items(), key=lambda c: bool({*words_of(c[0])} & _SECOND))
+    for name, values in ordered:
         unit = own.units.get(name, "")
         unit = unit if dimension(unit) else unit_in_name(name)
         words = {*words_of(name)}

@@ -97,7 +97,7 @@ def test_bad_shear_tables_end_with_one_line(tables, capsys):
         assert main(["bevameter", "bad.csv"]) == 2
         assert said in capsys.readouterr().err
     assert main(["bevameter", "shear.csv", "shear.csv"]) == 2
-    assert "both shear tests" in capsys.readouterr().err
+    assert "given twice" in capsys.readouterr().err
     (tables / "runs.csv").write_text("test,slip\na,0.1\n")
     assert main(["bevameter", "runs.csv"]) == 2
     assert "no table of tests" in capsys.readouterr().err

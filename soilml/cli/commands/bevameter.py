@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
-from soilml.errors import InputError, MissingLibraryError, TableError
+from soilml.errors import InputError, MissingLibraryError, SoilmlError, TableError
 from soilml.io.atomic_files import save_text
 
 if TYPE_CHECKING:
     from soilml.identification.bevameter import BevameterResult
     from soilml.io.table import Table
+    from soilml.remarks import Remark
 
 HELP = "soil parameters from plate-sinkage and shear tests, without a wheel"
 DESCRIPTION = """\
@@ -26,15 +28,19 @@ far repeats differ, and where the laws do not fit.
   soilml bevameter PLATES.csv --model MODEL.toml --out SOIL.toml
   soilml bevameter SHEAR.csv --out SOIL.toml --picture tests.png
 
-Either table may be missing; their columns tell which is which.
+Either kind may be missing; their columns tell which is which. Several tables of
+a kind are taken together. A table that cannot be used is left out, with a line
+that says why, and the others are fitted.
 
 PLATES.csv has test, sinkage_m, pressure_Pa or load_N, and the plate:
 plate_radius_m, plate_area_m2 of a round plate, or plate_width_m and
 plate_length_m. SHEAR.csv has test, normal_stress_Pa, shear_displacement_m and
 shear_stress_Pa; for a ring inner_radius_m, outer_radius_m, angle_rad, torque_Nm,
 and load_N or normal_stress_Pa. A blank displacement or angle marks the steady
-end of a test. Rows with the same name in the column test are one test. Other
-names are taken where the header states units, such as z [mm] and p [kPa].
+end of a test. Without displacements or angles each row is the strength, or the
+largest torque, of a test, and K is not measured. Rows with the same name in the
+column test are one test otherwise. Other names are taken where the header
+states units, such as z [mm] and p [kPa].
 
 The unit is the test, not the sample: ranges follow from how tests scatter. The
 second range is where the value at another place of the soil would lie, and is
@@ -87,10 +93,11 @@ def run(args: argparse.Namespace) -> int:
 
     if args.picture is not None:
         need("matplotlib", "bevameter --picture")
-    plates, shear = _tables(args)
+    plates, shear, left = _tables(args)
     case = None if args.model is None else read_case(args.model, available_effects(args))
     with working("fitting the tests"):
         result = bevameter(plates, shear, case)
+    result = replace(result, remarks=(*left, *result.remarks))
     if args.picture is not None:
         from soilml.identification.bevameter.result import save_picture
 
@@ -128,26 +135,78 @@ def _table(path: str, ignore_extra: bool) -> Table:
     return check_table(found.table, Path(path), ("test",), ("test",), LIMITS)
 
 
-def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None]:
-    """The plate tests and the shear tests, distinguished by their columns."""
-    found: dict[str, Table] = {}
+def _tables(args: argparse.Namespace) -> tuple[Table | None, Table | None, list[Remark]]:
+    """The plate tests, the shear tests, and remarks on tables that are left out.
+
+    Raises the error of the first table where none can be used.
+    """
+    from soilml.identification.bevameter.plate_tests import read_plate_tests
+    from soilml.identification.bevameter.shear_tests import read_shear_tests
+    from soilml.remarks import Remark
+
+    found: dict[str, list[Table]] = {}
+    errors: list[SoilmlError] = []
+    remarks: list[Remark] = []
+    if len({Path(path).resolve() for path in args.tables}) < len(args.tables):
+        raise InputError("a table is given twice; give each once")
     for path in args.tables:
-        table = _table(path, args.ignore_extra)
-        if "shear_stress_Pa" in table or "torque_Nm" in table:
-            kind = "shear"
-        elif "sinkage_m" in table:
-            kind = "plate"
+        try:
+            table = _table(path, args.ignore_extra)
+            kind = _kind(path, table)
+            (read_shear_tests if kind == "shear" else read_plate_tests)(table)
+        except MissingLibraryError:
+            raise
+        except SoilmlError as error:
+            errors.append(error)
+            remarks.append(Remark("table-left-out", f"left out: {error}", (path,)))
         else:
-            raise TableError(
-                f"{path} is no table of tests: plate tests have sinkage_m, shear tests have "
-                f"shear_stress_Pa or torque_Nm; found: {', '.join(table.columns)}"
-            )
-        if kind in found:
+            found.setdefault(kind, []).append(table)
+    if not found:
+        raise errors[0]
+    plates, shear = (_together(found.get(kind, [])) for kind in ("plate", "shear"))
+    return plates, shear, remarks
+
+
+def _kind(path: str, table: Table) -> str:
+    """Plate or shear tests, by their columns."""
+    if "shear_stress_Pa" in table or "torque_Nm" in table:
+        return "shear"
+    if "sinkage_m" in table:
+        return "plate"
+    raise TableError(
+        f"{path} is no table of tests: plate tests have sinkage_m, shear tests have "
+        f"shear_stress_Pa or torque_Nm; found: {', '.join(table.columns)}"
+    )
+
+
+def _together(tables: list[Table]) -> Table | None:
+    """Tables of one kind as one; tests of one name in two tables are two tests.
+
+    Raises `InputError` where their columns differ.
+    """
+    import numpy as np
+
+    from soilml.io.table import Table
+
+    if len(tables) < 2:
+        return tables[0] if tables else None
+    first = tables[0]
+    for other in tables[1:]:
+        if {*other.columns} != {*first.columns}:
             raise InputError(
-                f"{path} and {found[kind].source} are both {kind} tests; put them in one table"
+                f"{first.source} and {other.source} have different columns ("
+                f"{', '.join(first.columns)}; {', '.join(other.columns)}); put them in one table"
             )
-        found[kind] = table
-    return found.get("plate"), found.get("shear")
+    names = [name for table in tables for name in {*table["test"].tolist()}]
+    alike = len({*names}) < len(names)
+    labels = [
+        f"{Path(table.source).stem} {name}" if alike else name
+        for table in tables
+        for name in table["test"].tolist()
+    ]
+    columns = {key: np.concatenate([table[key] for table in tables]) for key in first.columns}
+    source = ", ".join(table.source for table in tables)
+    return Table({**columns, "test": np.asarray(labels)}, source)
 
 
 def _text(result: BevameterResult) -> str:
@@ -165,6 +224,8 @@ def _text(result: BevameterResult) -> str:
         for name, e in result.estimates().items()
         for factor, unit in [shown_unit(e.unit, e.value)]
     ]
+    if result.shear is not None and result.shear.shear_modulus is None:
+        rows.append(("shear_modulus", "not measured", "", "", ""))
     head = ("parameter", "value", "95 % of the mean", "95 % at another place", "unit")
     return "\n".join([format_table(head, rows), *(f"! {text}" for text in result.remarks)])
 

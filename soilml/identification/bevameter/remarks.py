@@ -134,6 +134,12 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
             f"the shear strength is {ratio:.3g} times the normal stress: check that both are in Pa",
             ("shear_stress_Pa", "normal_stress_Pa"),
         )
+    if fit.shear_modulus is None:
+        yield Remark(
+            "not-measured",
+            "the tests have strengths alone, no stress over displacement: K is not measured",
+            ("shear_modulus",),
+        )
     if fit.cohesion is None:
         yield Remark(
             "one-normal-stress",

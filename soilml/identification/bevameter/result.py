@@ -61,16 +61,18 @@ class BevameterResult:
 
         Dots are measured, thin lines fitted to each test, thick lines the law of the result.
 
-        `ax`: axes of matplotlib: one for plate tests and two for shear tests; by default a new
-        figure. Returns the axes, (panels,). Raises `InputError` for another number of axes.
+        `ax`: axes of matplotlib: one for plate tests, one for shear curves and one for strengths;
+        by default a new figure. Returns the axes, (panels,). Raises `InputError` for another number
+        of axes.
         """
         axes = take_axes(ax, 1, _panels(self), _size(self))[0]
         panels = list(axes)
         if self.plates is not None:
             _draw_plates(panels.pop(0), self.plates)
         if self.shear is not None:
-            _draw_curves(panels[0], self.shear)
-            _draw_strengths(panels[1], self.shear)
+            if _has_curves(self):
+                _draw_curves(panels.pop(0), self.shear)
+            _draw_strengths(panels.pop(0), self.shear)
         return np.asarray(axes)
 
     def as_json(self) -> dict[str, Any]:
@@ -105,7 +107,7 @@ def _shear_entries(fit: ShearFit) -> list[dict[str, Any]]:
             "test": test.name,
             "normal_stress_Pa": test.normal_stress,
             "strength_Pa": curve.strength,
-            "shear_modulus_m": curve.modulus,
+            "shear_modulus_m": curve.modulus if test.has_curve else None,
             "misfit": curve.misfit,
         }
         for test, curve in zip(fit.tests, fit.curves, strict=True)
@@ -119,7 +121,11 @@ def save_picture(path: str | os.PathLike[str], result: BevameterResult) -> None:
 
 
 def _panels(result: BevameterResult) -> int:
-    return (result.plates is not None) + 2 * (result.shear is not None)
+    return (result.plates is not None) + (result.shear is not None) + _has_curves(result)
+
+
+def _has_curves(result: BevameterResult) -> bool:
+    return result.shear is not None and any(test.has_curve for test in result.shear.tests)
 
 
 def _size(result: BevameterResult) -> tuple[float, float]:
@@ -151,6 +157,8 @@ def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
 def _draw_curves(panel: Any, fit: ShearFit) -> None:
     for test, curve in zip(fit.tests, fit.curves, strict=True):
         shown = np.isfinite(test.displacement)
+        if not shown.any():
+            continue
         j = test.displacement[shown]
         (dots,) = panel.plot(1e3 * j, 1e-3 * test.stress[shown], ".", label=short_label(test.name))
         grid = np.linspace(0.0, float(j.max()), 200)

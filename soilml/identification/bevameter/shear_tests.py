@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import TableError
@@ -28,6 +29,7 @@ LEAST_STRESS_RATIO = 1.15
 #: Candidates of K, from a tenth of the smallest displacement to the upper limit; steps of 1 %.
 UPPER_MODULUS = 2.0  # in largest displacements: beyond, a curve is a straight line
 STEP = 0.01
+MOST_STRENGTHS = 10  # Rows of one name and one normal stress that are strengths of repeats
 END = 0.2  # Last part of a curve, as a fraction of its displacement, whose mean is its end
 LEAST_LOADS = 4  # Loads from which on a bend of the failure line, or a trend of K, is looked for
 #: Studentised size of a bend or trend from which it is reported: chance gives it in 1 of 50 tables
@@ -39,7 +41,8 @@ SIGNIFICANT = 3.0
 class ShearTest:
     """One test: mean normal stress (Pa), and shear stress (Pa) at displacements (m), (k,) each.
 
-    A displacement is infinite where the stress is that of the steady end of the test.
+    A displacement is infinite where the stress is that of the steady end of the test, or its
+    strength where no curve was recorded.
     """
 
     name: str
@@ -47,6 +50,11 @@ class ShearTest:
     displacement: Floats
     stress: Floats
     normal_variation: float  # largest relative deviation of the normal stress from its mean
+
+    @property
+    def has_curve(self) -> bool:
+        """Whether stresses were recorded over displacements."""
+        return bool(np.isfinite(self.displacement).any())
 
 
 def read_shear_tests(table: Table) -> list[ShearTest]:
@@ -58,11 +66,12 @@ def read_shear_tests(table: Table) -> list[ShearTest]:
 
     for a ring that is rotated by an angle alpha with the torque T under the load W; the stress is
     taken as constant over the ring. A row whose displacement or angle is blank holds the steady
-    shear stress at the end of the test.
+    shear stress at the end of the test. Where no row has one, each row is a test of its own, with
+    its strength or largest torque, as most shear cells give it.
 
-    table: Rows with `test`, and either `normal_stress_Pa`, `shear_displacement_m`,
-        `shear_stress_Pa`, or `inner_radius_m`, `outer_radius_m`, `angle_rad`, `torque_Nm`, `load_N`
-        (or `normal_stress_Pa`).
+    table: Rows with `test`, and either `normal_stress_Pa`, `shear_stress_Pa` and
+        `shear_displacement_m`, or `inner_radius_m`, `outer_radius_m`, `torque_Nm`, `angle_rad` and
+        `load_N` (or `normal_stress_Pa`). Displacement and angle may be missing.
 
     Raises `TableError`, which names the missing column, or the test without a usable curve.
 
@@ -72,8 +81,12 @@ def read_shear_tests(table: Table) -> list[ShearTest]:
         raise TableError(f"{table.source}: the table has no row")
     displacement, stress, normal = _curves(table)
     tests = []
-    for name in dict.fromkeys(table["test"].tolist()):
-        rows = table["test"] == name
+    names = table["test"]
+    if not np.isfinite(displacement).any():
+        names = _numbered(names.tolist())
+        _refuse_lost_curves(table, normal)
+    for name in dict.fromkeys(names.tolist()):
+        rows = names == name
         sigma = normal[rows]
         sigma = sigma[np.isfinite(sigma)]
         if sigma.size == 0 or sigma.mean() <= 0.0:
@@ -82,11 +95,33 @@ def read_shear_tests(table: Table) -> list[ShearTest]:
     return tests
 
 
+def _refuse_lost_curves(table: Table, normal: Floats) -> None:
+    """Raise `TableError` where a test has so many rows that these are samples of its curve."""
+    pairs = list(zip(table["test"].tolist(), normal.tolist(), strict=True))
+    for name, stress in dict.fromkeys(pairs):
+        if (count := pairs.count((name, stress))) > MOST_STRENGTHS:
+            key = "angle_rad" if "torque_Nm" in table else "shear_displacement_m"
+            raise TableError(
+                f"{table.source}: column {key} is missing: {count} rows of test {name} are samples "
+                "of a curve; for strengths alone, give each test one row"
+            )
+
+
+def _numbered(names: Sequence[str]) -> NDArray[np.str_]:
+    """The names of rows (n,), with a number where several rows have one."""
+    return np.asarray(
+        [
+            f"{name} {names[: i + 1].count(name)}" if names.count(name) > 1 else name
+            for i, name in enumerate(names)
+        ]
+    )
+
+
 def _curves(table: Table) -> tuple[Floats, Floats, Floats]:
     """Displacement (m), shear stress and normal stress (Pa) of each row."""
     ring = "torque_Nm" in table
     if ring:
-        for key in ("inner_radius_m", "outer_radius_m", "angle_rad"):
+        for key in ("inner_radius_m", "outer_radius_m"):
             _require(table, key, "for a ring, with torque_Nm")
         inner, outer = table["inner_radius_m"], table["outer_radius_m"]
         if (wrong := ~(outer > inner)).any():
@@ -95,18 +130,22 @@ def _curves(table: Table) -> tuple[Floats, Floats, Floats]:
                 f"{table.place(row)}, column outer_radius_m: {outer[row]:g} given; needed is a "
                 f"radius above inner_radius_m, {inner[row]:g}"
             )
-        displacement = table["angle_rad"] * 0.5 * (outer + inner)
+        displacement = _or_blank(table, "angle_rad") * 0.5 * (outer + inner)
         stress = 3.0 * table["torque_Nm"] / (2.0 * np.pi * (outer**3 - inner**3))
     else:
-        for key in ("shear_displacement_m", "shear_stress_Pa"):
-            _require(table, key, "or those of a ring: torque_Nm, angle_rad, ...")
-        displacement, stress = table["shear_displacement_m"], table["shear_stress_Pa"]
+        _require(table, "shear_stress_Pa", "or those of a ring: torque_Nm, angle_rad, ...")
+        displacement, stress = _or_blank(table, "shear_displacement_m"), table["shear_stress_Pa"]
     if "normal_stress_Pa" in table:
         return displacement, stress, table["normal_stress_Pa"]
     if not ring:
         _require(table, "normal_stress_Pa", "the normal stress of each row")
     _require(table, "load_N", "or normal_stress_Pa")
     return displacement, stress, table["load_N"] / (np.pi * (outer**2 - inner**2))
+
+
+def _or_blank(table: Table, key: str) -> Floats:
+    """A column (n,), NaN where the table has none."""
+    return np.asarray(table[key], float) if key in table else np.full(len(table), np.nan)
 
 
 def _require(table: Table, key: str, text: str) -> None:
@@ -121,16 +160,20 @@ def _test(
     j = np.where(np.isnan(displacement), np.inf, displacement)
     usable = np.isfinite(stress) & (j > 0.0)
     j, stress = j[usable], stress[usable]
-    if np.unique(j).size < LEAST_POINTS or not np.any(stress > 0.0):
+    least = LEAST_POINTS if np.isfinite(j).any() else 1
+    if np.unique(j).size < least or not np.any(stress > 0.0):
         raise TableError(
             f"{table.source}: test {name} needs {LEAST_POINTS} or more samples with a displacement "
             f"and a shear stress above zero; it has {j.size}"
         )
     curve = np.isfinite(j)
+    mean = float(sigma.mean())
+    variation = float(np.abs(sigma / mean - 1.0).max())
+    if not curve.any():
+        return ShearTest(name, mean, np.asarray([np.inf]), np.asarray([stress.mean()]), variation)
     means = thinned(j[curve], stress[curve])
     j, stress = (np.append(a, b[~curve]) for a, b in zip(means, (j, stress), strict=True))
-    mean = float(sigma.mean())
-    return ShearTest(name, mean, j, stress, float(np.abs(sigma / mean - 1.0).max()))
+    return ShearTest(name, mean, j, stress, variation)
 
 
 @dataclass(frozen=True)
@@ -139,6 +182,7 @@ class ShearCurve:
 
     `peak` and `end` are the largest stress and that of the end (Pa); `mobilised` is the fraction of
     the strength that is reached at the largest displacement; `misfit` is the relative residual.
+    Where a test has its strength alone, `modulus` is NaN.
     """
 
     strength: float
@@ -164,7 +208,7 @@ class ShearFit:
     strength
         Shear strength (Pa) at the mean normal stress.
     shear_modulus
-        K (m), the geometric mean of the tests.
+        K (m), the geometric mean of the tests; None where none has a curve.
     halves
         (c, phi) of the lighter and of the heavier half of the loads where the failure line is
         curved; else empty.
@@ -178,13 +222,13 @@ class ShearFit:
     cohesion: SpreadEstimate | None
     friction_angle: SpreadEstimate | None
     strength: SpreadEstimate
-    shear_modulus: SpreadEstimate
+    shear_modulus: SpreadEstimate | None
     halves: tuple[tuple[float, float], ...]
     modulus_trend: float
 
     def estimates(self) -> dict[str, SpreadEstimate]:
         """What the tests determine, by name."""
-        found = {"shear_modulus": self.shear_modulus}
+        found = {} if self.shear_modulus is None else {"shear_modulus": self.shear_modulus}
         if self.cohesion is None or self.friction_angle is None:
             return {"shear_strength": self.strength, **found}
         return {"cohesion": self.cohesion, "friction_angle": self.friction_angle, **found}
@@ -207,6 +251,7 @@ def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
     sigma = np.asarray([test.normal_stress for test in tests])
     strength = np.asarray([curve.strength for curve in curves])
     log_modulus = np.log([curve.modulus for curve in curves])
+    recorded = np.isfinite(log_modulus)
     stresses = distinct_levels(sigma)
     columns = np.stack([np.ones(sigma.size), sigma], axis=1)
     if stresses[-1] < LEAST_STRESS_RATIO * stresses[0]:
@@ -216,13 +261,14 @@ def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
     if through_origin:
         slope = relative_line(columns[:, 1:], strength)
         line, fitted = np.append(0.0, slope[0]), slope[2]
-    mean_log = float(log_modulus.mean())
-    residual = np.stack([np.log(strength / fitted), log_modulus - mean_log], axis=1)
+    mean_log = float(log_modulus[recorded].mean()) if recorded.any() else 0.0
+    about = np.where(recorded, log_modulus - mean_log, 0.0)
+    residual = np.stack([np.log(strength / fitted), about], axis=1)
     scatter = pooled_scatter(residual, USUAL_SCATTER, columns.shape[1])
     p, s = len(line), scatter.covariance
     covariance = np.zeros((p + 1, p + 1))
     covariance[:p, :p] = hat @ hat.T * s[0, 0]
-    covariance[p, p] = s[1, 1] / len(tests)
+    covariance[p, p] = s[1, 1] / max(int(recorded.sum()), 1)
     error, deviation = scatter.draws(covariance)
     modulus = np.exp(mean_log + error[:, p])
     draws = (line + error[:, :p]) * _shape_factors(curves, len(error))[:, None]
@@ -243,6 +289,7 @@ def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
             spread_estimate(float(np.arctan(max(line[1], 0.0))), angle, other_angle, "rad"),
             [half[1] for half in halves],
         )
+    several = len(distinct_levels(sigma[recorded])) >= LEAST_LOADS if recorded.any() else False
     return ShearFit(
         tuple(tests),
         curves,
@@ -250,15 +297,20 @@ def fit_shear_strength(tests: Sequence[ShearTest]) -> ShearFit:
         c,
         phi,
         spread_estimate(float(line @ at), draws @ at, other @ at, "Pa"),
-        spread_estimate(float(np.exp(mean_log)), modulus, modulus * np.exp(deviation[:, 1]), "m"),
+        spread_estimate(float(np.exp(mean_log)), modulus, modulus * np.exp(deviation[:, 1]), "m")
+        if recorded.any()
+        else None,
         halves,
-        _trend(np.log(sigma), log_modulus) if len(stresses) >= LEAST_LOADS else 0.0,
+        _trend(np.log(sigma[recorded]), log_modulus[recorded]) if several else 0.0,
     )
 
 
 def fit_shear_curve(test: ShearTest) -> ShearCurve:
     """Least squares of strength and K; the steady end of a test counts as one more point."""
     j, stress = test.displacement, test.stress
+    if not test.has_curve:
+        strength = float(stress.mean())
+        return ShearCurve(strength, float("nan"), strength, strength, 1.0, 0.0)
     finite = j[np.isfinite(j)]
     low, high = np.log(0.1 * finite.min()), np.log(UPPER_MODULUS * finite.max())
     candidates = np.exp(np.arange(low, high, STEP))

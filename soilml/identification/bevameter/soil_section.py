@@ -86,8 +86,11 @@ def shear_section(fit: ShearFit, case: Case | None) -> Section:
     is what each cohesion leaves.
     """
     modulus = fit.shear_modulus
-    values = {"shear_modulus": modulus.value}
-    prior = {"shear_modulus": _prior("shear_modulus", modulus.value, modulus.another_place_95)}
+    values: dict[str, float] = {}
+    prior: dict[str, Prior] = {}
+    if modulus is not None:
+        values["shear_modulus"] = modulus.value
+        prior["shear_modulus"] = _prior("shear_modulus", modulus.value, modulus.another_place_95)
     if fit.cohesion is not None and fit.friction_angle is not None:
         for name, estimate in (("cohesion", fit.cohesion), ("friction_angle", fit.friction_angle)):
             values[name] = estimate.value
@@ -185,6 +188,8 @@ def updated_soil(case: Case, result: BevameterResult) -> Case:
     Priors of what they determine, and earlier tests of the same kinds, are replaced.
     """
     determined = (BEARING if result.plates else ()) + (SHEARING if result.shear else ())
+    # strengths alone leave K as the case has it
+    determined = tuple(n for n in determined if n != "shear_modulus" or n in result.soil)
     kept = {name: prior for name, prior in case.prior.items() if name not in determined}
     measured = tuple(
         test

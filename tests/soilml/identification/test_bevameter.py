@@ -278,8 +278,9 @@ def test_shear_tables_without_a_curve_are_refused():
     columns = shear().columns
     with pytest.raises(TableError, match="column normal_stress_Pa is missing"):
         bevameter(shear=Table({k: v for k, v in columns.items() if k != "normal_stress_Pa"}))
+    many = {k: np.repeat(v, 6) for k, v in columns.items() if k != "shear_displacement_m"}
     with pytest.raises(TableError, match="column shear_displacement_m is missing"):
-        bevameter(shear=Table({k: v for k, v in columns.items() if k != "shear_displacement_m"}))
+        bevameter(shear=Table(many))
     blank = np.full(len(columns["test"]), np.nan)
     with pytest.raises(TableError, match="samples with a displacement and a shear"):
         bevameter(shear=Table(columns | {"shear_stress_Pa": blank}))
