@@ -22,7 +22,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from gap_case import _case
+from gap_case import read_model
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan, active_mechanisms, benchmark_plans
@@ -81,7 +81,7 @@ def stated(unnamed: bool, plan: Plan) -> dict[str, Any]:
     unnamed: Whether the analysis has no effect, so that no cause is in its catalogue.
     """
     drawn = draw_blind_set(plan)
-    case = _case(drawn.model)
+    case = read_model(drawn.model)
     effects = {} if unnamed else EFFECTS
     report = gap(case, Table(dict(drawn.columns)), effects=effects, seed=0)
     cause = report.remainder_cause

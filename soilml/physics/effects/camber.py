@@ -34,7 +34,7 @@ class Camber(Effect):
     name: ClassVar[str] = "camber"
     about: ClassVar[EffectCard] = EffectCard(
         text="the wheel is inclined to the side: one edge digs in",
-        source="slices across the width",
+        source="geometry; slices across the width",
         kind="rig",
         reference={"angle": 0.15},
         signs={"sinkage": -1},

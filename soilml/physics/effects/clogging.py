@@ -22,17 +22,18 @@ class Clogging(SlipLoadScaling):
         \frac{v}{(r + h) \omega} = (1 - s) \frac{r}{r + h}
 
     in the pressure, the shear displacement and the lever arm of the torque, with s the slip of the
-    clean rim, as a rig reckons it, and z the sinkage of the layer. References: Wong, Theory of
-    Ground Vehicles, chapter 2, lugs whose spaces are filled with soil act as a cylinder around
-    their tips; definition of slip. That the layer turns with the wheel and is as strong as the soil
-    is ours. Lugs of which `grousers` has the shear already count once more beside it: give it the
-    part of h that clogs beyond theirs. Not for soil that falls off again within a turn.
+    clean rim, as a rig reckons it, and z the sinkage of the layer. References: Ding et al., J.
+    Terramechanics 48(1), 2011, the radius r + lambda h of shearing around lugs, here with lambda =
+    1 and in all of the contact; definition of slip. That the layer turns with the wheel and is as
+    strong as the soil is ours. Lugs of which `grousers` has the shear already count once more
+    beside it: give it the part of h that clogs beyond theirs. Not for soil that falls off again
+    within a turn.
     """
 
     name: ClassVar[str] = "clogging"
     about: ClassVar[EffectCard] = EffectCard(
         text="soil clings to the rim or fills the room between lugs: a larger wheel",
-        source="Wong, Theory of Ground Vehicles, ch. 2",
+        source="Ding et al. 2011, J. Terramechanics 48(1), radius of shearing",
         kind="wheel",
         reference={"layer": 0.003},
         signs={"torque": +1, "drawbar_pull": +1},

@@ -22,14 +22,15 @@ class CohesionDrift(SlipLoadScaling):
 
     with p from 0 at the first row to 1 at the last, by time where it is known, else by the order of
     the rows; where p is not known the campaign is over, p = 1. The soil of the model is that of the
-    first row. References: Mitchell and Soga, Fundamentals of Soil Behavior, 2005, chapter 12,
-    strength by time and moisture; the straight line is ours. Friction and stiffness stay.
+    first row. References: Fredlund, Morgenstern and Widger, Can. Geotech. J. 15(3), 1978,
+    cohesion c' + (u_a - u_w) tan(phi_b), which grows with the suction u_a - u_w of a soil that
+    dries; the straight line is ours. Friction and stiffness stay.
     """
 
     name: ClassVar[str] = "cohesion-drift"
     about: ClassVar[EffectCard] = EffectCard(
         text="the soil gains or loses cohesion during the campaign: drying, wetting",
-        source="Mitchell and Soga 2005, ch. 12",
+        source="Fredlund et al. 1978, Can. Geotech. J. 15(3)",
         kind="soil",
         reference={"gain": 500.0},
         signs={"torque": +1, "drawbar_pull": +1},

@@ -26,17 +26,17 @@ class CurvedEnvelope(SlipLoadScaling):
 
     so that phi is the secant friction angle at 10 kPa, and a = 0 the straight envelope of Mohr and
     Coulomb. References: Charles and Watts, Geotechnique 30(4), 1980, tau = A sigma^b with b = 1 - a
-    of 0.7 to 0.9 for rockfill; Atkinson, The Mechanics of Soils and Foundations, eq. 10.11, the
-    same for the peak strength of soils; Baker, J. Geotech. Geoenviron. Eng. 130(5), 2004, curved
-    envelopes of many soils, above all at small normal stress; Bolton, Geotechnique 36(1), 1986, on
-    why: dense soil dilates less under pressure. Cohesion beside the power is ours. Where all loads
-    press alike it is a change of c and phi.
+    of 0.7 to 0.9 for rockfill; Atkinson, The Mechanics of Soils and Foundations, chapter on peak
+    states, the same for the peak strength of soils; Baker, J. Geotech. Geoenviron. Eng. 130(5),
+    2004, curved envelopes of many soils, above all at small normal stress; Bolton, Geotechnique
+    36(1), 1986, on why: dense soil dilates less under pressure. Cohesion beside the power is ours.
+    Where all loads press alike it is a change of c and phi.
     """
 
     name: ClassVar[str] = "curved-envelope"
     about: ClassVar[EffectCard] = EffectCard(
         text="the strength envelope is curved: friction falls with the normal stress",
-        source="Atkinson, Mechanics of Soils and Foundations, eq. 10.11; Baker 2004",
+        source="Charles and Watts 1980, Geotechnique 30(4); Baker 2004",
         kind="soil",
         reference={"exponent": 0.2},
         signs={},
