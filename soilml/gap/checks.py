@@ -19,7 +19,9 @@ from soilml.remarks import Remark
 #: Degrees of freedom that repeated rows must have for an estimate of the noise: its relative
 #: standard error is then 30 %.
 MIN_REPEAT_DEGREES_OF_FREEDOM = 6
-MIN_RESIDUAL_READINGS = 8  # Readings beyond the number of soil parameters that an analysis needs
+#: Readings beyond the number of soil parameters that an analysis needs, and that a name needs: with
+#: fewer, the noise cannot be told from the declared one.
+MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS = 4, 8
 ONE_LOAD = "one-load"  # Code of the obstacle that one load cannot test the soil parameters
 MAX_DUPLICATE_FRACTION = 0.2  # Fraction of duplicate rows above which the table itself is suspect
 
@@ -108,12 +110,18 @@ def _check_count(data: CheckedData) -> Iterator[Finding]:
     if not data.readings.channels:
         text = "no torque, drawbar pull or sinkage was measured"
         yield Consequence.ERROR, Remark("no-channel", text)
-    elif count < data.parameters + MIN_RESIDUAL_READINGS:
-        text = (
-            f"{'1 reading' if count == 1 else f'{count} readings'} for {data.parameters} soil "
-            f"parameters: at least {data.parameters + MIN_RESIDUAL_READINGS} readings are needed"
-        )
-        yield Consequence.ERROR, Remark("few-readings", text)
+        return
+    for least, consequence, what in (
+        (MIN_RESIDUAL_READINGS, Consequence.ERROR, "are needed"),
+        (NAMING_RESIDUAL_READINGS, Consequence.NAMING_OBSTACLE, "are needed to name a cause"),
+    ):
+        if count < data.parameters + least:
+            text = (
+                f"{'1 reading' if count == 1 else f'{count} readings'} for {data.parameters} soil "
+                f"parameters: at least {data.parameters + least} readings {what}"
+            )
+            yield consequence, Remark("few-readings", text)
+            return
 
 
 def _check_variety(data: CheckedData) -> Iterator[Finding]:

@@ -39,6 +39,7 @@ _IN_SHORT = {
     "other-law": "the law differs from the catalogue's",
     "not-catalogued": "a large discrepancy is left beside it",
     "prior-opened": "a fit pressed against its prior",
+    "few-readings": "there are few readings",
     "one-run": "there is one run only",
     "one-load": "there is one load only",
     "few-slips": "there are too few slips",

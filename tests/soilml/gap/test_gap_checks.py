@@ -123,6 +123,10 @@ def test_a_constant_sensor_is_an_error():
 def test_too_few_readings_are_an_error():
     table = driven(case_of(), loads=(40.0, 80.0), slips=1)
     assert "6 readings for 3 soil parameters" in check(table).errors[0].text
+    few = check(driven(case_of(), loads=(40.0, 80.0, 120.0), slips=1))
+    assert few.errors == ()
+    text = "9 readings for 3 soil parameters: at least 11 readings are needed to name a cause"
+    assert text in texts(few.naming_obstacles)
 
 
 def test_a_table_without_any_reading_is_refused():

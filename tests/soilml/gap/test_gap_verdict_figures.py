@@ -158,7 +158,10 @@ def test_duplicates_are_an_error_from_a_fifth_of_the_table_on():
     assert found(79, 21) == [Consequence.ERROR]
 
 
-@pytest.mark.parametrize(("count", "expected"), [(10, [Consequence.ERROR]), (11, [])])
+@pytest.mark.parametrize(
+    ("count", "expected"),
+    [(6, [Consequence.ERROR]), (7, [Consequence.NAMING_OBSTACLE]), (11, [])],
+)
 def test_readings_for_three_parameters(count, expected):
     class Several:
         channels = CHANNELS
