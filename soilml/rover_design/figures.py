@@ -127,7 +127,7 @@ def _front(panel: Any, report: DrawnDesigns) -> None:
     panel.axhline(report.study.goal.margin, color=UNCHANGED, lw=0.8)
     panel.set_xlabel(UNITS[least] if least in UNITS else axis_label(least))
     panel.set_ylabel(f"margin at a risk of {report.study.goal.risk:g}, N")
-    panel.set_title("front: beaten in both by none")
+    panel.set_title(f"front: margin against {least.replace('_', ' ')}")
     panel.legend(frameon=False, fontsize=9)
 
 

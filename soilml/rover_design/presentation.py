@@ -22,15 +22,24 @@ MOST_ROWS = 10  # Most designs of the front in a table
 #: Results in the table of designs: column, heading on a terminal and on a page, factor.
 _COLUMNS = (
     ("probability", "goal_%", "goal met, %", 100.0),
-    ("margin_at_risk_N", "at_risk_N", "margin at risk, N", 1.0),
     ("margin_N", "margin_N", "margin, N", 1.0),
     ("margin_N_p05", "p05", "5 %", 1.0),
     ("margin_N_p95", "p95", "95 %", 1.0),
-    ("slip", "slip", "slip", 1.0),
+    ("margin_at_risk_N", "at_risk_N", "margin at risk, N", 1.0),
     ("energy_J_per_m", "work_J/m", "work, J/m", 1.0),
+    ("slip", "slip", "slip", 1.0),
     ("torque_Nm", "torque_Nm", "torque, N m", 1.0),
-    ("lugs_needed", "lugs", "lugs needed", 1.0),
+    ("lugs_needed", "lugs_min", "lugs needed", 1.0),
 )
+#: Short headings of dimensions on a terminal.
+_HEADS = {
+    "radius": "radius_mm",
+    "width": "width_mm",
+    "lug_height": "lug_mm",
+    "lug_count": "lugs",
+    "wheels": "wheels",
+    "mass": "mass_kg",
+}
 #: Results that hold where the slope is climbed.
 _WHERE_CLIMBED = ("slip", "energy_J_per_m", "torque_Nm", "lugs_needed")
 
@@ -57,8 +66,11 @@ def design_text(report: DesignReport) -> str:
 
 def _designs_table(report: DesignReport) -> str:
     """The table of designs; last columns that do not fit on a line are left out, and named."""
-    head = [axis_label(name).replace(", ", "_").replace(" ", "_") for name in _named(report)]
-    header = ["", *head, *(title for _, title, _, _ in _columns(report))]
+    header = [
+        "",
+        *(_HEADS[name] for name in _named(report)),
+        *(title for _, title, _, _ in _columns(report)),
+    ]
     rows = [list(row) for row in _rows(report)]
     widths = [max(len(row[i]) for row in [header, *rows]) + 2 for i in range(len(header))]
     shown = len(header)
@@ -80,14 +92,15 @@ def verdict(report: DesignReport) -> str:
         f"margin {_number(best['margin_N'])} N ({_number(best['margin_N_p05'])} to "
         f"{_number(best['margin_N_p95'])})"
     )
-    chance = f"{100.0 * best['probability']:.0f} %"
+    near = abs(best["probability"] - 1.0 + goal.risk) < 0.01
+    chance = f"{100.0 * best['probability']:.{1 if near else 0}f} %"
     if goal.margin > 0.0 or min(goal.torque_limit, goal.energy_limit) < math.inf:
         slope += " within its limits"
     if report.met:
         return f"{sizes}: climbs {slope} with {chance}, {margin}"
     return (
         f"none is sure enough: the likeliest, {sizes}, climbs {slope} with {chance}, not "
-        f"{100.0 * (1.0 - goal.risk):.0f} %, {margin}"
+        f"{significant(100.0 * (1.0 - goal.risk), 3)} %, {margin}"
     )
 
 
@@ -96,9 +109,16 @@ def _named(report: DesignReport) -> list[str]:
 
 
 def _columns(report: DesignReport) -> list[tuple[str, str, str, float]]:
-    """Columns of the table of designs; the margin at a risk of 5 % is the lower end of its band."""
-    same = report.study.goal.risk == QUANTILES["_p05"]
-    return [c for c in _COLUMNS if not (same and c[0] == "margin_at_risk_N")]
+    """Columns of the table of designs, with what is to be least behind the probability.
+
+    The margin at a risk of 5 % is the lower end of its band.
+    """
+    goal = report.study.goal
+    same = goal.risk == QUANTILES["_p05"]
+    kept = [c for c in _COLUMNS if not (same and c[0] == "margin_at_risk_N")]
+    least = "lugs_needed" if goal.least == "lug_count" else RESULTS.get(goal.least, "probability")
+    first = ("probability", least)
+    return sorted(kept, key=lambda c: first.index(c[0]) if c[0] in first else len(first))
 
 
 def _soil_cells(one: SoilOutcome) -> list[str]:

@@ -184,7 +184,7 @@ def design_report(
         designs=found,
         best=results,
         best_dimensions=dimensions,
-        met=bool(enough and meets(study, found)[best]),
+        met=bool(enough and found.lugs_suffice[best]),
         front=pareto_front(study, found),
         contours=contours,
         by_soil=tuple(_by_soil(own, outcome)),
@@ -223,16 +223,17 @@ def _remarks(
     draws: int,
 ) -> Iterator[Remark]:
     """What limits the answer for the best design."""
-    if not meets(study, found).any():
-        text = "no design within the limits meets the goal at this risk; shown is the likeliest"
-        yield Remark("goal-not-met", text)
-    elif results["probability"] < 1.0 - study.goal.risk:
+    chance, needed = results["probability"], 1.0 - study.goal.risk
+    compared = bool(meets(study, found).any())
+    if compared != (chance >= needed):
         text = (
-            f"under other draws the best design meets the goal with "
-            f"{results['probability']:.1%}, not with {1.0 - study.goal.risk:.0%}: it stands on the "
-            "limit; take one of the front beyond it"
+            f"the best design stands on the limit: it meets the goal with {chance:.1%} under draws "
+            f"of its own, needed is {needed:.1%}; take one of the front beyond it"
         )
         yield Remark("on-the-limit", text)
+    elif not compared:
+        text = "no design within the limits meets the goal at this risk; shown is the likeliest"
+        yield Remark("goal-not-met", text)
     for name in study.varied:
         ends = study.dimensions[name].values[0], study.dimensions[name].values[-1]
         if study.dimensions[name].searched and best[name] in ends and name != study.goal.least:

@@ -61,7 +61,7 @@ and has the least of `least`; where none does, it is the likeliest. The margin
 is the largest pull up to the slip limit less the weight along the slope. The
 front has the designs that no other one beats in both margin and `least`.
 goal_% is the probability of meeting the goal; p05 and p95 are the ends of
-the 90 % band; lugs is the number of lugs that a wheel needs.
+the 90 % band; lugs_min is the number of lugs that a wheel needs.
 
 The result is JSON in SI units, in the file of --out or in a pipe; a terminal
 shows tables. --report writes a page to read and print.
