@@ -156,8 +156,13 @@ def add_ignore_extra_option(parser: argparse.ArgumentParser) -> None:
 
 
 def add_row_options(parser: argparse.ArgumentParser) -> None:
-    """Declare `--where` and `--ignore-extra`, which `tables.read_rows` follows."""
+    """Declare `--where`, `--gear` and `--ignore-extra`, which `tables.read_rows` follows."""
     parser.add_argument("--where", metavar="COLUMN=VALUE", help="use only the rows with this value")
+    parser.add_argument(
+        "--gear",
+        metavar="NAME",
+        help="use only the rows of this gear, and [gears.NAME] where the model file has several",
+    )
     add_ignore_extra_option(parser)
 
 

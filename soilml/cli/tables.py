@@ -1,4 +1,4 @@
-"""Tables of measured rows as commands read them: progress, the rows of --where, hints."""
+"""Tables of measured rows as commands read them: progress, the rows and the gear, hints."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 
 from soilml.cli.output import tell
 from soilml.cli.progress import progress_bar, working
-from soilml.config.case import Case
+from soilml.config.case import Case, case_of_one_gear, read_case
 from soilml.errors import FitError, InputError
 from soilml.io.read_table import FILLED, read_table
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_remarks
+from soilml.physics.effects import EFFECTS, Effect
 
 Result = TypeVar("Result")
 
@@ -36,14 +37,39 @@ def read_long_table(path: str, need: Sequence[str] = (), **options: Any) -> Tabl
 def read_rows(
     args: argparse.Namespace, need: Sequence[str], filled: Sequence[str] = FILLED
 ) -> Table:
-    """The rows of the table `args.runs` that `--where` selects; see `read_table`."""
+    """The rows of the table `args.runs` that `--where` and `--gear` select; see `read_table`."""
     table = read_long_table(args.runs, need, filled=filled, ignore_extra=args.ignore_extra)
-    if args.where is None:
-        return table
-    name, equals, value = args.where.partition("=")
-    if not equals:
-        raise InputError(f"--where is {args.where!r}; needed is COLUMN=VALUE, such as run=sand_3")
-    return table.where(name, value)
+    if args.where is not None:
+        name, equals, value = args.where.partition("=")
+        if not equals:
+            raise InputError(
+                f"--where is {args.where!r}; needed is COLUMN=VALUE, such as run=sand_3"
+            )
+        table = table.where(name, value)
+    if args.gear is not None and "gear" in table and any(table["gear"] != ""):
+        table = table.where("gear", args.gear)
+    return table
+
+
+def read_case_of_rows(
+    args: argparse.Namespace,
+    path: str,
+    table: Table | None,
+    effects: Mapping[str, type[Effect]] = EFFECTS,
+    with_bias: bool = True,
+) -> Case:
+    """The case of one gear: that of `--gear`, or the one that all rows name.
+
+    Raises `InputError` where the file has several gears and neither says which.
+    """
+    case = read_case(path, effects, with_bias)
+    names = [] if table is None or "gear" not in table else list(dict.fromkeys(table["gear"]))
+    gear: str | None = args.gear
+    if case.gears and gear is None and len(names) == 1 and names[0]:
+        gear = str(names[0])
+    if not case.gears and any(names):
+        gear = None  # it has selected rows
+    return case_of_one_gear(case, path, gear)
 
 
 def print_table_hints(table: Table, case: Case | None, radius: float | None = None) -> None:

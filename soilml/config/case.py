@@ -230,14 +230,21 @@ def read_case_of_one_gear(
     Raises `InputError` as `read_case` does, and where the file has several gears and none of this
     name.
     """
-    case = read_case(path, effects, with_bias)
+    return case_of_one_gear(read_case(path, effects, with_bias), path, gear)
+
+
+def case_of_one_gear(case: Case, path: str | os.PathLike[str], gear: str | None) -> Case:
+    """The case of the gear of this name, of the file `path`; raises as `read_case_of_one_gear`."""
     if not case.gears and gear is None:
         return case
     known = ", ".join(case.gears)
     if not case.gears:
         raise InputError(f"{path} has one gear, in [gear]; omit --gear")
     if gear is None:
-        raise InputError(f"{path} has several gears: {known}; choose one with --gear")
+        raise InputError(
+            f"{path} has several gears: {known}; choose one with --gear, which also selects its "
+            "rows, where the table has a column gear"
+        )
     if gear not in case.gears:
         raise InputError(f"{path} has no gear {gear!r}; there are: {known}")
     return case.of_gear(gear)

@@ -95,7 +95,7 @@ def check_wheel_size(case: Case, table: Table) -> None:
     if names.size > 1:
         raise TableError(
             f"{table.source}: column gear names {', '.join(filter(None, names))}, and the model "
-            "has one gear; write each as [gears.NAME], or select rows with --where gear=NAME"
+            "has one gear; write each as [gears.NAME], or select rows with --gear NAME"
         )
     _check_sinkage(case, table)
     sizes = {name: getattr(case.model.gear, name, None) for name in ("radius", "width")}

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from soilml.cli.options import (
     add_effects_option,
     add_exact_model_option,
-    add_gear_option,
     add_model_and_runs,
     add_output,
     add_row_options,
@@ -71,7 +70,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--all", action="store_true", help="list every candidate, best first")
     add_effects_option(parser)
     add_exact_model_option(parser)
-    add_gear_option(parser)
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
     add_output(
@@ -103,8 +101,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import available_effects, parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
-    from soilml.cli.tables import print_table_hints, read_rows
-    from soilml.config.case import read_case_of_one_gear
+    from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid, samples_of_prior, samples_of_rows
     from soilml.experiment_design.advice_after_results import mean_covariates
     from soilml.experiment_design.presentation import next_row_remarks
@@ -119,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
     table = None if args.runs is None else read_rows(args, RUNS)
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
+    case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     free = select_free(case, parse_names(args.free))
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()

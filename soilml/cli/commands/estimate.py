@@ -108,7 +108,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="your wheel and effects, which are compared with those of the model file; for a file "
         "for wheels of any size, also your soil, priors and noise",
     )
-    parser.add_argument("--gear", metavar="NAME", help="which gear of --case, if it has several")
     parser.add_argument(
         "--exact-model",
         action="store_true",
@@ -128,8 +127,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report
-    from soilml.cli.tables import print_table_hints, read_rows
-    from soilml.config.case import read_case_of_one_gear
+    from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.identification.model_error_inputs import with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.read_table import FILLED, RUNS
@@ -143,22 +141,23 @@ def run(args: argparse.Namespace) -> int:
     if args.runs is None and args.case is None:
         show("\n".join(presentation.description(estimator).text for estimator in estimators))
         return 0
-    case = None
+    read = {name: column(name) for estimator in estimators for name in estimator.inputs}
+    needed = tuple(key for key in RUNS if key in ("run", *read.values()))
+    filled = [key for key in FILLED if key in needed]
+    table = case = None
+    if args.runs is not None:
+        table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     if args.case is not None:
-        case = read_case_of_one_gear(args.case, gear=args.gear, with_bias=True)
+        case = read_case_of_rows(args, args.case, table)
     if args.exact_model:
         estimators = [with_exact_model(estimator) for estimator in estimators]
     estimators, remarks = estimators_for_case(
         estimators, case, args.case, pooled=args.by is not None
     )
     remarks = [*map(presentation.description, estimators), *remarks]
-    if args.runs is None:
+    if table is None:
         show("\n".join(texts(remarks)))
         return 0
-    read = {name: column(name) for estimator in estimators for name in estimator.inputs}
-    needed = tuple(key for key in RUNS if key in ("run", *read.values()))
-    filled = [key for key in FILLED if key in needed]
-    table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     for estimator in estimators:
         check_table_wheel(estimator, table)
     print_table_hints(table, case, presentation.trained_radius(estimators[0]))

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from soilml.cli.options import (
     add_cost_option,
     add_effects_option,
-    add_ignore_extra_option,
     add_model_and_runs,
+    add_row_options,
     add_seed_option,
     folder_outputs,
 )
@@ -79,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of a sensor's fault after calibration; can be repeated",
     )
     add_cost_option(parser)
-    add_ignore_extra_option(parser)
+    add_row_options(parser)
     add_effects_option(parser)
 
 
@@ -93,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import available_effects, parse_costs, parse_names
     from soilml.cli.output import origin_of, show, tell
     from soilml.cli.progress import progress_bar
-    from soilml.cli.tables import print_table_hints, read_long_table
+    from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
@@ -103,9 +103,12 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap import gap
     from soilml.gap.presentation import gap_files, gap_text
 
-    table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
+    table = read_rows(args, RUNS)
     effects = available_effects(args)
-    case = read_case(args.model, effects, with_bias=True)
+    if args.gear is not None:
+        case = read_case_of_rows(args, args.model, table, effects)
+    else:
+        case = read_case(args.model, effects, with_bias=True)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(

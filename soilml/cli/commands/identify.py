@@ -84,7 +84,13 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.options import available_effects, parse_names
     from soilml.cli.output import is_terminal, show, write_stdout, write_with_report
-    from soilml.cli.tables import print_table_hints, read_rows, result_by_group, tell_failures
+    from soilml.cli.tables import (
+        print_table_hints,
+        read_case_of_rows,
+        read_rows,
+        result_by_group,
+        tell_failures,
+    )
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
@@ -98,7 +104,11 @@ def run(args: argparse.Namespace) -> int:
     from soilml.identification.presentation import Identification, identify_report
 
     table = read_rows(args, RUNS)
-    case = read_case(args.model, available_effects(args), with_bias=True)
+    effects = available_effects(args)
+    if args.gear is not None:
+        case = read_case_of_rows(args, args.model, table, effects)
+    else:
+        case = read_case(args.model, effects, with_bias=True)
     print_table_hints(table, case)
     free = parse_names(args.free)
 

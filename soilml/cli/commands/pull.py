@@ -12,7 +12,6 @@ from soilml.cli.options import (
     add_by_option,
     add_effects_option,
     add_exact_model_option,
-    add_gear_option,
     add_model_and_runs,
     add_output,
     add_report_option,
@@ -90,7 +89,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="take the soil from the estimate of this model file",
     )
     add_effects_option(parser)
-    add_gear_option(parser)
     add_by_option(parser)
     add_row_options(parser)
     add_exact_model_option(parser)
@@ -103,8 +101,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Predict and write the results."""
     from soilml.cli.options import available_effects, parse_names, parse_numbers
-    from soilml.cli.tables import print_table_hints, read_rows, result_by_group
-    from soilml.config.case import read_case, read_case_of_one_gear
+    from soilml.cli.tables import (
+        print_table_hints,
+        read_case_of_rows,
+        read_rows,
+        result_by_group,
+    )
+    from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from soilml.traction.presentation import PRESENTATION
     from soilml.traction.report import pull_report
@@ -126,7 +129,7 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(
                 f"--{option} needs a model file with [rover], and neither --load nor --gear"
             )
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear, True)
+    case = read_case_of_rows(args, args.model, table, available_effects(args))
     print_table_hints(table, case)
     loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
     if len(loads or ()) > MAX_LOADS:
