@@ -243,6 +243,11 @@ def _remarks(
     if sunk >= 0.0005:
         yield Remark("not-carried", f"{sunk:.1%} of the soils do not carry a wheel at any slip")
     if best["lug_height"] > 0.0:
+        text = (
+            "lugs may pull more: of 10 mm on two measured wheels they added 10 N, where this model "
+            "adds 1 to 2 N; drive a wheel with them and without"
+        )
+        yield Remark("lugs-understated", text, ("lug_height",), "note")
         needed = results["lugs_needed"]
         if "lug_count" in best and best["lug_count"] < needed:
             text = f"{best['lug_count']:g} lugs are too few: {needed:.0f} are needed between which "
