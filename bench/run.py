@@ -24,6 +24,7 @@ import model_errors
 import physics
 import prospects
 import slip
+import small_changes
 import soil_tests
 import streams
 import summary
@@ -179,20 +180,36 @@ PARTS = (
         f"{streams.DAYS} simulated days of docs/driving.md on each line, by the reference wheel "
         "of `datagen/blind_sets`. A day has three soils of 100 rows, 2 % torque noise, and slip "
         "with a standard deviation of 0.02. Of the rows, 2 % are glitches (torque doubled or "
-        "zero, slip off by a half); torque is stuck for 20 rows, and a pause lasts 10 rows. "
+        "zero, slip off by a half); torque is stuck for 20 rows, slip for 15, and a pause lasts "
+        "10. "
         "Over the last 150 rows the friction angle falls by 7 degrees or the zero of the torque "
         "sensor rises by 0.5 N m. "
         "Width: median standard deviation over that of the prior. "
         f"Intervals and flag `in_range`: rows from the {streams.SETTLED}th on one soil on, "
-        "glitches apart. Alarms: sound rows of unchanged soil that were set aside or called a "
+        "glitches apart; the flag of rows that the tracker used. "
+        "Alarms: sound rows of unchanged soil that were set aside or called a "
         "change, drift or stuck sensor. Changes by rms change of torque: how many were detected "
         f"within {streams.WITHIN} rows; median and largest delay in rows. Drift: how many were "
         "flagged; median and largest delay. Last column: of the rows in a drift whose mean is off "
         "by more than so many standard deviations, the share that carries a flag, and their "
-        "number. `model_error` 1: the file with typical errors of its model, and without them "
-        "otherwise. All typical errors: those of sensors are drawn for each day, those of "
+        "number. Averaged: over sizes of the model's errors, as by default. Slip stuck: the most "
+        "rows of it that were used on a day, up to the last. "
+        "All typical errors: those of sensors are drawn for each day, those of "
         "bearing and contact for each soil.",
         lambda folder: streams.table(ROOT / "exported" / "wheel.onnx"),
+    ),
+    Part(
+        "small-changes",
+        "driving",
+        "Small changes of soil",
+        f"{small_changes.DAYS} simulated days as modelled, on which torque changes by 5 to 12 % "
+        "(rms) "
+        "from each soil to the next; glitches and stuck sensors as above. The best possible filter "
+        "knows the wheel, the noise, the prior, the rate of changes and the glitches, and tells a "
+        f"change at a probability of {small_changes.TOLD:g}; its soils are {small_changes.SOILS} "
+        "points of the prior. False changes: rows of unchanged soil, from the "
+        f"{small_changes.LATE}th on.",
+        lambda folder: small_changes.table(ROOT / "exported" / "wheel.onnx"),
     ),
     Part(
         "loo", "training", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()

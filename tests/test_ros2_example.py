@@ -197,15 +197,17 @@ def samples(wheel_speed=1.0, torque=1.0, speed=0.1):
         ([samples(), samples(torque=math.nan)], "1 samples of effort of the joint"),
         ([samples(), samples(speed=math.inf)], "1 samples of odometry"),
         ([samples(0.3), samples(1.0)], "the wheel starts or stops"),
+        ([samples(1.0), samples(1.01), samples(1.02)], "odometry repeats its speed"),
+        ([samples(1.0), samples(1.0, speed=0.11), samples(1.02)], ""),
         ([samples(), samples(1.0, 1e308, 1e308)], ""),
     ],
 )
 def test_a_stretch_that_says_nothing_gives_no_row(parts, reason):
     rows = RowCollector(RADIUS, LOAD)
     for i, part in enumerate(parts):
-        assert rows.add(SECOND + i * 7 * SECOND // 10, part) == []
+        assert rows.add(SECOND + i * 7 * SECOND // 10 // (len(parts) - 1), part) == []
     (found,) = rows.add(5 * SECOND // 2, samples())
-    assert (found.reason, found.row is None) == (reason, bool(reason))
+    assert found.reason.startswith(reason) and (found.row is None) == bool(reason)
 
 
 def test_a_stretch_with_samples_in_a_part_of_it_gives_no_row():

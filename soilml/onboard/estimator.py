@@ -217,9 +217,16 @@ class Estimator:
         rows = self._configured_sets.rows(measured)
         return self.sets.rows_in_range(self.session, rows)
 
-    def start(self) -> Memory:
-        """The memory of a soil before its first reading; see `step`."""
-        return self._configured_sets.start(self.memory_id)
+    def start(self, keep: int = 0) -> Memory:
+        """The memory of a soil before its first reading; see `step`.
+
+        keep: Rows that are kept as they were read until there are so many. Errors of model and
+            sensors are linear at the soil that is known from them all, so that up to so many rows
+            the answers are those of `run`. A step then takes as long as a call with these rows.
+
+        Raises `InputError` if `keep` is not a whole number of rows, from 0 to 256.
+        """
+        return self._configured_sets.start(self.memory_id).keeping(keep)
 
     @cached_property
     def memory_id(self) -> str:
@@ -230,7 +237,9 @@ class Estimator:
     def step(self, memory: Memory, **measured: Any) -> tuple[Estimate, Memory]:
         """The estimate from all readings so far, after one or more new ones, and the new memory.
 
-        The memory does not grow with the number of readings, and their order matters little.
+        The memory does not grow with the number of readings, and their order matters little. Errors
+        of model and sensors are linear at the soil that is known when a row arrives; `start` can
+        keep rows so that the answer is that of one call.
 
         Parameters
         ----------
@@ -252,8 +261,13 @@ class Estimator:
         """
         sets = self._configured_sets
         before = check_memory(memory, sets.columns, self.memory_id, self.path)
-        estimate, memory = self._set_estimate(sets.rows(measured), before)
-        return estimate, memory.packed(len(before.system))
+        rows = sets.rows(measured)
+        if before.kept is None:
+            estimate, memory = self._set_estimate(rows, before)
+            return estimate, memory.packed(len(before.system))
+        rows = before.kept.with_rows(rows)
+        estimate, memory = self._set_estimate(rows, before.kept.before)
+        return estimate, replace(memory.packed(), kept=before.kept.after(rows, memory))
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.features import READABLE, as_number, as_numbers, flatten_readings, parts_of_rows
-from soilml.onboard.memory import Memory
+from soilml.onboard.memory import ROWS_PER_CALL, Memory
 from soilml.onboard.model_file import Session
 from soilml.onboard.set_contract import (
     ABSENT_READING,
@@ -46,8 +46,6 @@ from soilml.onboard.set_contract import (
 
 Feed = dict[str, NDArray[Any]]
 
-#: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.
-ROWS_PER_CALL = 256
 #: Standard deviations that may be zero, and everything that is read of a row.
 MAY_BE_ZERO = ("torque_bias", *OPERATING_STD_INPUTS)
 KNOWN = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INPUTS)

@@ -15,6 +15,8 @@ LEAST_SAMPLES, LEAST_SPAN = 2, 0.5
 #: Change of the wheel's speed from the first half of a stretch to the second, as a share of its
 #: mean, above which the wheel starts or stops: its torque then accelerates the wheel as well.
 MOST_CHANGE = 0.3
+#: Samples of odometry from which equal ones are no measurement, while the wheel's speed varies.
+REPETITIONS = 3
 #: Quantities and what the node calls them.
 SOURCES = {
     "wheel_speed": "velocity of the joint",
@@ -186,6 +188,9 @@ class RowCollector:
         first, second = values["wheel_speed"][:half], values["wheel_speed"][-half:]
         if abs(sum(second) - sum(first)) > MOST_CHANGE * half * abs(mean["wheel_speed"]):
             return Stretch(end, None, "the wheel starts or stops")
+        speeds = values["speed"]
+        if len(speeds) >= REPETITIONS and len(set(speeds)) == 1 < len(set(values["wheel_speed"])):
+            return Stretch(end, None, "odometry repeats its speed to the last digit")
         if not isfinite(sum(mean.values())):
             return Stretch(end, None, "samples are too large")
         load = mean["load"] if self.load is None else self.load

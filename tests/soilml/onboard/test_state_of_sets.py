@@ -4,7 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import simulated_run
 
+from soilml import Estimator
 from soilml.errors import InputError
 from soilml.onboard.memory import LEAST_SINGULAR_VALUE, PACKED_EVERY, Memory, check_memory
 from soilml.onboard.tracking.filter_state import FilterState, RowWindow
@@ -132,3 +134,34 @@ def test_answers_after_packing_are_those_before(whole_file):
     for _ in range(3 * PACKED_EVERY):
         _, after = estimator.step(after, **one)
     assert len(after.system) <= after.system.shape[1]
+
+
+def test_rows_that_are_kept_give_the_answer_of_one_call(wheel_set_file, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 20)
+    estimator = Estimator.load(wheel_set_file)
+    together = estimator.run(**run)
+    found = {}
+    for keep in (0, 12, 20):
+        memory = estimator.start(keep)
+        for first in range(0, 20, 4):
+            part = {name: values[first : first + 4] for name, values in run.items()}
+            found[keep], memory = estimator.step(memory, **part)
+        assert memory.rows == 20 and found[keep].rows_used == 20
+        assert (memory.kept is None) == (keep == 0)
+    assert found[20].mean == pytest.approx(together.mean, rel=1e-6)
+    assert found[20].std == pytest.approx(together.std, rel=1e-6)
+    far = {k: np.abs((found[k].mean - together.mean) / together.std).max() for k in found}
+    assert far[20] < 1e-5 < min(far[0], far[12]) and far[12] < 1.0
+    # all rows have joined after the last step: nothing is kept twice
+    assert memory.kept.rows == {} and memory.kept.before.rows == 20
+
+
+def test_what_cannot_be_kept_is_refused(wheel_set_file):
+    estimator = Estimator.load(wheel_set_file)
+    for keep in (-1, 257, 2.0, True):
+        with pytest.raises(InputError, match=r"keep is .*; needed is a whole number from 0 to 256"):
+            estimator.start(keep)
+    memory = estimator.start(keep=4)
+    other = replace(memory.kept, before=replace(memory.kept.before, file="another"))
+    with pytest.raises(InputError, match="this memory is of 'another'"):
+        estimator.step(replace(memory, kept=other), slip=0.3, torque=2.0, load=60.0)
