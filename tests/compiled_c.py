@@ -24,6 +24,7 @@ TYPES = {
     "int": ctypes.c_int,
     "unsigned int": ctypes.c_uint,
     "bool": ctypes.c_bool,
+    "pointer": ctypes.c_void_p,
 }
 
 
@@ -48,8 +49,12 @@ class CompiledModel:
         self.codes = {name: int(number) for name, number in codes}
         self.structs = {}
         for body, name in re.findall(r"typedef struct \w*\s*\{(.*?)\} (\w+);", text, re.DOTALL):
-            fields = re.findall(r"^    ([a-z0-9_ ]+?) (\w+)((?:\[\w+\])*);", body, re.MULTILINE)
-            members = [(field, self._type(kind, sizes)) for kind, field, sizes in fields]
+            form = r"^    ([a-z0-9_ ]+?) (\*?\w+)((?:\[\w+\])*);"
+            fields = re.findall(form, body, re.MULTILINE)
+            members = [
+                (field.lstrip("*"), self._type("pointer" if "*" in field else kind, sizes))
+                for kind, field, sizes in fields
+            ]
             self.structs[name] = type(name, (ctypes.Structure,), {"_fields_": members})
         self.library = ctypes.CDLL(str(library))
         for function, struct in (("empty_row", "row"), ("usual_context", "context")):

@@ -26,6 +26,7 @@ from training.export_c.graph_translation import rows_are_apart
 from training.export_c.interface import Interface, read_interface
 from training.export_c.program import Constant, SharedParts
 from training.export_c.single_precision import in_single_precision
+from training.export_c.tracker import tracker_values
 
 #: Bytes of an element, as all usual compilers have them; the C file checks what follows from it.
 BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
@@ -70,6 +71,7 @@ def write_c(
     model = in_single_precision(model, metadata)
     interface, shared = read_interface(model, metadata), SharedParts()
     functions: dict[str, GraphFunction] = {}
+    depends = False
     if interface.single:
         functions["single"] = single_function(model, interface, shared)
     if interface.sets:
@@ -77,6 +79,7 @@ def write_c(
             functions["step"] = step_function(model, interface, shared, rows)
         else:
             functions["update"] = update_function(model, interface, shared, rows)
+            depends = True
         functions["answer"] = answer_function(model, interface, shared)
     used = frozenset().union(*(function.constants for function in functions.values()))
     constants = [parts for parts in shared.constants.values() if parts[0] in used]
@@ -105,6 +108,7 @@ def write_c(
         "factors": fields["pooling"].single_row_coverage_factor.tolist(),
         "z90": Z_90,
         "vague": NOT_IDENTIFIED_ABOVE,
+        "tracker": tracker_values(interface, sizes["memory_bytes"], rows) if depends else None,
         **sizes,
     }
     source, header = (
@@ -150,7 +154,7 @@ def _sizes(
     if interface.sets:
         work += len(interface.rows) * rows * BYTES["float"]
         work += interface.columns * max(interface.columns * BYTES["float"], BYTES["double"])
-        work += interface.columns * BYTES["double"]
+        work += interface.columns * BYTES["double"] + 16  # rows that were added last
     triangle = interface.columns * (interface.columns + 1) // 2
     memory = triangle * BYTES["double"] + (4 + len(interface.context)) * BYTES["float"] + 16
     return {

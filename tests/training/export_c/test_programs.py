@@ -1,5 +1,6 @@
 """Programs in C and C++ around exported files: examples, and a run under sanitizers."""
 
+import re
 import shutil
 import subprocess
 
@@ -36,6 +37,19 @@ def test_the_c_example(compiler, exported, library, tmp_path):
     build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
     *_, last = run(program).splitlines()
     assert last == "answered"
+
+
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_the_walk_through_of_the_page(compiler, exported, library, tmp_path):
+    """The program of docs/c-export.md, which ends with a row that is set aside."""
+    page = (ROOT / "docs" / "c-export.md").read_text()
+    (tmp_path / "main.c").write_text(re.search(r"<<'END'\n(.*?)^END$", page, re.M | re.S)[1])
+    folder, program, made = exported("wheel"), tmp_path / "board", library("wheel", compiler)
+    command = [compiler, *WARNINGS, f"-I{folder}", tmp_path / "main.c", made]
+    build([*command, f"-Wl,-rpath,{made.parent}", "-lm", "-o", program])
+    *events, identity = run(program).splitlines()
+    assert [line.split(":")[0] for line in events] == [f"event {e}" for e in (0, 0, 0, 0, 1)]
+    assert identity.startswith("wheel by soilml ")
 
 
 @pytest.mark.skipif(not shutil.which("g++"), reason="no C++ compiler")

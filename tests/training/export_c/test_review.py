@@ -1,0 +1,91 @@
+"""What docs/c-review.md states of the generated code: stack, recursion, loops, state, requirements."""
+
+import os
+import re
+import subprocess
+import sys
+
+import pytest
+from compiled_c import COMPILERS, ROOT, WARNINGS
+
+PAGE = ROOT / "docs" / "c-review.md"
+#: Functions of the C library that the code may call: mathematics, and copies of memory.
+LIBRARY = {
+    *("cos", "exp", "floor", "log", "sin", "sqrt", "tanh", "rint", "fabs"),
+    *("cosf", "expf", "floorf", "logf", "sinf", "sqrtf", "tanhf", "rintf", "fabsf"),
+    *("memcpy", "memset", "memmove"),
+}
+#: Largest stack by file that the page states, bytes, where float is 4 and double 8.
+STACK = {"wheel_linear": 1000, "slip_torque": 1000, "wheel_lssvm": 20_000, "wheel": 20_000}
+SMALL = [name for name in STACK if name != "wheel"]
+gcc = pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
+
+
+def call_graph(source, out):
+    """Bytes of stack of each function, and its calls, as gcc has them."""
+    command = ["gcc", *WARNINGS, "-O2", "-fcallgraph-info=su", "-c", source, "-o", out]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0 and done.stderr == "", done.stderr[:2000]
+    text = out.with_suffix(".ci").read_text()
+    stack, calls = {}, {}
+    for name, label in re.findall(r'node: \{ title: "([^"]+)" label: "([^"]*)"', text):
+        size = re.search(r"(\d+) bytes \(([\w,]+)\)", label)
+        stack[name] = None if size is None else int(size[1])
+        assert size is None or size[2] == "static", f"{name} has a stack of variable size"
+    for one, other in re.findall(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', text):
+        calls.setdefault(one, set()).add(other)
+    return stack, calls
+
+
+def deepest(name, stack, calls, above=()):
+    """Bytes of stack of a function with all that it calls."""
+    assert name not in above, f"{name} calls itself"
+    below = [deepest(other, stack, calls, (*above, name)) for other in calls.get(name, ())]
+    return (stack[name] or 0) + max(below, default=0)
+
+
+@gcc
+@pytest.mark.parametrize("name", [*SMALL, pytest.param("wheel", marks=pytest.mark.slow)])
+def test_stack_is_bounded_nothing_recurses_and_mathematics_alone_is_called(
+    name, exported, tmp_path
+):
+    stack, calls = call_graph(exported(name) / f"{name}.c", tmp_path / "made.o")
+    own = [function for function, size in stack.items() if size is not None]
+    assert {function for function, size in stack.items() if size is None} <= LIBRARY
+    assert max(deepest(function, stack, calls) for function in own) < STACK[name]
+    listed = subprocess.run(["nm", tmp_path / "made.o"], capture_output=True, text=True)
+    kinds = {line.split()[-2] for line in listed.stdout.splitlines()}
+    assert kinds <= {"T", "t", "r", "U"}  # functions and constants: no state
+
+
+@pytest.mark.parametrize("name", [*SMALL, pytest.param("wheel", marks=pytest.mark.slow)])
+def test_every_loop_counts_to_a_number_that_is_known_before_it_begins(name, exported):
+    source = (exported(name) / f"{name}.c").read_text()
+    code = re.sub(r"/\*.*?\*/", "", source, flags=re.DOTALL)
+    assert not re.search(r"\b(while|goto|do|malloc|free|alloca|longjmp)\b", code)
+    heads = re.findall(r"\bfor \((.*?)\)(?=\s*[\n{])", code)
+    assert heads and all(head.count(";") == 2 and head.split(";")[1].strip() for head in heads)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["wheel"])
+def test_the_export_of_a_set_posterior_is_deterministic(name, exported, tmp_path):
+    """Bit by bit, in another process with another order of hashes."""
+    model, out = ROOT / "exported" / f"{name}.onnx", tmp_path / f"{name}.c"
+    program = "import sys; from soilml.cli import main; sys.exit(main(sys.argv[1:]))"
+    command = [sys.executable, "-c", program, "export-c", str(model), str(out)]
+    done = subprocess.run(command, env=os.environ | {"PYTHONHASHSEED": "7"}, cwd=ROOT)
+    assert done.returncode == 0
+    for made in (out, out.with_suffix(".h")):
+        assert made.read_bytes() == (exported(name) / made.name).read_bytes()
+
+
+def test_every_requirement_of_the_page_names_tests_that_exist():
+    rows = [line for line in PAGE.read_text().splitlines() if re.match(r"\| C\d", line)]
+    assert len(rows) >= 12
+    for row in rows:
+        named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", row)
+        assert named, row
+        for file, test in named:
+            text = (ROOT / "tests" / "training" / "export_c" / file).read_text()
+            assert f"def {test}(" in text, f"{file}::{test}"

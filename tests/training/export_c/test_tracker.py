@@ -1,0 +1,124 @@
+"""The tracker in C against `SoilTracker`: the same events, and the same estimates."""
+
+import ctypes
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from compiled_c import ROOT, as_arrays
+from simulated_rows import ANY_WHEEL
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "bench"))
+
+from driven_days import SLIP_STD, simulate_day
+
+from soilml import Estimator, SoilTracker
+from soilml.onboard.tracking import Event
+
+pytestmark = pytest.mark.slow
+#: Largest difference of mean and standard deviation, in standard deviations, of one row of a
+#: hundred and of any: sums in another order, and a factor in the place of singular vectors.
+OFTEN, WORST = 1e-3, 0.02
+
+
+class CompiledTracker:
+    """A tracker of a compiled model."""
+
+    def __init__(self, model, context):
+        self.model = model
+        self.tracker, self.estimate = model.new("tracker"), model.new("set_estimate")
+        given = model.new("context", **context) if context else None
+        assert model.call("tracker_start", self.tracker, given) == 0
+
+    def read(self, **row):
+        """Code, event and estimate."""
+        event = (ctypes.c_int * 1)(-1)
+        row = self.model.row(**row)
+        arguments = self.tracker, row, event, self.estimate, self.model.work
+        return self.model.call("tracker_read", *arguments), event[0], as_arrays(self.estimate)
+
+
+def drive(model, estimator, rows, context=None):
+    """Both trackers along rows; events, and differences of the estimates (rows,)."""
+    python, own = SoilTracker(estimator), CompiledTracker(model, context or {})
+    events, apart = [], []
+    for row in rows:
+        expected = python.read(**row)
+        code, event, answer = own.read(**row)
+        events.append((Event(event), expected.event))
+        tracker = own.tracker
+        assert tracker.rows_since_change == expected.rows_since_change
+        assert tracker.in_question == expected.rows_in_question
+        assert tracker.drifting == expected.drifting
+        assert tracker.memory.counted[1] == expected.rows_remembered
+        if code == model.codes["NO_ROWS"]:
+            assert expected.rows_remembered == 0
+            continue
+        estimate = expected.estimate
+        assert code == int(not estimate.in_range)
+        found = [answer["mean"] - estimate.mean, answer["std"] - estimate.std]
+        apart.append(np.max(np.abs(found) / estimate.std))
+    return events, np.array(apart)
+
+
+def day(seed):
+    """Rows of a simulated day in float32, so that both sides read the same numbers."""
+    made = simulate_day(seed)
+    columns = {k: np.asarray(v, np.float32) for k, v in made.readings.items()}
+    columns["slip_std"] = np.full(len(columns["slip"]), SLIP_STD, np.float32)
+    return [{k: float(v[i]) for k, v in columns.items()} for i in range(len(columns["slip"]))]
+
+
+def spoilt(rows, rng):
+    """The rows with some in between that cannot be used."""
+    odd = ({"torque": np.nan}, {"slip": 1.5}, {"load": np.inf}, {"slip": 0.9})
+    found = []
+    for row in rows:
+        found += [row | odd[rng.integers(4)]] if rng.random() < 0.1 else []
+        found += [row] * (1 + int(rng.random() < 0.05))
+    return found
+
+
+@pytest.mark.parametrize(("seed", "name"), [(0, "wheel"), (1, "any_wheel")])
+def test_a_day_with_other_soils_glitches_stuck_sensors_and_a_drift(seed, name, compiled):
+    context = ANY_WHEEL if name == "any_wheel" else {}
+    estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+    estimator = estimator.on(**context) if context else estimator
+    rows = spoilt(day(seed), np.random.default_rng(seed))
+    rows = rows if name == "wheel" else rows[:160]
+    events, apart = drive(compiled(name), estimator, rows, context)
+    assert [own for own, _ in events] == [expected for _, expected in events]
+    assert np.quantile(apart, 0.99) < OFTEN and apart.max() < WORST
+    kinds = {own for own, _ in events}
+    needed = {Event.ACCEPTED, Event.SET_ASIDE, Event.REPEATED, Event.UNUSABLE}
+    assert needed | ({Event.SOIL_CHANGED, Event.STUCK} if name == "wheel" else set()) <= kinds
+
+
+@pytest.mark.parametrize("value", [-1.0, np.inf])
+def test_a_bad_standard_deviation_changes_nothing(value, compiled):
+    model = compiled("wheel")
+    own = CompiledTracker(model, {})
+    for row in day(0)[:5]:
+        own.read(**row)
+    before = bytes(own.tracker)
+    code, _, _ = own.read(**day(0)[5] | {"torque_std": value})
+    assert code == model.codes["BAD_STD"] and bytes(own.tracker) == before
+
+
+def test_a_tracker_that_was_not_started_is_refused(compiled):
+    model = compiled("wheel")
+    own = CompiledTracker(model, {})
+    own.tracker = model.new("tracker")
+    assert own.read(**day(0)[0])[0] == model.codes["NOT_STARTED"]
+    zeros = model.structs["wheel_context"]()
+    assert model.call("tracker_start", own.tracker, zeros) == model.codes["BAD_CONTEXT"]
+
+
+def test_the_constants_are_those_of_the_tracker_in_python(compiled):
+    model = compiled("wheel")
+    assert {e.name: e.value for e in Event}.items() <= model.codes.items()
+    assert (
+        model.numbers["WHEEL_TRACKER_LENGTH"]
+        == SoilTracker(Estimator.load(ROOT / "exported" / "wheel.onnx")).length
+    )

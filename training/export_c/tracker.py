@@ -1,0 +1,61 @@
+"""What the tracker in C is made with: the constants of `soilml.onboard.tracking`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from soilml.onboard.set_contract import ABSENT_STD, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
+from soilml.onboard.tracking import filter_state, misfit, soil_tracker
+from training.export_c.interface import Interface
+
+BYTES_OF_A_ROW, OTHER_BYTES = 64, 2048  # Beside the residual systems, at most
+
+
+def tracker_values(interface: Interface, memory_bytes: int, rows: int) -> dict[str, Any] | None:
+    """Values for the templates of the tracker; None where a file cannot have one.
+
+    That is a file without sets or without errors that a set shares, and a step that takes fewer
+    rows than are compared with those before.
+
+    interface: Of the file.
+    memory_bytes: Size of the memory of a set.
+    rows: Rows that one step takes at most.
+    """
+    names = [field.name for field in interface.rows]
+    watched = [name for name in filter_state.WATCHED if name in names]
+    complete = {"slip", "load", "torque"} <= {*watched}
+    if not interface.context or not complete or rows < filter_state.MOST_ROWS:
+        return None
+    length = soil_tracker.DEFAULT_LENGTH
+    per_block = -(-length // filter_state.BLOCKS)
+    blocks = length + per_block + 2
+    system_rows = len(RESPONSE_CHANNELS) * blocks
+    stds = [names.index(f"{n}_std") if f"{n}_std" in names else -1 for n in watched]
+    size = 2 * memory_bytes + system_rows * interface.columns * 4 + blocks * BYTES_OF_A_ROW
+    return {
+        "length": length,
+        "bytes": size + OTHER_BYTES,
+        "events": list(soil_tracker.Event),
+        "system_rows": system_rows,
+        "blocks": blocks,
+        "rows_per_block": per_block,
+        "recent": min(filter_state.RECENT_ROWS, length // 2),
+        "most_rows": filter_state.MOST_ROWS,
+        "least_rows": filter_state.LEAST_ROWS,
+        "give_up_after": filter_state.GIVE_UP_AFTER,
+        "repetitions": filter_state.REPETITIONS,
+        "watched": watched,
+        "stds": stds,
+        "absent_std": ABSENT_STD,
+        "model_error": any(field.name == MODEL_ERROR_INPUT for field in interface.context),
+        "all_but_right": misfit.ALL_BUT_RIGHT,
+        "quantile": misfit.QUANTILE,
+        "change_quantile": misfit.CHANGE_QUANTILE,
+        "error_degrees": misfit.ERROR_DEGREES,
+        "assumed_readings": misfit.ASSUMED_READINGS,
+        "assumed_rows": misfit.ASSUMED_ROWS,
+        "rows_judged": misfit.ROWS_JUDGED,
+        "most_excess": misfit.MOST_EXCESS,
+        "most_variance": misfit.MOST_VARIANCE,
+        "halves_every": soil_tracker.HALVES_EVERY,
+    }
