@@ -1,4 +1,4 @@
-"""What docs/c-review.md states of the generated code: stack, recursion, loops, state, requirements."""
+"""What docs/c-review.md states of the generated code: stack, recursion, loops, state, tests."""
 
 import os
 import re
@@ -13,10 +13,11 @@ PAGE = ROOT / "docs" / "c-review.md"
 LIBRARY = {
     *("cos", "exp", "floor", "log", "sin", "sqrt", "tanh", "rint", "fabs"),
     *("cosf", "expf", "floorf", "logf", "sinf", "sqrtf", "tanhf", "rintf", "fabsf"),
-    *("memcpy", "memset", "memmove"),
+    *("sincos", "sincosf", "memcpy", "memset", "memmove"),
 }
 #: Largest stack by file that the page states, bytes, where float is 4 and double 8.
-STACK = {"wheel_linear": 1000, "slip_torque": 1000, "wheel_lssvm": 20_000, "wheel": 20_000}
+STACK = {"wheel_linear": 1000, "slip_torque": 1000, "wheel_lssvm": 20_000, "wheel": 12_000}
+BOUNDED = ("static", "dynamic,bounded")  # Frames whose size gcc knows, or its largest value
 SMALL = [name for name in STACK if name != "wheel"]
 gcc = pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
 
@@ -31,7 +32,7 @@ def call_graph(source, out):
     for name, label in re.findall(r'node: \{ title: "([^"]+)" label: "([^"]*)"', text):
         size = re.search(r"(\d+) bytes \(([\w,]+)\)", label)
         stack[name] = None if size is None else int(size[1])
-        assert size is None or size[2] == "static", f"{name} has a stack of variable size"
+        assert size is None or size[2] in BOUNDED, f"{name} has a stack without bound"
     for one, other in re.findall(r'edge: \{ sourcename: "([^"]+)" targetname: "([^"]+)"', text):
         calls.setdefault(one, set()).add(other)
     return stack, calls
