@@ -67,16 +67,11 @@ def lines(soil: str, kind: str, campaigns: int, folder: Path) -> Iterator[str]:
         yield f"| {kind} | {soil} | {soils} x {rows} | {cells([tuple(pair) for pair in mean])} |"
 
 
-def table(campaigns: int, folder: Path) -> str:
-    """The table as Markdown."""
-    head = table_head(("files", "soil", "soils x rows", *SENSORS, "fused"), text=3)
-    body = [
-        line for soil in SOILS for kind in KINDS for line in lines(soil, kind, campaigns, folder)
-    ]
-    return "\n".join([head, *body])
-
-
 if __name__ == "__main__":
     count = int(sys.argv[1]) if len(sys.argv) > 1 else CAMPAIGNS
+    print(table_head(("files", "soil", "soils x rows", *SENSORS, "fused"), text=3))
     with tempfile.TemporaryDirectory() as temporary:
-        print(table(count, Path(temporary)))
+        for soil in SOILS:
+            for kind in KINDS:
+                for line in lines(soil, kind, count, Path(temporary)):
+                    print(line, flush=True)
