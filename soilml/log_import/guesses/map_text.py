@@ -33,16 +33,18 @@ from soilml.log_import.guesses.columns import (
     liveliest,
     words_of,
 )
-from soilml.log_import.guesses.constants import agreed_constants
+from soilml.log_import.guesses.constants import agreed_constants, stated_radius
 from soilml.log_import.guesses.draft import (
     Draft,
     Marked,
+    inputs_of,
     key_line,
     keys_alike,
 )
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.roles import Assignment, assign, axle_of
+from soilml.log_import.guesses.support import mark_unsupported
 from soilml.log_import.guesses.wheel_radius import wheel_lines
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
@@ -194,6 +196,10 @@ class _MapDrafting:
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
+        clear = [role for role, why in self.reasons.items() if not isinstance(why, Marked)]
+        radius = stated_radius(self.stated.common)
+        for group in drafts.values():
+            mark_unsupported(group, inputs_of(group, self.run), radius, clear)
         add_errors(first, self.found, self.errors)
         for role, why in self.reasons.items():
             if role in first:

@@ -8,6 +8,7 @@ from soilml.log_import.guesses.columns import Candidate, words_of
 from soilml.log_import.guesses.constants import StatedConstants, number_in_names
 from soilml.log_import.guesses.draft import Marked, key_line, toml_value
 from soilml.log_import.guesses.roles import Assignment
+from soilml.log_import.guesses.support import unused_of, used_columns
 from soilml.log_import.mapping.channel_map import ROLES
 
 _GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}  # Words of a place in degrees
@@ -137,6 +138,17 @@ def absent_lines(
             "# [ground_speed]",
             '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
         ]
+    used = used_columns(found.shared, found.parts)
+    for own in found.wheels.values():
+        used |= used_columns(own, {})
+    if (
+        not others
+        and role in ("drawbar_pull", "sinkage")
+        and (names := unused_of(role, ROLES[role][0], columns, used))
+    ):
+        shown = ", ".join(map(toml_value, names[:4]))
+        line = f"# [{role}]  # CHANGE: perhaps one of {shown} is {ROLES[role][1]}"
+        return ["", Marked(line), f"# column = {toml_value(names[0])}"]
     if others:
         column = toml_value(others[0].address)
         return ["", f"# [{role}]  # {ROLES[role][1]}", f"# column = {column}"]

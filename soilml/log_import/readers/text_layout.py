@@ -37,6 +37,8 @@ _SPACES = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _BRACKETS = re.compile(r"^(.*?)\s*[\[(<{]\s*([^\])>}]*)\s*[\])>}]\s*$")
 #: A quantity over its unit, as `Zeit / s` and `T in N m`.
 _OVER_UNIT = re.compile(r"^(.+?\w)\s+(?:/|in)\s+(\S.{0,15})$")
+#: The same without spaces, of a name of some length: `torque/mNm`, `rate/(deg/s)`.
+_OVER_UNIT_CLOSE = re.compile(r"^([^\W\d_]{3,}[^/()\[\],\s]*)/(\([^)]*\)|[^/ ]{1,8})$")
 #: What divides the words in brackets; words before a unit.
 _PARTS = re.compile(r"\s+[-:\u2013]\s+|[,;]")
 _IN = re.compile(r"^(?:(.*)\s)?in\s+(\S.*)$")
@@ -146,8 +148,9 @@ def is_number(cell: str, decimal_comma: bool = False) -> bool:
 
 def name_and_unit(cell: str) -> tuple[str, str]:
     """Name and unit of a header such as `Fz [N]` or `speed (mm/s)`; the unit is "" without one."""
-    if (match := _OVER_UNIT.match(cell)) and known_unit(_bare(match[2])):
-        return match[1].strip(), _bare(match[2])
+    for pattern in (_OVER_UNIT, _OVER_UNIT_CLOSE):
+        if (match := pattern.match(cell)) and known_unit(_bare(match[2])):
+            return match[1].strip(), _bare(match[2])
     match = _BRACKETS.match(cell)
     if match and match[1].strip():
         return _unit_and_remark(match[1].strip(), match[2].strip())
@@ -259,6 +262,8 @@ def _header(
 def _header_cells(text: str, separator: str, width: int) -> list[str]:
     """The cells of a line before the samples; names may have another separator than the samples."""
     cells = split_line(text, separator)
+    if len(cells) > width:
+        cells = _closed(cells, separator, width)
     if separator == " " and len(cells) != width:
         for own in (re.split(r"\s{2,}", text), _NAMED.findall(text)):
             if len(own) == width and not any(is_number(cell) for cell in own):
@@ -268,6 +273,20 @@ def _header_cells(text: str, separator: str, width: int) -> list[str]:
         if len(own) == width and not any(is_number(cell) for cell in own):
             return own
     return cells
+
+
+def _closed(cells: list[str], separator: str, width: int) -> list[str]:
+    """The cells of a header whose brackets hold a separator, as `speed (rpm, before gearbox)`.
+
+    The cells as they are, where that does not give the width of the samples.
+    """
+    found: list[str] = []
+    for cell in cells:
+        if found and found[-1].count("(") > found[-1].count(")"):
+            found[-1] = f"{found[-1]}{separator} {cell}"
+        else:
+            found.append(cell)
+    return found if len(found) == width else cells
 
 
 def _are_units(cells: list[str]) -> bool:
