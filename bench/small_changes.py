@@ -37,7 +37,7 @@ from soilml.onboard.tracking import Event
 
 #: Days, the first seed, and ends of the rms relative change of torque. Limits of the tracker were
 #: chosen on days of other seeds.
-DAYS, SEED, CHANGES = 12, 400, (0.05, 0.12)
+DAYS, SEED, CHANGES = 8, 400, (0.05, 0.12)
 #: A change counts as found within so many rows, and late rows of a soil as unchanged after so many.
 SOON, LATE = 20, 40
 #: The best filter: soils of the prior, and knots of slip and load at which their torque is known.
