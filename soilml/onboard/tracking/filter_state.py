@@ -185,10 +185,12 @@ class RepeatedReadings:
         before = self.previous
         if before is None:
             return RepeatedReadings(row)
+        # a wheel that stands repeats its slip and torque, whatever the load does
+        moves = bool(row["slip"][0] or row["torque"][0])
         return RepeatedReadings(
             row,
             tuple(
-                times + 1 if _measured(row, n) and row[n][0] == before[n][0] else 0
+                times + 1 if moves and _measured(row, n) and row[n][0] == before[n][0] else 0
                 for n, times in zip(WATCHED, self.times, strict=True)
             ),
         )

@@ -57,6 +57,11 @@ def test_sound_rows_give_the_estimate_of_a_run(settled, estimator, wheel_posteri
     assert (settled.state.rows_remembered, settled.state.rows_since_change) == (40, 40)
 
 
+def test_a_wheel_that_stands_under_a_changing_load_has_no_stuck_sensor(settled):
+    states = [settled.read(slip=0.0, torque=0.0, load=60.0 + i) for i in range(5)]
+    assert {state.event for state in states} == {Event.UNUSABLE}
+
+
 @pytest.mark.parametrize("factor", [2.0, 0.5, 0.0])
 def test_a_glitch_leaves_the_estimate_as_it_is(settled, wheel_posterior, factor):
     before = settled.state.estimate
