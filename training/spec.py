@@ -206,6 +206,8 @@ def _take_parameter(
 LEAST_DESIGNS = 512  # With fewer operating conditions no network learns the response of a wheel
 #: Upper limits, beyond which training takes days on a laptop.
 UPPER_LIMITS = {"designs": 10**7, "hidden": 1024, "epochs": 10**5}
+#: Monomials of a file for a microcontroller: with 26, the memory of a set has 4 kB.
+LEAST_SMALL_TERMS, MOST_SMALL_TERMS = 10, 26
 
 
 def take_response_settings(settings: Settings, seed: int) -> ResponseSettings:
@@ -217,5 +219,11 @@ def take_response_settings(settings: Settings, seed: int) -> ResponseSettings:
             table.fail(f"{key} is {counts[key]}; needed is at most {most}")
     if counts["designs"] < LEAST_DESIGNS:
         table.fail(f"designs is {counts['designs']}; needed are {LEAST_DESIGNS} or more")
+    small = bool(table.take("small", bool, "true or false", False))
+    terms = table.count("terms") if "terms" in table else MOST_SMALL_TERMS if small else 0
+    if small and not LEAST_SMALL_TERMS <= terms <= MOST_SMALL_TERMS:
+        table.fail(
+            f"terms is {terms}; a small file needs {LEAST_SMALL_TERMS} to {MOST_SMALL_TERMS}"
+        )
     table.finish()
-    return ResponseSettings(**counts, seed=seed)
+    return ResponseSettings(**counts, seed=seed, small=small, terms=terms)

@@ -178,7 +178,7 @@ def train(
 def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosterior:
     """The set posterior of wheels of any size, and its metrics on fresh simulated sets."""
     response = fit_response(spec.family, spec.response, progress)
-    posterior = calibrate_misfit_limits(spec.family, response, progress)
+    posterior = calibrate_misfit_limits(spec.family, response, progress, spec.response.small)
     return posterior, validate_posterior(posterior, progress)
 
 
@@ -189,7 +189,7 @@ def _train_set_posterior(
         return None, {}
     family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
     response = fit_response(family, spec.set_posterior, progress)
-    posterior = calibrate_misfit_limits(family, response, progress)
+    posterior = calibrate_misfit_limits(family, response, progress, spec.set_posterior.small)
     posterior = replace(posterior, noise=family.declared_noise())
     return posterior, validate_posterior(posterior, progress)
 

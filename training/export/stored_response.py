@@ -27,9 +27,9 @@ from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.misfit_test import MisfitLimits
-from training.set_posterior.monomials import monomial_terms
+from training.set_posterior.monomials import Terms
 from training.set_posterior.residual_system import BOX_TOLERANCE
-from training.set_posterior.response_surface import Response
+from training.set_posterior.response_surface import Response, family_terms
 from training.set_posterior.validation import metadata_of, probe_of_sets
 
 CHANNELS = len(RESPONSE_CHANNELS)
@@ -50,8 +50,10 @@ def write_anew(path: Path) -> None:
     family = _family(metadata, sets, path)
     branch = model.graph if sets["alone"] else _branch(model, "then_branch")
     limits = MisfitLimits(*(np.asarray(sets["misfit"][key]) for key in ("readings", "most")))
-    response = read_response(branch, family, sets["error"])
-    posterior = SetPosteriorGraph(family, response, limits, sets["noise"])
+    terms = tuple(tuple(term) for term in sets.get("monomials", ())) or family_terms(family)
+    response = read_response(branch, family, sets["error"], terms)
+    small = bool(sets.get("small", False))
+    posterior = SetPosteriorGraph(family, response, limits, sets["noise"], small)
     graph = Graph("" if sets["alone"] else "sets_")
     posterior.add_to(graph, "" if sets["alone"] else "sets_")
     if sets["alone"]:
@@ -117,12 +119,13 @@ def _resize(entry: Any, shape: list[Any]) -> None:
             dimension.dim_value = size
 
 
-def read_response(graph: Any, family: WheelFamily, error: Mapping[str, float]) -> Response:
+def read_response(
+    graph: Any, family: WheelFamily, error: Mapping[str, float], terms: Terms
+) -> Response:
     """The response surface in the graph of a set posterior, as `Response.add_to` wrote it.
 
     Raises `ModelFileError` for a graph of another structure.
     """
-    terms = monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
     constants = _constants(graph)
     ends = _box(graph, constants)
     layers, mean = _layers(graph.node, constants)

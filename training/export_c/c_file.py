@@ -100,7 +100,8 @@ def write_c(
         "functions": functions,
         "arrays": _arrays(functions),
         "constants": [array(*parts) for parts in constants],
-        "kernels": [kernel_text(kernel, kind) for kernel, kind in sorted(shared.kernels)],
+        "kernels": [kernel_text(kernel, kind, interface.small) for kernel, kind in sorted(shared.kernels)],
+        "unpacking": sorted(shared.unpacking),
         "rows": rows,
         "quantities": list(zip(fields["names"], fields["units"], strict=True)),
         "lower": fields["prior"].lower.tolist(),
@@ -153,10 +154,10 @@ def _sizes(
     work = sum(BYTES[kind] * length for kind, length in _arrays(functions).values())
     if interface.sets:
         work += len(interface.rows) * rows * BYTES["float"]
-        work += interface.columns * max(interface.columns * BYTES["float"], BYTES["double"])
-        work += interface.columns * BYTES["double"] + 16  # rows that were added last
+        work += interface.columns * BYTES[interface.precision] + 16  # rows that were added last
     triangle = interface.columns * (interface.columns + 1) // 2
-    memory = triangle * BYTES["double"] + (4 + len(interface.context)) * BYTES["float"] + 16
+    precision, shared = BYTES[interface.precision], 4 + len(interface.context)
+    memory = triangle * precision + shared * BYTES["float"] + 16
     return {
         "memory_bytes": -(-memory // 8) * 8 if interface.sets else 0,
         "work_bytes": -(-work // 8) * 8,
@@ -175,8 +176,6 @@ def _arguments(interface: Interface, function: GraphFunction) -> str:
 
 def _argument(interface: Interface, name: str) -> str:
     """What a function of a set is given for an input of the graph."""
-    if name == MEMORY_INPUTS[0]:
-        return "work->system"
     if name == MEMORY_INPUTS[1]:
         return "memory->counted"
     for index, field in enumerate(interface.rows):
@@ -185,9 +184,14 @@ def _argument(interface: Interface, name: str) -> str:
     return f"&memory->context.{name}"
 
 
-def kernel_text(name: str, kind: str) -> str:
-    """The text of a kernel for one element type."""
-    text = (TEMPLATES / "kernels" / f"{name}.c").read_text()
+def kernel_text(name: str, kind: str, light: bool = False) -> str:
+    """The text of a kernel for one element type.
+
+    light: Whether it is for a processor without vector instructions, where there are two versions.
+    """
+    folder = TEMPLATES / "kernels"
+    lighter = folder / "light" / f"{name}.c"
+    text = (lighter if light and lighter.exists() else folder / f"{name}.c").read_text()
     for mark, functions in _MATH.items():
         text = text.replace(mark, functions.get(kind, mark))
     return text.replace("REAL", kind)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.onboard.set_contract import MEMORY_OUTPUTS, ROW_IN_RANGE, SET_PREFIX, SET_SWITCH
-from training.export_c.graph_translation import translate_graph
+from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_PREFIX, SET_SWITCH
+from training.export_c.graph_translation import added_rows, translate_graph
 from training.export_c.interface import Interface, input_shapes
 from training.export_c.program import MemoryPlan, Program, SharedParts, plan_memory
 from training.export_c.tensor import Shape, Size, Tensor
@@ -40,6 +40,7 @@ class GraphFunction:
     #: C type and number of elements of each output; -1 for a number that varies
     outputs: dict[str, tuple[str, int]]
     lengths: dict[str, int]  # elements of working memory by type
+    unpacks: bool  # whether it reads the memory of a set
     constants: frozenset[str]  # names of the constant arrays that it reads
 
 
@@ -64,8 +65,10 @@ def update_function(
     """The state with the rows that readings add, the counts, and the answer."""
     inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size.of(KEPT)}, switch=True)
     program = Program(shared, {ROWS: rows, KEPT: interface.columns})
-    names = [*STEP_OUTPUTS, *_answers(model)]
-    return graph_function("update_graph", model, program, inputs, names)
+    added, *others = added_rows(model), *STEP_OUTPUTS[1:], *_answers(model)
+    function = graph_function("update_graph", model, program, inputs, [added, *others])
+    outputs = {(MEMORY_OUTPUTS[0] if k == added else k): v for k, v in function.outputs.items()}
+    return replace(function, outputs=outputs)
 
 
 def answer_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
@@ -109,6 +112,8 @@ def graph_function(
     length that is a matrix, if there is one.
     """
     given = tuple(program.bounds)
+    state = inputs.get(MEMORY_INPUTS[0])
+    unpacks = state is not None and state.value is None
     found = translate_graph(model, program, inputs, wanted)
     plan = plan_memory(program, frozenset(tensor.owner for tensor in found.values()))
     given_on = program.given | {tensor.owner for tensor in found.values()}
@@ -116,6 +121,7 @@ def graph_function(
     varying = [t.shape[0] for t in found.values() if not t.count.fixed and t.rank > 1]
     parameters = [
         "WORK *work",
+        *(["const MEMORY *memory"] if unpacks else []),
         *(f"int {count}" for count in given),
         *(f"const {inputs[n].kind} *in_{n}" for n in read),
         *(f"const {tensor.kind} **out_{key}" for key, tensor in found.items()),
@@ -134,6 +140,7 @@ def graph_function(
         inputs=tuple(read),
         outputs=sizes,
         lengths=plan.lengths,
+        unpacks=unpacks,
         constants=frozenset(names),
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 from soilml.errors import ModelFileError
 from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_SWITCH
 from training.export_c.operators import OPERATORS
+from training.export_c.operators.products import squares_of_product
 from training.export_c.program import Node, Program
 from training.export_c.tensor import Size, Tensor
 from training.onnx_graph.builder import SHORTCUT, needed_nodes
@@ -37,16 +38,129 @@ def translate_graph(
     for initial in model.graph.initializer:
         known[initial.name] = Tensor.constant(numpy_helper.to_array(initial), initial.name)
     known |= inputs
-    opsets = model.opset_import
-    nodes, _ = needed_nodes(_without_branches(model.graph, known), outputs)
-    uses = Counter(name for node in nodes for name in node.input)
-    uses.update(dict.fromkeys(outputs, 2))
-    for node in nodes:
-        found = _translate(program, node, [known.get(n) for n in node.input], opsets)
-        for name, tensor in zip(node.output, found, strict=False):
-            several = tensor.pending and uses[name] > 1
-            known[name] = program.stored(tensor) if several else tensor
+    every = _with_sound_memory(_without_branches(model.graph, known))
+    nodes, _ = needed_nodes(every, outputs)
+    translation = _Translation(program, nodes, known, outputs, model.opset_import)
+    for place, node in enumerate(nodes):
+        translation.add(node, place)
     return {name: program.stored(known[name]) for name in outputs if known[name].count != Size(0)}
+
+
+#: Operators that only move elements: where they read the memory of a set, they are computed again
+#: for a node so many further on, so that a copy of the memory does not take room in between.
+MOVING, FAR = ("Transpose", "Split", "Concat", "Gather"), 60
+
+
+class _Translation:
+    """Nodes of a graph that are translated one after another."""
+
+    def __init__(
+        self,
+        program: Program,
+        nodes: Sequence[Any],
+        known: dict[str, Tensor],
+        outputs: Sequence[str],
+        opsets: Any,
+    ) -> None:
+        self.program, self.nodes, self.known, self.opsets = program, nodes, known, opsets
+        self.uses = Counter(name for node in nodes for name in node.input)
+        self.uses.update(dict.fromkeys(outputs, 2))
+        self.squared: dict[str, Any] = {}  # products that are only squared and summed
+        self.moved: dict[str, Any] = {}  # nodes that move elements of the memory, by output
+        self.made: dict[str, int] = {}  # where they were translated last
+        state = known.get(MEMORY_INPUTS[0])
+        self.state = None if state is None or state.value is not None else state
+
+    def add(self, node: Any, place: int) -> None:
+        """Translate the next node."""
+        if self._is_only_squared(node):
+            self.squared[node.output[0]] = node
+            return
+        product = self.squared.get(node.input[0]) if node.input else None
+        if product is not None:
+            self.program.begin(_comment(node))
+            keepdims = all(a.i for a in node.attribute if a.name == "keepdims")
+            a, b = (self.known[name] for name in product.input)
+            self.known[node.output[0]] = squares_of_product(self.program, a, b, keepdims)
+            return
+        if node.op_type == "Identity" and self._is_memory(node.input[0]):
+            self.known[node.output[0]] = self.known[node.input[0]]
+            return
+        from_memory = any(self._of_memory(name) for name in node.input)
+        if from_memory and node.op_type in MOVING:
+            self.moved |= dict.fromkeys(node.output, node)
+        self._translate(node, place)
+
+    def _translate(self, node: Any, place: int) -> None:
+        if node.op_type == "Transpose" and self._is_memory(node.input[0]):
+            found = [self._unpacked("unpack_columns", 1)]
+        else:
+            given = [self._given(name, place) for name in node.input]
+            found = _translate(self.program, node, given, self.opsets)
+        for name, tensor in zip(node.output, found, strict=False):
+            several = tensor.pending and self.uses[name] > 1
+            self.known[name] = self.program.stored(tensor) if several else tensor
+            self.made[name] = place
+
+    def _given(self, name: str, place: int) -> Tensor | None:
+        """An input of a node; the memory of a set, and what is moved of it, anew."""
+        if self._is_memory(name):
+            return self._unpacked("unpack", 0)
+        if name in self.moved and place - self.made[name] > FAR:
+            self._translate(self.moved[name], place)
+        return self.known.get(name)
+
+    def _of_memory(self, name: str) -> bool:
+        """Whether a value is the memory of a set, or elements of it that were moved."""
+        return self._is_memory(name) or name in self.moved
+
+    def _is_memory(self, name: str) -> bool:
+        return self.state is not None and self.known.get(name) is self.state
+
+    def _unpacked(self, function: str, first: int) -> Tensor:
+        """The memory of a set, written by a function of C with this axis first."""
+        assert self.state is not None
+        shape = self.state.shape[first], self.state.shape[1 - first]
+        unpacked = self.program.new(self.state.kind, shape)
+        self.program.shared.unpacking[function] = None
+        self.program.emit(f"    {function}(memory, {unpacked.name});", unpacked)
+        return unpacked
+
+    def _is_only_squared(self, node: Any) -> bool:
+        """Whether a node is a product that is only needed for sums of squares along its rows."""
+        if node.op_type != "MatMul" or self.uses[node.output[0]] != 1:
+            return False
+        left, right = (self.known.get(name) for name in node.input)
+        if left is None or right is None or left.rank < 2 or right.rank != 2:
+            return False
+        if any(t.count == Size(0) for t in (left, right)) or left.value is not None:
+            return False
+        (user,) = (other for other in self.nodes if node.output[0] in other.input)
+        axes = self.known.get(user.input[1]) if len(user.input) > 1 else None
+        if user.op_type != "ReduceSumSquare" or axes is None:
+            return False
+        return axes.numbers("an axis") == [left.rank - 2]
+
+
+def _with_sound_memory(nodes: Sequence[Any]) -> list[Any]:
+    """The nodes without the guard against a memory that is not finite: that of C code is."""
+    from onnx import helper
+
+    return [
+        helper.make_node("Identity", [node.input[1]], list(node.output))
+        if node.op_type == "Where" and node.input[1] in MEMORY_INPUTS
+        else node
+        for node in nodes
+    ]
+
+
+def added_rows(model: Any) -> str:
+    """Name of the value with the rows that readings add to the state of a set."""
+    switch = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_), SET_SWITCH)}
+    nodes = _without_branches(model.graph, switch)
+    makers = {name: node for node in nodes for name in node.output}
+    joined = _source(makers, MEMORY_OUTPUTS[0], "Concat")
+    return str(joined.input[1])
 
 
 def rows_are_apart(model: Any) -> bool:

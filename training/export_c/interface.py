@@ -64,6 +64,12 @@ class Interface:
     single: bool
     sets: bool
     columns: int  # columns of the state of a set
+    small: bool = False  # whether the file is for a microcontroller
+
+    @property
+    def precision(self) -> str:
+        """C type of the numbers of a memory."""
+        return "float" if self.small else "double"
 
     @property
     def optional_context(self) -> bool:
@@ -108,8 +114,8 @@ def read_interface(model: Any, metadata: Mapping[str, str]) -> Interface:
             context.append(ContextField(name, float(ends[0]), float(ends[1]), number))
     rows.sort(key=lambda field: (not field.required, bool(field.reading)))
     columns = int(shapes[MEMORY_INPUTS[0]][1][1]) if sets else 0
-    single = not (sets and sets["alone"])
-    return Interface(tuple(rows), tuple(context), single, sets is not None, columns)
+    single, small = not (sets and sets["alone"]), bool(sets and sets.get("small"))
+    return Interface(tuple(rows), tuple(context), single, sets is not None, columns, small)
 
 
 def _row_field(

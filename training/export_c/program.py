@@ -24,6 +24,8 @@ class Statement:
     code: str
     comment: str
     names: tuple[str, ...]
+    #: names whose elements are read before those of the first name are written, one by one
+    replaceable: tuple[str, ...] = ()
 
 
 Constant = tuple[str, NDArray[Any], str]  # Name, elements and C type of a constant array
@@ -35,6 +37,7 @@ class SharedParts:
 
     constants: dict[str, Constant] = field(default_factory=dict)
     kernels: dict[tuple[str, str], None] = field(default_factory=dict)
+    unpacking: dict[str, None] = field(default_factory=dict)  # functions that unpack a memory
 
     def constant(self, values: NDArray[Any]) -> str:
         """The name of the C array with these elements; equal arrays are one."""
@@ -82,11 +85,15 @@ class Program:
         self.bounds[name] = most.most(self.bounds)
         return name
 
-    def emit(self, code: str, *tensors: Tensor) -> None:
-        """Append a statement that reads or writes these tensors."""
+    def emit(self, code: str, *tensors: Tensor, replaceable: Iterable[Tensor] = ()) -> None:
+        """Append a statement that reads or writes these tensors.
+
+        The first tensor may take the place of a replaceable one that is not needed afterwards.
+        """
         self.given |= {t.owner for t in tensors if t.value is None and t.owner not in self.memory}
         names = tuple(dict.fromkeys(t.owner for t in tensors if t.owner in self.memory))
-        self.statements.append(Statement(code, self._comment, names))
+        places = tuple(t.owner for t in replaceable if t.owner in self.memory and not t.block_of)
+        self.statements.append(Statement(code, self._comment, names, places))
         self._comment = ""
 
     def computed(self, kind: str, shape: Shape, text: str, operands: Iterable[Tensor]) -> Tensor:
@@ -112,7 +119,9 @@ class Program:
         if tensor not in self._stored:
             out = self.new(tensor.kind, tensor.shape)
             code = element_loops(out.name, tensor.shape, tensor.expression)
-            self.emit(code, out, *leaves_of(tensor.expression))
+            leaves = leaves_of(tensor.expression)
+            same = [leaf for leaf in leaves if leaf.shape == tensor.shape]
+            self.emit(code, out, *leaves, replaceable=same)
             self._stored[tensor] = out
         return self._stored[tensor]
 
@@ -177,7 +186,8 @@ class Node:
 Translation = Callable[[Program, Node], list[Tensor]]
 
 
-#: Elements to a multiple of which places are rounded: a cache line of 64 bytes has 16 floats.
+#: Elements to a multiple of which places of large tensors are rounded: a cache line of 64 bytes has
+#: 16 floats.
 GRAIN = 16
 
 
@@ -190,10 +200,12 @@ class MemoryPlan:
 
 
 def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
-    """Place every tensor of a program, each as low as its neighbours in time allow.
+    """Place every tensor of a program, the largest first, as low as others in its time allow.
 
     program: Statements with the tensors that they touch.
     kept: Names that are needed after the last statement.
+
+    References: Pisarchyk and Lee, arXiv:2001.03288, 2020 (greedy by size).
     """
     first: dict[str, int] = {}
     last: dict[str, int] = {}
@@ -201,17 +213,24 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
         for name in statement.names:
             first.setdefault(name, index)
             last[name] = len(program.statements) if name in kept else index
+    needs = {name: _elements(program, name) for name in first}
+    taken: dict[str, str] = {}  # whose place a tensor takes
+    for index, statement in enumerate(program.statements):
+        for other in statement.replaceable:
+            name, place = statement.names[0], taken.get(other, other)
+            fits = (program.memory[name][0], needs[name]) == (program.memory[place][0], needs[place])
+            if fits and name not in taken and first[name] == last[place] == index:
+                taken[name], last[place] = place, last[name]
     offsets: dict[str, int] = {}
     lengths: dict[str, int] = {}
-    placed: list[tuple[str, str, int, int]] = []
-    for name in first:
-        kind, shape = program.memory[name]
-        need = max(total(shape).most(program.bounds), 1)
-        need = -(-need // GRAIN) * GRAIN
+    placed: dict[str, list[tuple[int, int, int, int]]] = {}  # by type: first, last, start, end
+    for name in sorted(first.keys() - taken.keys(), key=lambda name: (-needs[name], first[name])):
+        kind, need = program.memory[name][0], needs[name]
+        others = placed.setdefault(kind, [])
         busy = sorted(
-            (start, end)
-            for other, of_kind, start, end in placed
-            if of_kind == kind and last[other] >= first[name]
+            (begin, end)
+            for born, dead, begin, end in others
+            if born <= last[name] and dead >= first[name]
         )
         start = 0
         for begin, end in busy:
@@ -219,6 +238,13 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
                 break
             start = max(start, end)
         offsets[name] = start
-        placed.append((name, kind, start, start + need))
+        others.append((first[name], last[name], start, start + need))
         lengths[kind] = max(lengths.get(kind, 0), start + need)
+    offsets |= {name: offsets[place] for name, place in taken.items()}
     return MemoryPlan(offsets, lengths)
+
+
+def _elements(program: Program, name: str) -> int:
+    """Elements that a tensor needs, rounded up if it is large."""
+    need = max(total(program.memory[name][1]).most(program.bounds), 1)
+    return need if need < GRAIN else -(-need // GRAIN) * GRAIN

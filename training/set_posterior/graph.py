@@ -12,27 +12,26 @@ from soilml.onboard.set_contract import (
     ERROR_COLUMNS,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
-    MODEL_ERROR_COLUMNS,
     MODEL_ERROR_INPUT,
     OPERATING_STD_INPUTS,
     READING_INPUTS,
     ROW_IN_RANGE,
-    SENSOR_ERROR_COLUMNS,
     SET_PREFIX,
     STD_INPUTS,
     empty_memory,
 )
 from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
-from training.onnx_graph.value import Value, concat
+from training.onnx_graph.value import Value
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.importance_sampler import add_importance_sampler
+from training.set_posterior.likelihood import Readings, add_likelihood
 from training.set_posterior.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
-from training.set_posterior.scale_mixture import ScaleMixture, add_scale_mixture
-from training.set_posterior.sensor_errors import integrate_out_sensor_errors
+from training.set_posterior.sampling_rounds import SIZES_SMALL, sample_sizes
+from training.set_posterior.small_likelihood import add_small_likelihood
 
 #: Inputs of the graph with a value for each row.
 ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
@@ -46,6 +45,7 @@ class SetPosteriorGraph:
     response: Response
     limits: MisfitLimits
     noise: FileNoise = field(default_factory=dict)
+    small: bool = False  # whether it is for a microcontroller: fewer points, smaller systems
 
     @property
     def columns(self) -> int:
@@ -102,31 +102,16 @@ class SetPosteriorGraph:
         names = (*ROW_INPUTS, *of_set, *MEMORY_INPUTS)
         inputs = {name: Value(graph, name) for name in names}
         inputs = complete_inputs(inputs, of_set, self.noise)
-        context, rows = add_residual_rows(self.family, self.response, inputs)
+        context, rows = add_residual_rows(self.family, self.response, inputs, self.small)
         state, counts = (inputs[name] for name in MEMORY_INPUTS)
         outputs = [prefix + name for name in MEMORY_OUTPUTS]
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
-        terms, of_sensors = len(self.response.terms), len(SENSOR_ERROR_COLUMNS)
-        of_model, size = len(MODEL_ERROR_COLUMNS), inputs[MODEL_ERROR_INPUT]
-        earlier, _ = state.split([terms + of_sensors, of_model], axis=1)
-        start = concat([earlier, rows.system_at(None)], axis=0)
-
-        def mixture_at(basis: Value) -> ScaleMixture:
-            system = concat([state, rows.system_at(basis)], axis=0).named(outputs[0])
-            whole, sensors, model = system.split([terms, of_sensors, of_model], axis=1)
-            system = concat([whole, model, sensors], axis=1)
-            system = integrate_out_sensor_errors(system, terms + of_model)
-            return add_scale_mixture(system, size, terms)
-
+        grown = Readings(rows, state, inputs[MODEL_ERROR_INPUT], outputs[0])
+        add = add_small_likelihood if self.small else add_likelihood
+        likelihood = add(self.family, self.response, context, grown)
         consistency = add_consistency(counts, self.limits, self.family.targets)
-        sample = add_importance_sampler(
-            self.family,
-            self.response,
-            context,
-            integrate_out_sensor_errors(start, terms),
-            mixture_at,
-            consistency,
-        )
-        add_posterior_outputs(self.family, context, sample, consistency, prefix)
+        sizes = SIZES_SMALL if self.small else sample_sizes(len(self.family.axes))
+        sample = add_importance_sampler(likelihood, consistency, sizes)
+        add_posterior_outputs(likelihood.family, context, sample, consistency, prefix)

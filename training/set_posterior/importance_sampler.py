@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -25,7 +24,8 @@ from training.onnx_graph.value import (
     tanh,
     where,
 )
-from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.families.wheel_family import WheelFamily
+from training.set_posterior.likelihood import Likelihood
 from training.set_posterior.misfit_test import Consistency
 from training.set_posterior.polynomial_residuals import (
     NearlyKnown,
@@ -33,14 +33,13 @@ from training.set_posterior.polynomial_residuals import (
     gauss_newton,
     within_box,
 )
-from training.set_posterior.response_surface import Response
 from training.set_posterior.sampling_rounds import (
     ProposalDraws,
+    SampleSizes,
     WeightedRound,
     adapted_draws,
     prior_draws,
     sample_round,
-    sample_sizes,
     weights_by_effective_size,
 )
 from training.set_posterior.scale_mixture import ScaledMisfit, ScaleMixture
@@ -52,11 +51,6 @@ PRIOR_STEPS, ADAPTED_STEPS = 2, 1
 LARGEST_TANH = 1.0 - 1e-6
 #: Added to the variances of a proposal, so that the Cholesky factor of coinciding samples exists.
 VARIANCE_FLOOR = 1e-6
-
-
-#: The likelihood whose errors of sensors and model are linear at a soil, given by its monomials
-#: (terms, 1).
-MixtureAt = Callable[[Value], ScaleMixture]
 
 
 @dataclass(frozen=True)
@@ -74,12 +68,7 @@ class WeightedSample:
 
 
 def add_importance_sampler(
-    family: WheelFamily,
-    response: Response,
-    context: ContextValues,
-    start: Value,
-    mixture_at: MixtureAt,
-    consistency: Consistency,
+    likelihood: Likelihood, consistency: Consistency, sizes: SampleSizes
 ) -> WeightedSample:
     r"""Weighted samples of the posterior of residuals that are averaged over scales k.
 
@@ -104,18 +93,17 @@ def add_importance_sampler(
     All draws are constants of the graph that are shifted and scaled: the same set gives the same
     answer.
 
-    family, response: Axes with their priors, and the monomials of the system.
-    context: Standard deviations of nearly known axes.
-    start: Residuals (m, terms) of a model without errors, errors of sensors integrated out.
-    mixture_at: The likelihood, at a soil.
+    likelihood: Of the readings, and the unknowns with their priors.
+    consistency: Limits of the set's misfit.
+    sizes: Points of each round.
 
     References: Cornuet et al., Scandinavian J. Statistics 39(4), 2012 (adaptive rounds); Robert and
     Casella, Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the
     others); Kish, Survey Sampling, 1965 (effective sample size).
     """
+    family, response, start = likelihood.family, likelihood.response, likelihood.start()
     unknowns = len(family.axes)
-    sizes = sample_sizes(unknowns)
-    nearly_known = NearlyKnown.of(family, response, context)
+    nearly_known = NearlyKnown.of(family, response, likelihood.context)
     residuals = PolynomialResiduals.of(family, response, nearly_known, start)
     graph = residuals.system.graph
     draws = adapted_draws(unknowns, sizes.adapted)
@@ -123,7 +111,7 @@ def add_importance_sampler(
     current = _prior_round(family, residuals, prior)
     basis = _mean_basis(residuals, current)
     soil = basis if nearly_known is None else basis * nearly_known.factors.node("Transpose")
-    mixture = mixture_at(soil).standardised(nearly_known)
+    mixture = likelihood.mixture_at(soil).standardised(nearly_known)
     current = current.reweighed(mixture)
     bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
     unbounded = constant(graph, np.arctanh(bounded))

@@ -65,7 +65,15 @@ class ResidualRows:
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
     def system_at(self, basis: Value | None) -> Value:
-        r"""The system (readings, terms + errors), with errors linear at one soil.
+        """The system (readings, terms + errors) of the readings that take part; see `columns_at`."""
+        return self.compressed(self.columns_at(basis))
+
+    def compressed(self, columns: Value) -> Value:
+        """Columns as rows (columns, readings) as a system of the readings that take part."""
+        return columns.node("Transpose").node("Compress", self.used, axis=0)
+
+    def columns_at(self, basis: Value | None) -> Value:
+        r"""Columns (terms + errors, readings), with errors linear at one soil.
 
         Errors of a row's slip and load are part of all its channels. With d the changes of its
         weighted residuals with one standard deviation of such an error, their covariance is
@@ -81,12 +89,11 @@ class ResidualRows:
         if basis is not None:
             parts.append(self.model_errors.columns_at(slopes, self.values.coefficients, basis))
         system = concat(parts, axis=0) * self.weight
-        whitened = self.sensor_errors.whitened(system, of_row * self.weight)
-        return whitened.node("Transpose").node("Compress", self.used, axis=0)
+        return self.sensor_errors.whitened(system, of_row * self.weight)
 
 
 def add_residual_rows(
-    family: WheelFamily, response: Response, readings: dict[str, Value]
+    family: WheelFamily, response: Response, readings: dict[str, Value], small: bool = False
 ) -> tuple[ContextValues, ResidualRows]:
     r"""Residuals of the three channels of each row, as polynomials of the unknowns.
 
@@ -111,7 +118,7 @@ def add_residual_rows(
     most_noise = np.asarray([[context.most_torque_noise], [MOST_RELATIVE_NOISE], [MOST_PULL_NOISE]])
     used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
     weight = used / sqrt(noise * noise + response.error[:, None] ** 2)
-    values = response.add_to(context.features, y, context.feature_slopes)
+    values = response.add_to(context.features, y, context.feature_slopes, once=small)
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
     outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)

@@ -22,6 +22,7 @@ from training.regressors.tanh_network import TanhNetwork, evaluate_layers
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
+from training.set_posterior.term_selection import select_terms
 
 Progress = Callable[[str, int, int], None]
 
@@ -58,18 +59,28 @@ class ResponseValues:
     coefficients: Value  # (terms, readings), with the offset taken off the constant term
     tangent: Value  # (d, hidden, rows) derivatives of the last hidden layer along d directions
     last_layer: Floats  # (channels * hidden, terms) its weights
+    #: the whole last layer (terms, channels * (hidden + channels)), where it is kept once only
+    whole_layer: Floats | None = None
 
     @staticmethod
     def of(
-        hidden: Value, offset: Value, tangent: Value, last: tuple[Floats, ...], terms: int
+        hidden: Value,
+        offset: Value,
+        tangent: Value,
+        last: tuple[Floats, ...],
+        terms: int,
+        once: bool = False,
     ) -> ResponseValues:
         """From the last hidden layer, and weights and bias of the last, of (terms * channels)."""
         weights, bias = last
         # the constant term is the first of each channel
         of_offset = -np.eye(terms * CHANNELS, CHANNELS)
-        layer = constant(hidden.graph, np.concatenate([weights.T, of_offset], axis=1))
-        output = gemm(layer, concat([hidden, offset], axis=0), bias[:, None])
-        return ResponseValues(output.reshape(terms, -1), tangent, _by_channel(weights, terms))
+        layer = np.concatenate([weights.T, of_offset], axis=1)
+        whole = concat([hidden, offset], axis=0)
+        output = gemm(constant(hidden.graph, layer), whole, bias[:, None])
+        kept = layer.reshape(terms, -1) if once else None
+        by_channel = _by_channel(weights, terms)
+        return ResponseValues(output.reshape(terms, -1), tangent, by_channel, kept)
 
     def slopes_at(self, basis: Value | None) -> Value:
         """Derivatives (d, channels, rows) of the channels at one soil along the directions.
@@ -78,6 +89,10 @@ class ResponseValues:
         """
         if basis is None:
             return self.last_layer[:, 0].reshape(CHANNELS, -1) @ self.tangent
+        if self.whole_layer is not None:
+            at_soil = gemm(basis, self.whole_layer, transpose_a=True).reshape(CHANNELS, -1)
+            units = len(self.last_layer) // CHANNELS
+            return at_soil.split([units, CHANNELS], axis=1)[0] @ self.tangent
         last_layer = constant(basis.graph, self.last_layer)
         return (last_layer @ basis).reshape(CHANNELS, -1) @ self.tangent
 
@@ -103,6 +118,8 @@ CHANNEL_WEIGHTS = np.asarray([1.0, 0.4, 1.0])
 #: The changes by another contact are needed to a tenth of their size: of fewer designs, one in
 #: eight, and with fewer hidden units.
 CONTACT_SHARE, LEAST_CONTACT_DESIGNS, CONTACT_HIDDEN = 8, 512, 32
+#: Designs on which terms are chosen, and points of the unknowns.
+SELECTION_DESIGNS, SELECTION_POINTS = 256, 512
 
 
 @dataclass(frozen=True)
@@ -113,6 +130,8 @@ class ResponseSettings:
     hidden: int
     epochs: int
     seed: int
+    small: bool = False  # whether the file is for a microcontroller
+    terms: int = 0  # most monomials; 0: all of the family's degrees
 
 
 @dataclass(frozen=True)
@@ -151,11 +170,14 @@ class Response:
             hidden = tanh(gemm(constant(hidden.graph, weights), hidden, bias))
         return SoilValues.of(hidden, self.layers[-2:], len(self.terms))
 
-    def add_to(self, features: Value, offset: Value, directions: Floats) -> ResponseValues:
+    def add_to(
+        self, features: Value, offset: Value, directions: Floats, once: bool = False
+    ) -> ResponseValues:
         """Add the network to a graph, with its derivatives along directions of the features (d, f).
 
         The derivatives are exact: each layer carries the tangents of its values. The offset
-        (channels, rows) is subtracted from the channels.
+        (channels, rows) is subtracted from the channels. With `once`, slopes at a soil read the
+        same weights as the coefficients, in another order: the program is smaller.
         """
         hidden = features - self.scaling.mean[:, None]
         tangent: Value | Floats = directions[:, :, None]
@@ -163,7 +185,8 @@ class Response:
             hidden = tanh(gemm(constant(hidden.graph, weights), hidden, bias))
             tangent = (weights @ tangent) * (1.0 - hidden * hidden)
         assert isinstance(tangent, Value)
-        return ResponseValues.of(hidden, offset, tangent, self.layers[-2:], len(self.terms))
+        terms = len(self.terms)
+        return ResponseValues.of(hidden, offset, tangent, self.layers[-2:], terms, once)
 
     def _inner_layers(self) -> list[tuple[Floats, Floats]]:
         """Weights (units, inputs) and biases (units, 1) of all layers but the last.
@@ -181,26 +204,43 @@ def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Prog
     Raises `InputError` if fewer than half of the designs carry their load on all soils of the
     prior.
     """
-    response = _fit(family, family.responses, settings, progress)
+    terms = family_terms(family)
+    if 0 < settings.terms < len(terms):
+        terms = _most_useful_terms(family, terms, settings)
+    response = _fit(family, family.responses, terms, settings, progress)
     if family.model_errors()["contact"] == 0.0:
         return response
     designs = max(LEAST_CONTACT_DESIGNS, settings.designs // CONTACT_SHARE)
-    smaller = replace(settings, designs=designs, hidden=min(settings.hidden, CONTACT_HIDDEN))
-    return replace(response, contact=_fit(family, family.contact_changes, smaller, progress))
+    hidden = settings.hidden // 2 if settings.small else min(settings.hidden, CONTACT_HIDDEN)
+    smaller = replace(settings, designs=designs, hidden=hidden)
+    return replace(response, contact=_fit(family, family.contact_changes, terms, smaller, progress))
+
+
+def family_terms(family: WheelFamily) -> Terms:
+    """All monomials of the degrees of a family."""
+    return monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
+
+
+def _most_useful_terms(family: WheelFamily, terms: Terms, settings: ResponseSettings) -> Terms:
+    """So many of these terms as the settings permit, chosen on a few designs."""
+    x = _points(family, SELECTION_POINTS, settings.seed)
+    y = family.responses(family.designs(SELECTION_DESIGNS, settings.seed), x[None])
+    y = y[np.isfinite(y).all(axis=(1, 2))] * CHANNEL_WEIGHTS
+    return select_terms(x, y.swapaxes(0, 1).reshape(len(x), -1), terms, settings.terms)
 
 
 def _fit(
     family: WheelFamily,
     respond: Callable[[Floats, Floats], Floats],
+    terms: Terms,
     settings: ResponseSettings,
     progress: Progress,
 ) -> Response:
-    """A surface of channels (n, m, 3), fitted to simulated designs.
+    """A surface of channels (n, m, 3) in these terms, fitted to simulated designs.
 
     Each design is simulated at points of the unknowns, and a polynomial is fitted to its responses;
     a network then learns the coefficients of the polynomials from the features of the designs.
     """
-    terms = monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
     x = _points(family, int(POINTS_PER_TERM * len(terms)), settings.seed)
     basis = monomials(x, terms)
     designs = family.designs(settings.designs, settings.seed)

@@ -53,6 +53,8 @@ class SampleSizes:
 #: standard deviation (root mean square).
 FEW_UNKNOWNS = 3
 SIZES_FEW, SIZES_MANY = SampleSizes(256, 128, 2), SampleSizes(512, 256, 3)
+#: Those of a file for a microcontroller, whatever the number of unknowns.
+SIZES_SMALL = SampleSizes(32, 72, 2)
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ def adapted_draws(unknowns: int, count: int) -> ProposalDraws:
 
     The row of ones adds the mean when a Cholesky factor of moments is multiplied with the draws.
     """
-    u = qmc.Sobol(unknowns + 1, rng=ADAPTED_SEED).random(count)
+    u = qmc.Sobol(unknowns + 1, rng=ADAPTED_SEED).random(1 << (count - 1).bit_length())[:count]
     stretch = np.sqrt(DEGREES_OF_FREEDOM / chi2.ppf(u[:, unknowns], DEGREES_OF_FREEDOM))
     z = ndtri(u[:, : unknowns - 1]) * stretch[:, None]
     squares = (z**2).sum(axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 
 from soilml.onboard.set_contract import LAW_ERROR_COLUMNS, MODEL_ERROR_COLUMNS
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, log, sqrt, where
+from training.set_posterior.columns import triangular_factor
 from training.set_posterior.model_errors import OF_CHANNELS
 from training.set_posterior.polynomial_residuals import NearlyKnown, PolynomialResiduals
 
@@ -52,6 +53,7 @@ class ScaleMixture:
 
     systems: Value  # A_k, (scales, m, terms), by rising scale
     log_weight: Value  # (scales, 1) logarithms of p_k over the root of the determinant
+    common: Value | None = None  # further rows (m, terms), which all scales have
 
     def standardised(self, nearly_known: NearlyKnown | None) -> ScaleMixture:
         """In coordinates of nearly known unknowns, with their prior as further rows."""
@@ -63,11 +65,14 @@ class ScaleMixture:
 
     def divided_by(self, std: Value) -> ScaleMixture:
         """For noise whose standard deviation is larger by a factor (1,)."""
-        return replace(self, systems=self.systems / std)
+        common = None if self.common is None else self.common / std
+        return replace(self, systems=self.systems / std, common=common)
 
     def misfit(self, basis: Value) -> ScaledMisfit:
         """At points with these monomials (terms, n)."""
         squares = (self.systems @ basis).sum_of_squares(axis=1, keepdims=False)
+        if self.common is not None:
+            squares = squares + (self.common @ basis).sum_of_squares(axis=0, keepdims=True)
         log_parts = squares * -0.5 + self.log_weight
         largest = log_parts.reduce("ReduceMax", axis=0, keepdims=True)
         total = log(exp(log_parts - largest).sum(axis=0, keepdims=True)) + largest
@@ -83,7 +88,11 @@ class ScaleMixture:
         """
         shares = gemm(weights, exp(misfit.log_parts), transpose_b=True)  # (1, scales)
         flat = self.systems.reshape(len(SCALES), -1)
-        return like.with_system((shares @ flat).reshape(-1, len(like.terms)))
+        system = (shares @ flat).reshape(-1, len(like.terms))
+        if self.common is not None:
+            columns = concat([system, self.common], axis=0).node("Transpose")
+            system = triangular_factor(columns, len(like.terms))
+        return like.with_system(system)
 
 
 def add_scale_mixture(system: Value, size: Value, terms: int) -> ScaleMixture:

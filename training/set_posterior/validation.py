@@ -57,14 +57,17 @@ class SetFigures:
 
 
 def calibrate_misfit_limits(
-    family: WheelFamily, response: Response, progress: Progress
+    family: WheelFamily, response: Response, progress: Progress, small: bool = False
 ) -> SetPosteriorGraph:
-    """The set posterior with misfit limits that refuse at most one consistent set in a hundred."""
+    """The set posterior with misfit limits that refuse at most one consistent set in a hundred.
+
+    small: Whether it is for a microcontroller.
+    """
     no_limits = MisfitLimits(np.asarray([1.0, 2.0]), np.asarray([1e9, 2e9]))
-    task = partial(_misfits, SetPosteriorGraph(family, response, no_limits))
+    task = partial(_misfits, SetPosteriorGraph(family, response, no_limits, small=small))
     found = _by_size(task, "measuring misfit", progress)
     readings, misfit = (np.concatenate(part) for part in zip(*found.values(), strict=True))
-    return SetPosteriorGraph(family, response, misfit_limits(readings, misfit))
+    return SetPosteriorGraph(family, response, misfit_limits(readings, misfit), small=small)
 
 
 def _misfits(posterior: SetPosteriorGraph, rows: int) -> tuple[Floats, Floats]:
@@ -199,6 +202,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
             "readings": posterior.limits.readings.tolist(),
             "most": posterior.limits.misfit.tolist(),
         },
+        **({"small": True, "monomials": posterior.response.terms} if posterior.small else {}),
         **posterior.family.metadata(),
     }
 

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from training.export_c.c_text import element, indices_of, leaves_of, nest, number, offset
 from training.export_c.operators.rearrangement import transposed
 from training.export_c.program import Node, Program, Translation
 from training.export_c.tensor import Shape, Size, Tensor, broadcast, strides
 
+#: Constant matrices with fewer columns are multiplied as they are, though they be sparse.
+LEAST_SPARSE = 8
+
 
 def translate_gemm(program: Program, node: Node) -> list[Tensor]:
     """`alpha a b + beta c` of two matrices, either of which may be transposed."""
-    a, b, c = node.input(0), program.stored(node.input(1)), node.optional(2)
+    a, b, c = node.input(0), node.input(1), node.optional(2)
     transpose_a, transpose_b = (int(node.attributes.get(k, 0)) for k in ("transA", "transB"))
     alpha, beta = (float(node.attributes.get(k, 1.0)) for k in ("alpha", "beta"))
+    if transpose_b and not transpose_a and a.shape[0] == Size(1) and b.source is not None:
+        # one row times a matrix lies in memory as that matrix times one column
+        out = _started(program, a.kind, (Size(1), b.shape[0]), c, beta)
+        _emit_by_rows(program, b.source, program.stored(a), alpha, out)
+        return [out]
+    b = program.stored(b)
     if a.source is not None and transpose_b and not transpose_a:
         out = _started(program, a.kind, (a.shape[0], b.shape[0]), c, beta)
         _emit_by_rows(program, a.source, b, alpha, out)
@@ -33,6 +46,9 @@ def translate_gemm(program: Program, node: Node) -> list[Tensor]:
 
 def translate_matmul(program: Program, node: Node) -> list[Tensor]:
     """A product of matrices or vectors, for each pair of a batch."""
+    picked = _picked_rows(node.input(0), node.input(1))
+    if picked is not None:
+        return [_multiplied_rows(program, node.input(1), *picked)]
     a, b = program.stored(node.input(0)), program.stored(node.input(1))
     left = a.seen_as((Size(1), *a.shape)) if a.rank == 1 else a
     right = b.seen_as((*b.shape, Size(1))) if b.rank == 1 else b
@@ -46,6 +62,31 @@ def translate_matmul(program: Program, node: Node) -> list[Tensor]:
     _emit(program, (m, k, n), at, batch=batch)
     shape = (*batch, *([] if a.rank == 1 else [m]), *([] if b.rank == 1 else [n]))
     return [out.seen_as(shape)]
+
+
+def _picked_rows(a: Tensor, b: Tensor) -> tuple[NDArray[Any], NDArray[Any]] | None:
+    """Of a constant matrix with one number a row at most: their columns, and the numbers."""
+    if a.value is None or a.rank != 2 or b.rank != 2 or a.value.shape[1] < LEAST_SPARSE:
+        return None
+    if np.count_nonzero(a.value, axis=1).max() > 1:
+        return None
+    columns = np.abs(a.value).argmax(axis=1)
+    return columns, a.value[np.arange(len(columns)), columns]
+
+
+def _multiplied_rows(
+    program: Program, b: Tensor, rows: NDArray[Any], factors: NDArray[Any]
+) -> Tensor:
+    """Rows of a matrix, each times a factor."""
+    b, n = program.stored(b), b.shape[1]
+    out = program.new(b.kind, (Size(len(rows)), n))
+    row = program.stored(Tensor.constant(rows.astype(np.int32), ""))
+    factor = program.stored(Tensor.constant(factors, ""))
+    i, j = indices_of(out.shape)
+    place, source = offset([n, Size(1)], [i, j]), offset([n, Size(1)], [f"{row.name}[{i}]", j])
+    code = f"{out.name}[{place}] = {factor.name}[{i}] * {b.name}[{source}];"
+    program.emit(nest(out.shape, [i, j], code), out, b, row, factor)
+    return out
 
 
 def _offset(tensor: Tensor, batch: Shape, indices: list[str]) -> str:
@@ -124,6 +165,26 @@ def _emit_by_rows(program: Program, a: Tensor, b: Tensor, alpha: float, out: Ten
     )
     body = nest(a.shape[:-1], indices[:-1], f"{{\n{inner}\n{call}\n}}")
     program.emit(body, row, out, b, *leaves_of(expression))
+
+
+def squares_of_product(program: Program, a: Tensor, b: Tensor, keepdims: bool) -> Tensor:
+    """Sums of squares along the rows of a product of matrices, which needs no memory itself.
+
+    a: A matrix (m, k), or several, (batch, m, k).
+    b: One matrix (k, n).
+    """
+    a, b = program.stored(a), program.stored(b)
+    *batch, m, k = a.shape
+    n = b.shape[1]
+    out = program.new(a.kind, (*batch, n))
+    kernel = program.shared.kernel("squares_of_product", a.kind)
+    i = indices_of(batch)
+    left, target = offset([m * k] * len(batch), i), offset([n] * len(batch), i)
+    call = (
+        f"{kernel}({m.c}, {k.c}, {n.c}, {a.name} + {left}, {b.name}, {out.name} + {target});"
+    ).replace(" + 0", "")
+    program.emit(nest(batch, i, call), out, a, b)
+    return out.seen_as((*batch, Size(1), n)) if keepdims else out
 
 
 OPERATORS: dict[str, Translation] = {"Gemm": translate_gemm, "MatMul": translate_matmul}
