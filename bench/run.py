@@ -25,6 +25,7 @@ import physics
 import prospects
 import slip
 import small_changes
+import small_files
 import soil_tests
 import streams
 import summary
@@ -230,6 +231,15 @@ PARTS = (
         "`soilml export-c` (docs/c-export.md) beside onnxruntime, one thread. Goals: half of the "
         "latency of onnxruntime, differences as small as those of rounding.",
         c_export.c_export,
+    ),
+    Part(
+        "small",
+        "board",
+        "Files for a microcontroller",
+        "`wheel_small.onnx` and `any_wheel_small.onnx` beside the full files, on the reference sets "
+        "of [sets.md](sets.md). Goals: RMSE at most 1.05 of the exact one, log density within 0.1 "
+        "nat of the full file, coverage 87 to 93 %, the same flags.",
+        small_files.section,
     ),
     Part(
         "pull",

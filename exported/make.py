@@ -20,6 +20,7 @@ KLS1 = str(HERE.parent / "examples" / "kls1" / "recipe.toml")
 #: Recipe and spec of each released file that is trained from data.
 RELEASED = {
     "wheel": ("wheel", "fused"),
+    "wheel_small": ("wheel", "wheel_small"),
     "wheel_lssvm": ("wheel", "lssvm"),
     "wheel_mlp": ("wheel", "mlp"),
     "wheel_linear": ("wheel", "linear"),
@@ -32,11 +33,11 @@ RELEASED = {
 
 
 #: Spec of each released file that is trained on simulated rows.
-SIMULATED = {"any_wheel": "any_wheel"}
+SIMULATED = {"any_wheel": "any_wheel", "any_wheel_small": "any_wheel_small"}
 
 
 #: Released files with a set posterior.
-WITH_SETS = ("wheel", "kls1_wheel", "any_wheel")
+WITH_SETS = ("wheel", "wheel_small", "kls1_wheel", "any_wheel", "any_wheel_small")
 
 
 def write_graphs(names: Sequence[str]) -> None:

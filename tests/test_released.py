@@ -18,6 +18,7 @@ from training.spec import read_any_wheel_spec, read_spec
 ROOT = Path(__file__).parents[1]
 RELEASED = {
     "wheel": ("wheel", "fused"),
+    "wheel_small": ("wheel", "wheel_small"),
     "wheel_lssvm": ("wheel", "lssvm"),
     "wheel_mlp": ("wheel", "mlp"),
     "wheel_linear": ("wheel", "linear"),
@@ -31,12 +32,13 @@ SLIP = {
     "slip_vibration_known": ("wheel_leg_known", "slip_vibration"),
 }
 FROM_DATA = RELEASED | SLIP
+SIMULATED = ("any_wheel", "any_wheel_small")
 
 
 def test_every_released_file_is_listed_and_has_its_card():
-    assert {f.stem for f in (ROOT / "exported").glob("*.onnx")} == {*FROM_DATA, "any_wheel"}
+    assert {f.stem for f in (ROOT / "exported").glob("*.onnx")} == {*FROM_DATA, *SIMULATED}
     page = (ROOT / "exported" / "README.md").read_text()
-    for name in (*FROM_DATA, "any_wheel"):
+    for name in (*FROM_DATA, *SIMULATED):
         assert (ROOT / "exported" / f"{name}.md").is_file()
         assert f"{name}.onnx" in page
 
@@ -121,10 +123,11 @@ def test_repeated_readings_do_not_reduce_the_uncertainty(name):
         assert (np.abs(inside - 0.9) < 0.06).all(), (rows, inside)
 
 
-def test_the_file_for_any_wheel_comes_from_its_spec():
-    metadata = Estimator.load(ROOT / "exported" / "any_wheel.onnx").metadata
-    assert metadata["spec"] == read_any_wheel_spec("any_wheel").text
-    assert metadata["spec_sha256"] in (ROOT / "exported" / "any_wheel.md").read_text()
+@pytest.mark.parametrize("name", SIMULATED)
+def test_the_file_for_any_wheel_comes_from_its_spec(name):
+    metadata = Estimator.load(ROOT / "exported" / f"{name}.onnx").metadata
+    assert metadata["spec"] == read_any_wheel_spec(name).text
+    assert metadata["spec_sha256"] in (ROOT / "exported" / f"{name}.md").read_text()
 
 
 @pytest.mark.slow

@@ -206,8 +206,8 @@ def _take_parameter(
 LEAST_DESIGNS = 512  # With fewer operating conditions no network learns the response of a wheel
 #: Upper limits, beyond which training takes days on a laptop.
 UPPER_LIMITS = {"designs": 10**7, "hidden": 1024, "epochs": 10**5}
-#: Monomials of a file for a microcontroller: with 26, the memory of a set has 4 kB.
-LEAST_SMALL_TERMS, MOST_SMALL_TERMS = 10, 26
+#: Monomials of a file for a microcontroller: with 25, the memory of a set has nearly 4 kB.
+LEAST_SMALL_TERMS, MOST_SMALL_TERMS = 10, 25
 
 
 def take_response_settings(settings: Settings, seed: int) -> ResponseSettings:

@@ -43,6 +43,8 @@ contains
   designs = 4096                     # by their likelihood, with a learned
   hidden = 64                        # response to slip, load and soil
   epochs = 500
+  small = true                       # for a microcontroller: fewer monomials,
+  terms = 14                         # 10 to 25, and fewer points (docs/c-export.md)
 """
 
 
@@ -104,7 +106,8 @@ def _any_wheel(args: argparse.Namespace) -> int:
         with atomic_outputs(outputs(args)[:2]) as (model, page):
             metadata = export_any_wheel(spec, posterior, figures, model)
             page.write_text(
-                any_wheel_card(metadata, posterior.family.inputs(), figures), encoding="utf-8"
+                any_wheel_card(metadata, posterior.family.inputs(), figures, out.stem),
+                encoding="utf-8",
             )
     size = out.stat().st_size / 1e3
     tell(f"\nwritten: {out} ({size:.0f} kB), {out.with_suffix('.md')}")

@@ -32,6 +32,11 @@ from training.spec import AnyWheelSpec
 #: The input that the prior of an output scales with.
 SCALES = {"cohesion": "cohesion_max", "shear_modulus": "shear_modulus_max"}
 NONE = np.zeros(0)
+#: What a card says of a file for a microcontroller.
+SMALL = (
+    "For a microcontroller: the response has fewer monomials and a smaller network, fewer points "
+    "are sampled, and uncertain bearing values are integrated out as errors that all rows share."
+)
 #: Pooling of a file without estimates of single rows: nothing is pooled.
 NO_POOLING = PoolingCalibration(
     conditions=RunConditions((), NONE, NONE, NONE),
@@ -93,7 +98,10 @@ def export_any_wheel(
 
 
 def any_wheel_card(
-    metadata: Mapping[str, str], units: Mapping[str, str], figures: Mapping[int, SetFigures]
+    metadata: Mapping[str, str],
+    units: Mapping[str, str],
+    figures: Mapping[int, SetFigures],
+    name: str,
 ) -> str:
     """The card as Markdown, from metadata, units of the file's own inputs, and set metrics."""
     sets = json.loads(metadata["set"])
@@ -103,13 +111,13 @@ def any_wheel_card(
         for name, (constant, share) in sets["noise"].items()
     }
     lines = [
-        "# any_wheel",
+        f"# {name}",
         "",
         "Estimates cohesion, friction angle and shear modulus from one or many readings of slip, "
         "torque and load, and of sinkage and drawbar pull where they are measured, for a rigid "
         "wheel of any size: wheel, bearing values, noise and upper bounds of the prior are inputs.",
         "",
-        "    estimator = Estimator.load('any_wheel.onnx').on(wheel_radius=0.15, ...)",
+        f"    estimator = Estimator.load('{name}.onnx').on(wheel_radius=0.15, ...)",
         "    estimator.run(slip=..., torque=..., load=...)",
         "",
         "The exact likelihood of all readings under a learned response of the wheel is sampled in "
@@ -120,6 +128,7 @@ def any_wheel_card(
         "angle from 25 to 45 degrees, shear modulus from shear_modulus_max / 6 to "
         "shear_modulus_max.",
         "",
+        *([SMALL, ""] if sets.get("small") else []),
         "## Valid for",
         "",
         "| input | unit | from | to |",

@@ -100,7 +100,9 @@ def write_c(
         "functions": functions,
         "arrays": _arrays(functions),
         "constants": [array(*parts) for parts in constants],
-        "kernels": [kernel_text(kernel, kind, interface.small) for kernel, kind in sorted(shared.kernels)],
+        "kernels": [
+            kernel_text(kernel, kind, interface.small) for kernel, kind in sorted(shared.kernels)
+        ],
         "unpacking": sorted(shared.unpacking),
         "rows": rows,
         "quantities": list(zip(fields["names"], fields["units"], strict=True)),

@@ -11,7 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_PREFIX, SET_SWITCH
+from soilml.onboard.set_contract import (
+    MEMORY_INPUTS,
+    MEMORY_OUTPUTS,
+    ROW_IN_RANGE,
+    SET_PREFIX,
+    SET_SWITCH,
+)
 from training.export_c.graph_translation import added_rows, translate_graph
 from training.export_c.interface import Interface, input_shapes
 from training.export_c.program import MemoryPlan, Program, SharedParts, plan_memory

@@ -218,7 +218,10 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
     for index, statement in enumerate(program.statements):
         for other in statement.replaceable:
             name, place = statement.names[0], taken.get(other, other)
-            fits = (program.memory[name][0], needs[name]) == (program.memory[place][0], needs[place])
+            fits = (program.memory[name][0], needs[name]) == (
+                program.memory[place][0],
+                needs[place],
+            )
             if fits and name not in taken and first[name] == last[place] == index:
                 taken[name], last[place] = place, last[name]
     offsets: dict[str, int] = {}

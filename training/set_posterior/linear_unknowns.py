@@ -87,7 +87,9 @@ class LinearUnknowns:
     def _changes(self, whole: Value) -> Value:
         """Changes (z, terms) of monomials (terms, 1) with one standard deviation of each z."""
         by_axis = [derivative(self.terms, axis) @ whole for axis in self.axes]
-        return concat([change.reshape(1, -1) for change in by_axis], axis=0) * self.std.take([a - 1 for a in self.axes], axis=0)
+        return concat([change.reshape(1, -1) for change in by_axis], axis=0) * self.std.take(
+            [a - 1 for a in self.axes], axis=0
+        )
 
     def _of_z(self, unit: Value) -> Value:
         """The factors of z in each term, (terms, 1)."""

@@ -65,7 +65,7 @@ class ResidualRows:
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
     def system_at(self, basis: Value | None) -> Value:
-        """The system (readings, terms + errors) of the readings that take part; see `columns_at`."""
+        """The system (readings, terms + errors) of the readings that take part."""
         return self.compressed(self.columns_at(basis))
 
     def compressed(self, columns: Value) -> Value:

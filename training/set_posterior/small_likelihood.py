@@ -29,7 +29,7 @@ def add_small_likelihood(
     terms, linear = len(response.terms), None
     if context.axis_std is not None:
         linear = LinearUnknowns.of(response, family.free, context.axis_std)
-        family, response = replace(family, axes=family.axes[: family.free]), linear.sampled
+        family, response = family.with_axes(family.free), linear.sampled
     sampled, taken = len(response.terms), OF_SENSORS + (len(linear.axes) if linear else 0)
 
     def split(new: Value, errors: int) -> tuple[Value, list[Value]]:

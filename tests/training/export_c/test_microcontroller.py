@@ -1,0 +1,73 @@
+"""Files for a microcontroller: sizes of their C code, and runs on an emulated Cortex-M4F."""
+
+import numpy as np
+import pytest
+from compiled_c import COMPILERS, ROOT, CompiledModel, compile_library
+from emulated_board import MISSING, NAMES, run_on_board
+from simulated_rows import ANY_WHEEL, rows_of
+
+from soilml.cli import main
+
+SMALL = ["wheel_small", "any_wheel_small"]
+#: Largest numbers of bytes, and of instructions of one row with its answer: 24 ms at 168 MHz if each
+#: takes two cycles.
+CONSTANTS, WORK, MEMORY, STACK, INSTRUCTIONS = 64_000, 24_000, 4_000, 2_000, 2_000_000
+#: The same of a row with sinkage and drawbar pull as well, which adds three readings.
+ALL_CHANNELS = 2_250_000
+#: Largest difference of a mean or standard deviation between processors, in standard deviations,
+#: and of the ends of intervals; they differ in the rounding of sums.
+MOMENTS, ENDS = 2e-3, 2e-2
+
+
+def exported_for_one_row(name, folder):
+    assert main(["export-c", str(ROOT / f"exported/{name}.onnx"), str(folder / f"{name}.c"),
+                 "--rows", "1"]) == 0  # fmt: skip
+    return folder / f"{name}.c"
+
+
+def stream(name, seed, channels):
+    """Rows of one soil, enough to fill the memory, and the context."""
+    context = ANY_WHEEL if name.startswith("any") else None
+    return rows_of(np.random.default_rng(seed), 48, context, channels), context
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SMALL)
+def test_sizes_and_precision(name, tmp_path):
+    source = exported_for_one_row(name, tmp_path)
+    header = source.with_suffix(".h").read_text()
+    sizes = {
+        line.split()[1].removeprefix(name.upper() + "_"): int(line.split()[2])
+        for line in header.splitlines()
+        if "_BYTES" in line and line.startswith("#define")
+    }
+    assert sizes["CONSTANT_BYTES"] <= CONSTANTS
+    assert sizes["WORK_BYTES"] <= WORK
+    assert sizes["MEMORY_BYTES"] <= MEMORY
+    memory = header[header.index("float factor[") : header.index(f"}} {name}_memory")]
+    assert "double" not in memory
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
+@pytest.mark.skipif(not COMPILERS, reason="no C compiler")
+@pytest.mark.parametrize("channels", [(), ("sinkage", "drawbar_pull")], ids=["torque", "all"])
+@pytest.mark.parametrize("name", SMALL)
+def test_an_emulated_cortex_m4_gives_the_same_numbers(name, channels, tmp_path):
+    source = exported_for_one_row(name, tmp_path)
+    rows, context = stream(name, 5, channels)
+    found = run_on_board(tmp_path, name, rows, context)
+    library = compile_library(source, tmp_path / "host.so", COMPILERS[0])
+    model = CompiledModel(source.with_suffix(".h"), library)
+    memory = model.start(**(context or {}))
+    assert len(found) == len(rows["slip"])
+    for row, board in zip(model.rows(**rows), found, strict=True):
+        code, answer = model.update(memory, (type(row) * 1)(row))
+        assert (board.code, board.in_range) == (code, answer["in_range"])
+        for part, limit in zip(NAMES, (MOMENTS, MOMENTS, ENDS, ENDS), strict=True):
+            assert (np.abs(board.estimate[part] - answer[part]) < limit * answer["std"]).all()
+    assert max(board.instructions for board in found) <= (
+        ALL_CHANNELS if channels else INSTRUCTIONS
+    )
+    assert max(board.stack for board in found) <= STACK
+    assert min(board.instructions for board in found) > 1e5  # the timer ran
