@@ -236,9 +236,9 @@ PARTS = (
         "small",
         "board",
         "Files for a microcontroller",
-        "`wheel_small.onnx` and `any_wheel_small.onnx` beside the full files, on the reference sets "
-        "of [sets.md](sets.md). Goals: RMSE at most 1.05 of the exact one, log density within 0.1 "
-        "nat of the full file, coverage 87 to 93 %, the same flags.",
+        "`wheel_small.onnx` and `any_wheel_small.onnx` beside the full files, on the reference "
+        "sets of [sets.md](sets.md). Goals: RMSE at most 1.05 of the exact one, log density within "
+        "0.1 nat of the full file, coverage 87 to 93 %, the same flags.",
         small_files.section,
     ),
     Part(

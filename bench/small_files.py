@@ -145,14 +145,14 @@ def _cells(
 def board_table(folder: Path) -> str:
     """Memory of the C code, and instructions and stack on an emulated Cortex-M4F."""
     lines = [
-        "`soilml export-c --rows 1`, gcc -O2 with contraction of products and sums; instructions "
-        f"of one row with its answer, and stack, largest of {ROWS} rows of one soil, emulated (`qemu-system-arm -M mps2-an386`). Limits: 64 "
-        "kB of constants, 24 kB of working memory, 4 kB a memory, 2 million instructions. A "
-        "processor of 168 MHz that executes one instruction in two cycles takes 24 ms for 2 "
-        "million.",
+        "`soilml export-c --rows 1`, gcc -O2 with contraction of products and sums. Instructions "
+        f"of one row with its answer, and stack: the largest of {ROWS} rows of one soil, emulated "
+        "(`qemu-system-arm -M mps2-an386`). Goals: 64 kB of constants, 24 kB of working memory, 4 "
+        "kB a memory, 2 million instructions. At 168 MHz and two cycles an instruction, 2 million "
+        "take 24 ms.",
         "",
-        "| file | constants, kB | working memory, kB | memory, kB | rows with | instructions, million "
-        "| stack, kB |",
+        "| file | constants, kB | working memory, kB | memory, kB | rows with | instructions, "
+        "million | stack, kB |",
         "|---|---:|---:|---:|---|---:|---:|",
     ]
     for name in PAIRS:
