@@ -24,7 +24,7 @@ from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.importance_sampler import add_importance_sampler
-from training.set_posterior.likelihood import Readings, add_likelihood
+from training.set_posterior.likelihood import SetReadings, add_likelihood
 from training.set_posterior.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
@@ -108,7 +108,7 @@ class SetPosteriorGraph:
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
-        grown = Readings(rows, state, inputs[MODEL_ERROR_INPUT], outputs[0])
+        grown = SetReadings(rows, state, inputs[MODEL_ERROR_INPUT], outputs[0])
         add = add_small_likelihood if self.small else add_likelihood
         likelihood = add(self.family, self.response, context, grown)
         consistency = add_consistency(counts, self.limits, self.family.targets)

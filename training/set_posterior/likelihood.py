@@ -21,8 +21,8 @@ MixtureAt = Callable[[Value], ScaleMixture]
 
 
 @dataclass(frozen=True)
-class Readings:
-    """Readings of a set: those of earlier calls, and new ones."""
+class SetReadings:
+    """SetReadings of a set: those of earlier calls, and new ones."""
 
     rows: ResidualRows
     state: Value  # residual system (kept, terms + errors) of earlier readings
@@ -43,7 +43,7 @@ class Likelihood:
 
 
 def add_likelihood(
-    family: WheelFamily, response: Response, context: ContextValues, readings: Readings
+    family: WheelFamily, response: Response, context: ContextValues, readings: SetReadings
 ) -> Likelihood:
     """The likelihood with all unknowns of the family and all terms of the response."""
     terms = len(response.terms)

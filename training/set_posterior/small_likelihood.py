@@ -7,14 +7,14 @@ from dataclasses import replace
 from training.onnx_graph.value import Value, concat
 from training.set_posterior.columns import integrate_out_columns, triangular_factor
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
-from training.set_posterior.likelihood import OF_MODEL, OF_SENSORS, Likelihood, Readings
+from training.set_posterior.likelihood import OF_MODEL, OF_SENSORS, Likelihood, SetReadings
 from training.set_posterior.linear_unknowns import LinearUnknowns
 from training.set_posterior.response_surface import Response
 from training.set_posterior.scale_mixture import ScaleMixture, add_scale_mixture
 
 
 def add_small_likelihood(
-    family: WheelFamily, response: Response, context: ContextValues, readings: Readings
+    family: WheelFamily, response: Response, context: ContextValues, readings: SetReadings
 ) -> Likelihood:
     r"""The likelihood in the unknowns that are not nearly known.
 
