@@ -50,7 +50,7 @@ TIERS = {
 }
 #: Which cause of tier C an effect of the catalogue names rightly, and why.
 SAME_CAUSE = (
-    "A stiff layer of tier C counts as named rightly by `firm-base`: both are firmer ground at a "
+    "A stiff layer of tier C counts as named rightly by `firm-base`. Both are firmer ground at a "
     "depth below loose soil, where the pressure rises faster than by the law of the surface. The "
     "laws differ: the layer has a finite stiffness and a sharp edge."
 )

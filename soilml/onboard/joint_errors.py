@@ -106,11 +106,15 @@ class JointErrors:
 def joint_errors(files: tuple[HeldOutErrors, ...]) -> tuple[JointErrors, ...] | None:
     """Measure the rule for each quantity (q) of several files; None for too few common rows.
 
-    Rows are common where number and true value agree.
+    Rows are common where number and true value agree; with fewer than `MANY_ROWS`, they must be
+    half of a file's.
     """
     single = _common_rows(files, "")
-    if single is None or len(single[0]) < LEAST_COMMON_ROWS:
+    if single is None:
         return None
+    rows, fewest = len(single[0]), min(len(file.rows) for file in files)
+    if rows < MANY_ROWS and rows < max(LEAST_COMMON_ROWS, fewest / 2):
+        return None  # rows of other data agree by chance
     rules = tuple(_measure(*(part[..., k] for part in single)) for k in range(single[0].shape[1]))
     average, repeats = _common_rows(files, "average_"), float(files[0].repeats[-1])
     same = all(file.repeats[-1] == repeats for file in files)
