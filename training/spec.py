@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from datagen.recipe import packaged_file
@@ -21,6 +21,7 @@ from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import FeatureSubset, GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.response_surface import ResponseSettings
 
@@ -225,5 +226,22 @@ def take_response_settings(settings: Settings, seed: int) -> ResponseSettings:
         table.fail(
             f"terms is {terms}; a small file needs {LEAST_SMALL_TERMS} to {MOST_SMALL_TERMS}"
         )
+    scales = _take_scales(table)
     table.finish()
-    return ResponseSettings(**counts, seed=seed, small=small, terms=terms)
+    return ResponseSettings(**counts, seed=seed, small=small, terms=terms, scales=scales)
+
+
+def _take_scales(table: Settings) -> ErrorScales:
+    """Read [[set_posterior.model_errors]], the usual scales where it is missing."""
+    if "model_errors" not in table:
+        return USUAL_SCALES
+    names = [field.name for field in fields(ErrorScale)]
+    entries = table.tables("model_errors")
+    found = [{name: entry.number(name) for name in names} for entry in entries]
+    for entry in entries:
+        entry.finish()
+    try:
+        return ErrorScales.of_list(found)
+    except InputError as error:
+        table.fail(f"model_errors: {error}")
+        raise

@@ -179,6 +179,7 @@ def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosteri
     """The set posterior of wheels of any size, and its metrics on fresh simulated sets."""
     response = fit_response(spec.family, spec.response, progress)
     posterior = calibrate_misfit_limits(spec.family, response, progress, spec.response.small)
+    posterior = replace(posterior, scales=spec.response.scales)
     return posterior, validate_posterior(posterior, progress)
 
 
@@ -190,7 +191,8 @@ def _train_set_posterior(
     family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
     response = fit_response(family, spec.set_posterior, progress)
     posterior = calibrate_misfit_limits(family, response, progress, spec.set_posterior.small)
-    posterior = replace(posterior, noise=family.declared_noise())
+    scales = spec.set_posterior.scales
+    posterior = replace(posterior, noise=family.declared_noise(), scales=scales)
     return posterior, validate_posterior(posterior, progress)
 
 

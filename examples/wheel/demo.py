@@ -133,8 +133,8 @@ def adapt_board(later: LaterSoils) -> None:
     command("adapt", MODEL, CAMPAIGN, *words)
     lines = []
     files = {"before": Estimator.load(old), "adapted": Estimator.load(f"{ADAPTED}/adapted.onnx")}
-    right = {f"{k}, model taken as right": v.on(model_error=0.0) for k, v in files.items()}
-    for label, estimator in (files | right).items():
+    right = {"before, model taken as right": files["before"].on(model_error=0.0)}
+    for label, estimator in (right | files).items():
         error, held = later.figures(estimator)
         cells = (f"{x * SHOWN[n][0]:.2g} {SHOWN[n][1]}" for n, x in zip(SHEAR, error, strict=True))
         lines.append((label, *cells, " / ".join(f"{100 * x:.0f} %" for x in held)))

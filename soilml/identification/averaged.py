@@ -86,13 +86,9 @@ def averaged_samples(
     Hoeting, Madigan, Raftery and Volinsky, Statist. Sci. 14(4), 1999 (model averaging). MacKay,
     Neural Computation 4(3), 1992 (evidence by Laplace's approximation).
     """
-    weighted, optimum = fit_under_declared_noise(case, readings, free)
-    if readings.undeclared:
-        known = np.isfinite(readings.std)
-        std = np.where(known, readings.std, weighted.readings.std)
-        readings = replace(readings, std=std, from_case=readings.from_case & known)
+    readings, start = with_noise_of_fit(case, readings, free)
     effects = candidate_effects(case, effects)
-    found = _fitted(case, readings, free, effects, optimum.values())
+    found = _fitted(case, readings, free, effects, start)
     if not found:
         raise FitError(
             "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
@@ -105,6 +101,21 @@ def averaged_samples(
         scale = float(np.sqrt(misfit))
         found = [(h, replace(density, noise_scale=scale)) for h, density in found]
     return _mixture(found, misfit, scale)
+
+
+def with_noise_of_fit(
+    case: Case, readings: Readings, free: Sequence[Coordinate]
+) -> tuple[Readings, dict[str, float]]:
+    """Readings with the noise of the exact model's residuals where none is declared; its values.
+
+    Raises `FitError` where no parameters in the prior carry the measured loads.
+    """
+    weighted, optimum = fit_under_declared_noise(case, readings, free)
+    if readings.undeclared:
+        known = np.isfinite(readings.std)
+        std = np.where(known, readings.std, weighted.readings.std)
+        readings = replace(readings, std=std, from_case=readings.from_case & known)
+    return readings, optimum.values()
 
 
 def _log_weight(entry: tuple[ErrorHypothesis, SoilDensity]) -> float:

@@ -13,8 +13,10 @@ from soilml.cli import main
 from soilml.gap.presentation import SUSPECTED_FILE
 from soilml.io.text_tables import csv_text
 from training.adaptation import board_file
+from training.adaptation.supported_errors import CHECKED
 from training.adaptation.workflow import GAP_FILES, _read_gap
 from training.commands.adapt import FILES
+from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 
 #: The packaged spec with a response that is learned in seconds.
 SMALL_SPEC = """\
@@ -102,6 +104,10 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monke
     assert not (out / "before.onnx").exists()
     assert "slip-sinkage" in (out / "adapted.toml").read_text()
     file = soilml.Estimator.load(out / "adapted.onnx")
+    scales = ErrorScales.of_list(json.loads(file.metadata["set"])["model_error_scales"])
+    assert scales.sizes[0].tolist() == list(CHECKED.sizes) and scales.probabilities[0] > 0.5
+    assert "model-errors" in [remark["code"] for remark in content["remarks"]]
+    assert f"| {CHECKED.bearing} |" in (out / "adapted.md").read_text()
     assert file.names == ("cohesion", "friction_angle", "shear_modulus")
     before = {path: path.stat().st_mtime_ns for path in out.glob("*.onnx")}
     (out / "adapted.h").unlink()
@@ -124,6 +130,8 @@ def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys
     content = json.loads((out / "adapt.json").read_text())
     assert content["status"] == "not-judged" and content["kept_back"] == []
     assert "few-runs" in [r["code"] for r in content["remarks"]]
+    metadata = soilml.Estimator.load(out / "adapted.onnx").metadata
+    assert json.loads(metadata["set"])["model_error_scales"] == USUAL_SCALES.as_list()
     assert "judgement" not in content
     assert all((out / name).is_file() for name in content["files"])
     assert (out / "adapted.onnx").is_file() and not (out / "kept_back.csv").exists()

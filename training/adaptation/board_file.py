@@ -20,6 +20,7 @@ from training.dataset import read_dataset
 from training.export.model_card import model_card
 from training.export.model_file import export_model
 from training.export_c.c_file import write_c
+from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.spec import Spec, read_spec
 from training.train import train
@@ -63,6 +64,7 @@ def make_file(
     recipe: str,
     *,
     seed: int,
+    scales: ErrorScales = USUAL_SCALES,
     workers: int | None = None,
     as_c: bool = False,
     progress: Progress = lambda text, done, total: None,
@@ -71,6 +73,7 @@ def make_file(
 
     recipe: Text of the recipe; see `training.adaptation.campaign.recipe_text`.
     seed: Of the training.
+    scales: Sizes of the errors of its model, and their probabilities.
     workers: Processes; one for each core by default.
     as_c: Whether C code is written as well.
 
@@ -81,7 +84,7 @@ def make_file(
     folder = steps.folder
     save_text(folder / names.recipe, recipe)
     found = read_recipe(folder / names.recipe)
-    spec = _spec(found, seed)
+    spec = _spec(found, seed, scales)
     RecipeFamily.of(found, spec.targets)  # raises before anything is simulated
     rows, model = folder / names.rows, folder / names.model[0]
     stage = f"{names.name}: simulating"
@@ -107,17 +110,19 @@ def make_file(
     return model
 
 
-def _spec(recipe: Recipe, seed: int) -> Spec:
-    """The packaged spec for those of its targets that vary, with this seed."""
+def _spec(recipe: Recipe, seed: int, scales: ErrorScales) -> Spec:
+    """The packaged spec for those of its targets that vary, with this seed and these errors."""
     spec = read_spec(SPEC)
     assert spec.set_posterior is not None
     targets = tuple(name for name in SHEAR if name in recipe.case.prior)
     content = json.loads(spec.text) | {"targets": list(targets), "seed": seed}
+    if scales != USUAL_SCALES:
+        content["set_posterior"] |= {"model_errors": scales.as_list()}
     return replace(
         spec,
         seed=seed,
         targets=targets,
-        set_posterior=replace(spec.set_posterior, seed=seed),
+        set_posterior=replace(spec.set_posterior, seed=seed, scales=scales),
         text=json.dumps(content, sort_keys=True),
     )
 

@@ -17,6 +17,7 @@ from soilml.errors import InputError
 from soilml.gap import gap
 from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
 from soilml.gap.presentation import SUSPECTED_FILE, gap_files
+from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
 from soilml.io.atomic_files import create_folder, write_files
 from soilml.io.read_table import Rows, as_table
@@ -40,6 +41,8 @@ from training.adaptation.judgement import BoardCandidate, Judgement, check_lengt
 from training.adaptation.page import adapt_page
 from training.adaptation.result import AdaptReport
 from training.adaptation.steps import ResumableSteps
+from training.adaptation.supported_errors import supported_scales
+from training.set_posterior.error_scales import ErrorScales
 
 #: Statuses of a gap report with effects that the evidence supports.
 CLAIMED = ("named", "partly-named", "class", "form-open")
@@ -79,7 +82,9 @@ def adapt(
     over soils of the priors and the slips and loads of the log. From the torque of the first rows
     of a run that was kept back, each estimates the soil, and its model predicts torque, drawbar
     pull and sinkage of the later rows. What a file does not estimate has the value of the fit to
-    the campaign, in both models.
+    the campaign, in both models. The adapted file has errors of its model of sizes that the
+    campaign supports (`supported_scales`); the old file is judged by the better of two answers, its
+    own and that of the model taken as right.
 
     Of fewer than four runs none is kept back: a file is then trained and not judged, and what the
     gap analysis says of rows that it kept back itself is all that speaks for it.
@@ -165,24 +170,31 @@ def adapt(
         if split.kept_back is not None:
             check_lengths(split.kept_back)
         new, remarks = board_unknowns(with_noise_of_log(found.case, table))
-        own = [f"With {' + '.join(found.effects)}. {found.sentence}"]
-        write_files({target / ADAPTED_MODEL: case_as_toml(found.case, own)})
+        head = [f"With {' + '.join(found.effects)}. {found.sentence}"]
+        write_files({target / ADAPTED_MODEL: case_as_toml(found.case, head)})
         make = partial(make_file, steps, seed=seed, workers=workers, progress=progress)
-        file = make(ADAPTED, recipe_text(new, driven, rows, seed), as_c=True)
+        make_adapted = partial(make, ADAPTED, recipe_text(new, driven, rows, seed), as_c=True)
         if split.kept_back is None:
+            make_adapted()
             report = found.report((), None, [*remarks, _unjudged(table)], rows, seed)
             return _finish(report, target, origin)
+        scales = supported_scales(new, split.kept_back, table)
+        remarks = [*remarks, _errors_remark(scales)]
+        file = make_adapted(scales=scales)
         if earlier is None:
             before = make(BEFORE, recipe_text(old, driven, rows, seed))
             earlier = with_sensors_of(Estimator.load(before), old)
         progress("judging", 0, 1)
-        judgement = judge(
-            split.kept_back,
-            BoardCandidate(earlier, with_fitted_soil(old, found.soil_before)),
-            BoardCandidate(with_sensors_of(Estimator.load(file), new), new),
-            truth,
-            seed=seed,
-        )
+        own = with_fitted_soil(old, found.soil_before)
+        after = BoardCandidate(with_sensors_of(Estimator.load(file), new), new)
+        answers = [earlier, with_exact_model(earlier)]  # the old file is judged by the better one
+        judgements = [
+            judge(split.kept_back, BoardCandidate(answer, own), after, truth, seed=seed)
+            for answer in answers[: 1 + (answers[1] is not earlier)]
+        ]
+        judgement = max(judgements, key=lambda one: one.ratio)
+        if judgement is not judgements[0]:
+            remarks.append(_exact_remark())
         progress("judging", 1, 1)
         report = found.report(split.runs, judgement, remarks, rows, seed)
         return _finish(report, target, origin, with_before=against is None)
@@ -294,12 +306,32 @@ def _sensor_remark(case: Case) -> list[Remark]:
     return [Remark("sensor-error-trained", text, names)]
 
 
+def _errors_remark(scales: ErrorScales) -> Remark:
+    """A note on the errors that the adapted file takes its model to have."""
+    checked = scales.scales[0]
+    text = (
+        f"the adapted file has errors of its model: {checked.bearing:g} of the usual ones with a "
+        f"probability of {checked.probability:.2f}, as the campaign supports, else larger ones"
+    )
+    return Remark("model-errors", text, severity="note")
+
+
+def _exact_remark() -> Remark:
+    """A note on the answer by which the old file is judged."""
+    text = (
+        "the old file is judged with its model taken as right (model_error 0), as which it "
+        "predicts the runs kept back better than with its own errors of the model"
+    )
+    return Remark("old-model-right", text, severity="note")
+
+
 def _unjudged(table: Table) -> Remark:
     """A remark on a campaign of which no run was kept back."""
     count = np.unique(table["run"]).size
     text = (
         f"{count} run{'s' * (count != 1)}: of {RUNS_PER_HELD_OUT} or more, a quarter is kept back "
-        "and judges both files; here gap/report.html alone says how well rows are predicted"
+        "and judges both files; here gap/report.html alone says how well rows are predicted, and "
+        "the file has the usual errors of a model"
     )
     return Remark("few-runs", text)
 

@@ -22,6 +22,7 @@ from soilml.onboard.set_contract import INTERFACE, RESPONSE_CHANNELS, SET_SWITCH
 from training.export.model_file import write_model
 from training.onnx_graph.builder import Graph, Output
 from training.regressors.standardisation import Standardisation
+from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import WheelFamily
@@ -53,7 +54,7 @@ def write_anew(path: Path) -> None:
     terms = tuple(tuple(term) for term in sets.get("monomials", ())) or family_terms(family)
     response = read_response(branch, family, sets["error"], terms)
     small = bool(sets.get("small", False))
-    posterior = SetPosteriorGraph(family, response, limits, sets["noise"], small)
+    posterior = SetPosteriorGraph(family, response, limits, sets["noise"], small, _scales(sets))
     graph = Graph("" if sets["alone"] else "sets_")
     posterior.add_to(graph, "" if sets["alone"] else "sets_")
     if sets["alone"]:
@@ -78,6 +79,12 @@ def _family(metadata: Mapping[str, str], sets: Mapping[str, Any], path: Path) ->
         return DimensionlessFamily.take(Settings(ranges, "[any_wheel]", path))
     targets = [entry["name"] for entry in json.loads(metadata["outputs"])]
     return RecipeFamily.of(parse_recipe(metadata["recipe"], str(path)), targets)
+
+
+def _scales(sets: Mapping[str, Any]) -> ErrorScales:
+    """Scales of the model's errors; the usual ones where a file states none."""
+    stated = sets.get("model_error_scales")
+    return USUAL_SCALES if stated is None else ErrorScales.of_list(stated)
 
 
 def _branch(model: Any, name: str) -> Any:

@@ -22,6 +22,7 @@ from soilml.onboard.set_contract import (
 )
 from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value
+from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.importance_sampler import add_importance_sampler
 from training.set_posterior.likelihood import SetReadings, add_likelihood
@@ -39,13 +40,28 @@ ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
 
 @dataclass(frozen=True)
 class SetPosteriorGraph:
-    """A family of wheels, its response surface, the largest accepted misfits, the file's noise."""
+    """A family of wheels with its response surface, and what a file assumes of readings.
+
+    Attributes
+    ----------
+    family, response
+        The wheels, and the surface that was learned of them.
+    limits
+        The largest accepted misfits.
+    noise
+        That of the file.
+    small
+        Whether it is for a microcontroller: fewer points, smaller systems.
+    scales
+        Sizes of the model's errors, and their probabilities before a set is read.
+    """
 
     family: WheelFamily
     response: Response
     limits: MisfitLimits
     noise: FileNoise = field(default_factory=dict)
-    small: bool = False  # whether it is for a microcontroller: fewer points, smaller systems
+    small: bool = False
+    scales: ErrorScales = USUAL_SCALES
 
     @property
     def columns(self) -> int:
@@ -108,7 +124,7 @@ class SetPosteriorGraph:
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
-        grown = SetReadings(rows, state, inputs[MODEL_ERROR_INPUT], outputs[0])
+        grown = SetReadings(rows, state, inputs[MODEL_ERROR_INPUT], self.scales, outputs[0])
         add = add_small_likelihood if self.small else add_likelihood
         likelihood = add(self.family, self.response, context, grown)
         consistency = add_consistency(counts, self.limits, self.family.targets)

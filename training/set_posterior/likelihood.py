@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
 from training.onnx_graph.value import Value, concat
+from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.residual_system import ResidualRows
 from training.set_posterior.response_surface import Response
@@ -27,6 +28,7 @@ class SetReadings:
     rows: ResidualRows
     state: Value  # residual system (kept, terms + errors) of earlier readings
     size: Value  # size of the errors of the model, (1,)
+    scales: ErrorScales  # their sizes where that is inferred
     grown: str  # name of the output for the state with the new rows
 
 
@@ -56,7 +58,7 @@ def add_likelihood(
         whole, sensors, model = system.split([terms, OF_SENSORS, OF_MODEL], axis=1)
         system = concat([whole, model, sensors], axis=1)
         system = integrate_out_sensor_errors(system, terms + OF_MODEL)
-        return add_scale_mixture(system, readings.size, terms)
+        return add_scale_mixture(system, readings.size, terms, readings.scales)
 
     return Likelihood(
         family, response, context, lambda: integrate_out_sensor_errors(start, terms), mixture_at

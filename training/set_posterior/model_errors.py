@@ -14,6 +14,7 @@ from soilml.onboard.set_contract import (
     RESPONSE_CHANNELS,
 )
 from training.onnx_graph.value import Value, concat, exp, gemm, log, maximum, shortcut, stack_rows
+from training.set_posterior.error_scales import OF_CHANNELS
 from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
 from training.set_posterior.monomials import ONE, Terms, derivative
@@ -21,8 +22,7 @@ from training.set_posterior.response_surface import Response
 
 FRICTION = "friction_angle"
 STRENGTH, MODULUS = ("cohesion", FRICTION), ("shear_modulus",)  # Unknowns of the shear strength
-#: Place of the first error that one channel has alone, and how those that grow with slip are named.
-OF_CHANNELS, GROWS = MODEL_ERROR_COLUMNS.index("sinkage"), "_by_slip"
+GROWS = "_by_slip"  # End of the names of errors that grow with slip
 
 
 @dataclass(frozen=True)

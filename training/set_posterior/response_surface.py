@@ -19,6 +19,7 @@ from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh
 from training.regressors.standardisation import Standardisation
 from training.regressors.tanh_network import TanhNetwork, evaluate_layers
+from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
@@ -124,7 +125,10 @@ SELECTION_DESIGNS, SELECTION_POINTS = 256, 512
 
 @dataclass(frozen=True)
 class ResponseSettings:
-    """Effort of the fit: designs simulated, width of the two hidden layers, epochs, seed."""
+    """Effort of the fit: designs simulated, width of the two hidden layers, epochs, seed.
+
+    `scales` are those of the errors that a model trained so has, which the fit does not depend on.
+    """
 
     designs: int
     hidden: int
@@ -132,6 +136,7 @@ class ResponseSettings:
     seed: int
     small: bool = False  # whether the file is for a microcontroller
     terms: int = 0  # most monomials; 0: all of the family's degrees
+    scales: ErrorScales = USUAL_SCALES
 
 
 @dataclass(frozen=True)

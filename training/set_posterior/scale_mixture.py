@@ -6,27 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from soilml.onboard.set_contract import LAW_ERROR_COLUMNS, MODEL_ERROR_COLUMNS
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, log, sqrt, where
 from training.set_posterior.columns import triangular_factor
-from training.set_posterior.model_errors import OF_CHANNELS
+from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.polynomial_residuals import NearlyKnown, PolynomialResiduals
-
-#: Scales of the model's errors, as multiples of their usual sizes, by rising size: of bearing and
-#: contact, of single channels, and of laws; and their prior probabilities. Less than the usual
-#: errors is twice as likely as all of them, and one model in twelve is wrong as nobody listed.
-#: Found on soils of bench/wrong_worlds.py with another seed than that of the tables.
-SCALES = ((0.6, 0.3, 0.6), (1.0, 1.5, 1.0), (3.0, 4.0, 2.0))
-PROBABILITIES = (0.6, 0.32, 0.08)
-#: The scale whose misfit tells whether readings are consistent: what usual errors do not explain is
-#: flagged, though the largest ones may.
-JUDGED = 1
-#: Number of columns of each kind, in the order of `MODEL_ERROR_COLUMNS`.
-GROUPS = (
-    OF_CHANNELS,
-    len(MODEL_ERROR_COLUMNS) - OF_CHANNELS - len(LAW_ERROR_COLUMNS),
-    len(LAW_ERROR_COLUMNS),
-)
 
 
 @dataclass(frozen=True)
@@ -53,13 +36,19 @@ class ScaleMixture:
 
     systems: Value  # A_k, (scales, m, terms), by rising scale
     log_weight: Value  # (scales, 1) logarithms of p_k over the root of the determinant
+    scales: ErrorScales
     common: Value | None = None  # further rows (m, terms), which all scales have
+
+    @property
+    def count(self) -> int:
+        """Number of scales."""
+        return len(self.scales.scales)
 
     def standardised(self, nearly_known: NearlyKnown | None) -> ScaleMixture:
         """In coordinates of nearly known unknowns, with their prior as further rows."""
         if nearly_known is None:
             return self
-        prior = np.broadcast_to(nearly_known.prior, (len(SCALES), *nearly_known.prior.shape))
+        prior = np.broadcast_to(nearly_known.prior, (self.count, *nearly_known.prior.shape))
         whole = [self.systems * nearly_known.factors, constant(self.systems.graph, prior)]
         return replace(self, systems=concat(whole, axis=1))
 
@@ -76,7 +65,7 @@ class ScaleMixture:
         log_parts = squares * -0.5 + self.log_weight
         largest = log_parts.reduce("ReduceMax", axis=0, keepdims=True)
         total = log(exp(log_parts - largest).sum(axis=0, keepdims=True)) + largest
-        least = squares.take([JUDGED], axis=0)
+        least = squares.take([self.scales.judged], axis=0)
         return ScaledMisfit(total * -2.0, least, log_parts - total)
 
     def proposal(
@@ -87,7 +76,7 @@ class ScaleMixture:
         misfit, weights: Of a sample of the posterior, whose weights (1, n) have the sum 1.
         """
         shares = gemm(weights, exp(misfit.log_parts), transpose_b=True)  # (1, scales)
-        flat = self.systems.reshape(len(SCALES), -1)
+        flat = self.systems.reshape(self.count, -1)
         system = (shares @ flat).reshape(-1, len(like.terms))
         if self.common is not None:
             columns = concat([system, self.common], axis=0).node("Transpose")
@@ -95,7 +84,7 @@ class ScaleMixture:
         return like.with_system(system)
 
 
-def add_scale_mixture(system: Value, size: Value, terms: int) -> ScaleMixture:
+def add_scale_mixture(system: Value, size: Value, terms: int, scales: ErrorScales) -> ScaleMixture:
     r"""A system (m, terms + errors) with the errors of the last columns integrated out.
 
     As `integrate_out_errors` does, for all scales at once. The determinant is the product of that
@@ -103,13 +92,14 @@ def add_scale_mixture(system: Value, size: Value, terms: int) -> ScaleMixture:
 
     .. math:: |I + E E^T| = \prod_j (1 + |g_j|^2)
 
-    size: Zero or more: the scale (1,) alone; below zero: `SCALES`.
+    size: Zero or more: the scale (1,) alone; below zero: `scales`.
+    scales: By rising size.
     """
-    graph, count, errors = system.graph, len(SCALES), len(MODEL_ERROR_COLUMNS)
+    of_columns = scales.of_columns
+    count, errors = of_columns.shape
     own, columns = system.split([terms, errors], axis=1)
-    of_columns = np.repeat(SCALES, GROUPS, axis=1)[:, None]
-    scales = where(size < 0.0, constant(graph, of_columns), size)  # (scales, 1, errors)
-    copies = (own.reshape(1, -1, terms) * np.ones((count, 1, 1)), columns * scales)
+    factors = where(size < 0.0, constant(system.graph, of_columns[:, None]), size)
+    copies = (own.reshape(1, -1, terms) * np.ones((count, 1, 1)), columns * factors)
     systems, determinants = concat(copies, axis=2), []
     for last in range(terms + errors - 1, terms - 1, -1):
         a, g = systems.split([last, 1], axis=2)
@@ -118,5 +108,5 @@ def add_scale_mixture(system: Value, size: Value, terms: int) -> ScaleMixture:
         change = g.node("Transpose", perm=[0, 2, 1]) @ a
         systems = a - (g / (determinant + sqrt(determinant))) * change
     log_determinant = log(concat(determinants, axis=1)).sum(axis=1, keepdims=False)
-    log_prior = np.log(np.asarray(PROBABILITIES))[:, None]
-    return ScaleMixture(systems, log_prior - log_determinant * 0.5)
+    log_prior = np.log(scales.probabilities)[:, None]
+    return ScaleMixture(systems, log_prior - log_determinant * 0.5, scales)

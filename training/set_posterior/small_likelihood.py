@@ -63,7 +63,9 @@ def add_small_likelihood(
         errors, monomials = with_errors.split([OF_MODEL, sampled], axis=1)
         _, common = without.split([OF_MODEL, sampled], axis=1)
         system = concat([monomials, errors], axis=1)
-        return replace(add_scale_mixture(system, readings.size, sampled), common=common)
+        return replace(
+            add_scale_mixture(system, readings.size, sampled, readings.scales), common=common
+        )
 
     return Likelihood(
         family,

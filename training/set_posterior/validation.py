@@ -194,6 +194,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
         "context": posterior.family.limits(),
         "errors": posterior.family.typical_errors(),
         "model_errors": posterior.family.model_errors(),
+        "model_error_scales": posterior.scales.as_list(),
         "alone": sets_only,
         "least_share_in_range": LEAST_SHARE_IN_RANGE,
         "error": dict(zip(RESPONSE_CHANNELS, posterior.response.error.tolist(), strict=True)),

@@ -7,13 +7,11 @@ from scipy.special import logsumexp
 from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_COLUMNS
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value
-from training.set_posterior.scale_mixture import (
-    GROUPS,
-    JUDGED,
-    PROBABILITIES,
-    SCALES,
-    add_scale_mixture,
-)
+from training.set_posterior.error_scales import GROUPS, USUAL_SCALES
+from training.set_posterior.scale_mixture import add_scale_mixture
+
+SIZES, PROBABILITIES = USUAL_SCALES.sizes, USUAL_SCALES.probabilities
+JUDGED = 1  # The usual size
 
 TERMS, ERRORS, ROWS, POINTS = 5, len(MODEL_ERROR_COLUMNS), 14, 6
 
@@ -22,7 +20,7 @@ TERMS, ERRORS, ROWS, POINTS = 5, len(MODEL_ERROR_COLUMNS), 14, 6
 def session():
     graph = Graph()
     inputs = {name: Value(graph, name) for name in ("system", "size", "basis")}
-    mixture = add_scale_mixture(inputs["system"], inputs["size"], TERMS)
+    mixture = add_scale_mixture(inputs["system"], inputs["size"], TERMS, USUAL_SCALES)
     found = mixture.misfit(inputs["basis"])
     found.surprise.node("Identity").named("surprise")
     found.least.node("Identity").named("least")
@@ -55,7 +53,7 @@ def run(session, system, basis, size) -> list[np.ndarray]:
 def test_the_likelihood_is_the_average_over_scales(session, example):
     surprise, least, log_parts = run(session, *example, INFERRED)
     parts, misfits = [], []
-    for scales, probability in zip(SCALES, PROBABILITIES, strict=True):
+    for scales, probability in zip(SIZES, PROBABILITIES, strict=True):
         misfit, log_determinant = dense(*example, np.repeat(scales, GROUPS))
         misfits.append(misfit)
         parts.append(np.log(probability) - 0.5 * (misfit + log_determinant))
@@ -75,5 +73,5 @@ def test_a_size_that_is_told_is_the_only_one(session, example, size):
 
 
 def test_scales_rise_and_their_probabilities_are_one_in_all():
-    assert (np.diff(SCALES, axis=0) >= 0.0).all() and sum(GROUPS) == ERRORS
+    assert (np.diff(SIZES, axis=0) >= 0.0).all() and sum(GROUPS) == ERRORS
     assert sum(PROBABILITIES) == pytest.approx(1.0)
