@@ -45,8 +45,10 @@ def test_bulldozing_and_a_slope_look_alike_until_the_wheel_runs_in_reverse(stori
     assert first.report["status"] == "class"
     assert {("bulldozing",), ("slope",)} <= {tuple(c) for c in first.report["cause_set"]}
     assert "reverse" in {run["kind"] for run in first.report["next_runs"]}
-    assert second.report["status"] == "named"
     assert second.report["cause_set"] == [["bulldozing"]]
+    first_suspect, next_one = second.report["suspects"][:2]
+    assert first_suspect["effects"] == ["bulldozing"]
+    assert first_suspect["probability"] > 0.8 > 0.1 > next_one["probability"]
 
 
 def test_a_sensor_that_is_off_is_not_named_as_physics(stories):

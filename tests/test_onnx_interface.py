@@ -19,8 +19,10 @@ ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "onnx-interface.md").read_text()
 RELEASED = {
     "wheel": "whole",
+    "wheel_small": "whole",
     "kls1_wheel": "whole",
     "any_wheel": "set",
+    "any_wheel_small": "set",
     "wheel_lssvm": "single",
     "wheel_mlp": "single",
     "wheel_linear": "single",

@@ -72,8 +72,9 @@ def test_metrics_hold_on_another_seed(name):
     assert found.in_range.mean() > 0.995
 
 
-#: Allowed deviation of the coverage, where the shear modulus varies by a factor of thirty.
-DEVIATION = {"kls1_wheel": 0.08}
+#: Allowed deviation of the coverage: where the shear modulus varies by a factor of thirty, and
+#: where few points represent the posterior of 40 rows, whose intervals are then too narrow.
+DEVIATION = {"kls1_wheel": 0.08, "wheel_small": 0.1}
 STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
 
 

@@ -148,7 +148,9 @@ def _check_keys(text: str, where: str) -> None:
             if token in (" ", "\t"):
                 continue
             if token in ("=", "]") and parts > MOST_DEPTH:
-                raise InputError(f"{where} is not valid: a key has more than {MOST_DEPTH} parts")
+                raise InputError(
+                    f"{where} is not valid, nested too deep: a key has more than {MOST_DEPTH} parts"
+                )
             if token == ".":
                 after_dot = parts > 0
                 continue

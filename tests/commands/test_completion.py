@@ -23,7 +23,7 @@ from soilml.cli.main import COMMANDS, parser
         (["effects", "slip-s"], {"slip-scale", "slip-sinkage"}),
         (["estimate", "wheel_l"], {"wheel_linear", "wheel_lssvm", FILES}),
         (["pull", "m.toml", "r.csv", "--gravity", "m"], {"moon", "mars"}),
-        (["pull", "m.toml", "r.csv", "--from", "any"], {"any_wheel", FILES}),
+        (["pull", "m.toml", "r.csv", "--from", "any"], {"any_wheel", "any_wheel_small", FILES}),
         (["identify", "m.toml", ""], {FILES}),
         (["import", "a.csv", "b.csv", ""], {FILES}),
         (["gap", "m.toml", "r.csv", "--ignore-extra", "--out", ""], {FILES}),

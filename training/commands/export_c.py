@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 
 from soilml.cli.options import InputFile, whole_number_from
-from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
+from training.export_c.c_names import check_c_name
 
 HELP = "write a model file as C99 code"
 DESCRIPTION = """\
@@ -47,15 +46,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes."""
     return output_files(args.out, ".c", ".h")
-
-
-def check_c_name(file: Path) -> None:
-    """Raise `InputError` unless the name of a C file can begin the names of its functions."""
-    if not re.fullmatch(r"[a-z_][a-z0-9_]*", file.stem):
-        raise InputError(
-            f"{file}: {file.stem!r} begins the names of the C functions; needed are lower-case "
-            "letters, digits and underscores, and a letter first, as in wheel.c"
-        )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from soilml.cli.options import InputFile
 from soilml.io.atomic_files import atomic_outputs, output_files
-from training.commands.export_c import check_c_name
+from training.export_c.c_names import check_c_name
 
 HELP = "write the fusion of several model files as C99 code"
 DESCRIPTION = """\
