@@ -204,11 +204,7 @@ def _train_on_few_rows(spec: Spec, data: Dataset, progress: Progress) -> Trained
     estimator, members, left = fit_few_rows(
         spec.regressors, spec.rule, data, prior, spec.seed, progress
     )
-    *_, last = left
-    conditions, domain = (
-        run_conditions(data),
-        TrainingDomain.of(data.features, spec.features, spec.seed, few=True),
-    )
+    last, conditions = left[-1], run_conditions(data)
     alone = spec.per_row or spec.set_posterior is not None
     covariance = covariance_matrices(last.std, estimator.correlation)
     calibrate = calibrate_single_rows if alone else calibrate_pooling
@@ -227,14 +223,14 @@ def _train_on_few_rows(spec: Spec, data: Dataset, progress: Progress) -> Trained
     return TrainedModel(
         spec=spec,
         estimator=estimator,
-        domain=domain,
+        domain=TrainingDomain.of(data.features, spec.features, spec.seed, few=True),
         pooling=pooling,
         prior=prior,
         data=data,
         parts=parts,
         scores={
             name: compute_metrics(data.targets, part.mean, part.std, prior.std)
-            for name, part in zip(names, [*left, last], strict=False)
+            for name, part in zip(names, [*left[: len(members)], last], strict=True)
         },
         pooled_scores={},
         members=tuple(members),

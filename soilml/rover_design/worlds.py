@@ -36,8 +36,8 @@ from soilml.traction.soil_draws import MeasuredSoil, measured_soil, prior_draws
 LUG_SHEARING = (0.5, 1.0)
 #: Loads over the mean load of the wheels between which the smooth error is defined.
 LOADS = (0.2, 5.0)
-#: What a rover tells of a drive; effects that need anything else are left out.
-TOLD = {"pass_number", "slip_angle"}
+#: What is known of a rover's drive; effects that need anything else are left out.
+KNOWN_OF_A_ROVER = {"pass_number", "slip_angle"}
 
 
 @dataclass(frozen=True)
@@ -247,8 +247,8 @@ def _hypotheses(count: int, rng: np.random.Generator) -> tuple[Floats, NDArray[n
 
 
 def _acts_on_a_rover(effect: type[Effect]) -> bool:
-    """Whether an effect is none of rig or sensors, and needs nothing that a rover does not tell."""
-    return effect.about.kind in ("soil", "wheel") and set(effect.about.needs) <= TOLD
+    """Whether an effect is none of rig or sensors, and needs only what is known of a rover."""
+    return effect.about.kind in ("soil", "wheel") and set(effect.about.needs) <= KNOWN_OF_A_ROVER
 
 
 def _stratified(count: int, rng: np.random.Generator) -> Floats:

@@ -52,7 +52,7 @@ def test_folds_leave_out_whole_runs_and_rows_of_a_single_run(tmp_path):
 
 @pytest.mark.parametrize(("soils", "rows"), [(20, 1), (60, 1), (4, 15)])
 def test_intervals_of_few_rows_hold_for_other_soils(tmp_path, soils, rows):
-    """The mean coverage over campaigns is near 90 %; that of the fit's own residuals is not."""
+    """The mean coverage over campaigns is near 90 %."""
     test = read_dataset(strides(tmp_path / "t.csv", 400, 1, 99), *features_of("slip_torque"))
     held = []
     for seed in range(24):

@@ -145,9 +145,11 @@ def _from_data(args: argparse.Namespace) -> int:
     ]
     labels = [QUANTITIES[name].symbol if name in QUANTITIES else name for name in spec.targets]
     head = ("", *[f"RMSE {n}" for n in labels], *[f"cover {n}" for n in labels])
-    kind = "held-out" if trained.left_out is None else "left-out"
+    kind = "held-out rows"
+    if trained.left_out is not None:
+        kind = "rows, each left out, on which the intervals are calibrated too"
     tell(
-        f"On {trained.scores['estimator'].rows} {kind} rows: RMSE over the prior's standard "
+        f"On {trained.scores['estimator'].rows} {kind}: RMSE over the prior's standard "
         "deviation, and coverage of 90 % intervals\n"
     )
     print(format_table(head, rows), file=sys.stderr)

@@ -78,10 +78,14 @@ def _plot_left_out(axis: Any, trained: TrainedModel) -> None:
     lower, width = trained.prior.lower, trained.prior.upper - trained.prior.lower
     mean = np.clip(left.mean, lower, trained.prior.upper)
     for k, name in enumerate(trained.spec.targets):
-        axis.errorbar(
-            (trained.data.targets[:, k] - lower[k]) / width[k],
+        middle, half = (
             (mean[:, k] - lower[k]) / width[k],
             left.factor[k] * left.std[:, k] / width[k],
+        )
+        axis.errorbar(
+            (trained.data.targets[:, k] - lower[k]) / width[k],
+            middle,
+            np.minimum([half, half], [middle, 1.0 - middle]),  # intervals end with the prior
             fmt="o",
             ms=3,
             lw=0.6,

@@ -51,7 +51,7 @@ def with_fitted_lengths(
 
     .. math:: -2 \ln p = \ln|V + a^2 K(l)| + r^T [V + a^2 K(l)]^{-1} r + \text{prior}
 
-    with the residuals r of a channel and the covariance V of their noise and scatter, maximised
+    with the residuals r of a channel and the covariance V of their noise and scatter, minimised
     over lengths l and amplitudes a on a grid. V is that of the problem, or independent noise of
     a size that is fitted too: what changes fast with slip or load is no noise, and the variance
     components of a search take it for noise or for scatter between runs. Soil and effects stay as

@@ -23,14 +23,14 @@ LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 _SLIPS = 0.05  # Slip from which a driving wheel has a torque worth judging
 _USUAL_SINKAGE = (0.02, 0.7)  # Range of the usual sinkage over the radius
 _LEAST_LOAD = 1.0  # Load, N, below which no wheel is driven: it is then rather in kN
-#: Mistakes that make T / (W r) too large, by factor; by which one of thousand, the load tells.
-_MILLI = "the torque is in mN m and was taken as N m"
-_KILO = "the load is in kN and was taken as N"
+#: Mistakes that make T / (W r) too large, by factor. One of thousand is of the torque, or where the
+#: load is that of no wheel, of the load.
 _TOO_LARGE = (
     (9.80665, "the load is in kg and was taken as N"),
     (100.0, "the torque is in N cm and was taken as N m"),
-    (1000.0, _MILLI),
 )
+_MILLI = (1000.0, "the torque is in mN m and was taken as N m")
+_KILO = (1000.0, "the load is in kN and was taken as N")
 _TOO_SMALL = (
     (1000.0, "the torque is in kN m, or the radius in mm"),
     (9.80665, "the torque is in kgf m"),
@@ -76,14 +76,13 @@ def traction_cause(traction: float, load: float) -> str:
     if LEAST_TRACTION <= traction <= MOST_TRACTION:
         return ""
     if traction > MOST_TRACTION:
-        options = [(traction / factor, text) for factor, text in _TOO_LARGE]
+        mistakes = (*_TOO_LARGE, _KILO if load < _LEAST_LOAD else _MILLI)
+        options = [(traction / factor, text) for factor, text in mistakes]
         other = "the torque is wrong by a gear ratio, or the radius by its unit"
     else:
         options = [(traction * factor, text) for factor, text in _TOO_SMALL]
         other = "the torque lacks a gear ratio, or its sensor is dead"
     distance, text = min((abs(np.log(max(q, 1e-30) / USUAL_TRACTION)), text) for q, text in options)
-    if text == _MILLI and load < _LEAST_LOAD:
-        text = _KILO
     return text if distance < np.log(4.0) else other
 
 
