@@ -150,11 +150,11 @@ def board_table(folder: Path) -> str:
         "`soilml export-c --rows 1`, gcc -O2 with contraction of products and sums. Instructions "
         f"of one row with its answer, and stack: the largest of {ROWS} rows of one soil, emulated "
         "(`qemu-system-arm -M mps2-an386`). Goals: 64 kB of constants, 24 kB of working memory, 4 "
-        "kB a memory, 2 million instructions. At 168 MHz and two cycles an instruction, 2 million "
+        "kB of state, 2 million instructions. At 168 MHz and two cycles an instruction, 2 million "
         "take 24 ms.",
         "",
-        "| file | constants, kB | working memory, kB | state of a set, kB | rows with | instructions, "
-        "million | stack, kB |",
+        "| file | constants, kB | working memory, kB | state of a set, kB | rows with "
+        "| instructions, million | stack, kB |",
         "|---|---:|---:|---:|---|---:|---:|",
     ]
     for name in PAIRS:
