@@ -75,7 +75,7 @@ def add_model_and_runs(parser: argparse.ArgumentParser, *, need_runs: bool = Tru
         type=InputFile,
         metavar="RUNS.csv",
         nargs=None if need_runs else "?",
-        help="measured rows, CSV or Parquet",
+        help="measured rows: CSV, Parquet or .xlsx",
     )
 
 

@@ -16,6 +16,7 @@ from soilml.cli.options import REPORT_FILES, input_files
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output, write_files
 from soilml.io.cell_text import escaped
+from soilml.io.spreadsheet import split_sheet
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
 from soilml.report.page import Content, Provenance, Report, report_texts
 from soilml.report.terminal import rounded, shown_column
@@ -76,7 +77,8 @@ def write_stdout(text: str) -> None:
 
 def origin_of(args: argparse.Namespace, files: Iterable[str] = ()) -> Provenance:
     """The command and its input files, of which `files` are some that no argument names."""
-    return Provenance.of(getattr(args, "command_line", []), [*input_files(args), *files])
+    read = (str(split_sheet(file)[0]) for file in (*input_files(args), *files))
+    return Provenance.of(getattr(args, "command_line", []), read)
 
 
 def write_with_report(

@@ -1,4 +1,4 @@
-"""CSV files as columns, in blocks of rows; every error names file, line and column."""
+"""CSV files and sheets as columns, in blocks of rows; errors name file, line and column."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import TableError
 from soilml.io.cell_text import cell_as_text, is_number, read_numbers
+from soilml.io.spreadsheet import SheetRows
 from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
 
 BLOCK = 8192  # Rows whose cells are held as text at a time
@@ -40,25 +41,65 @@ def read_csv(
     """
     with file.open(encoding="utf-8-sig") as opened:
         reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)
+        told = None if progress is None else lambda: progress(buffer.tell())
         try:
-            header = [name.strip() for name in next(reader, [])]
-            if not header:
-                raise TableError(f"{file} is empty; needed is a header: {header_hint}")
-            kept = list(columns(header))
-            places = [header.index(name) for name in kept]
-            blocks: list[list[Column]] = [[] for _ in kept]
-            lines: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
-            for numbers, rows in _blocks(file, reader, len(header)):
-                lines.append(numbers)
-                for name, place, filled in zip(kept, places, blocks, strict=True):
-                    cells = [row[place].strip() for row in rows]
-                    filled.append(_column(file, name, cells, numbers))
-                if progress is not None:
-                    progress(buffer.tell())
+            return _columns(file, reader, columns, header_hint, told)
         except UnicodeDecodeError as error:
             raise TableError(f"{file} cannot be read as text: {error}") from None
         except csv.Error as error:
             raise TableError(f"{file} line {reader.line_num}: {error}; {_QUOTES}") from None
+
+
+def read_sheet(
+    file: Path, columns: Callable[[list[str]], Sequence[str]], header_hint: str
+) -> tuple[dict[str, Column], NDArray[np.int64]]:
+    """What `read_csv` gives, of a sheet of a spreadsheet, a line being a row of the sheet.
+
+    Raises as `read_csv` and `SheetRows` do.
+    """
+    return _columns(file, _Padded(SheetRows(file)), columns, header_hint, None)
+
+
+class _Padded(Iterator[list[str]]):
+    """Rows of a sheet from its first one that is not blank, none shorter than that."""
+
+    def __init__(self, rows: SheetRows) -> None:
+        self._rows, self._width = rows, 0
+
+    @property
+    def line_num(self) -> int:
+        return self._rows.line_num
+
+    def __next__(self) -> list[str]:
+        row = next(self._rows)
+        while not self._width and not row:
+            row = next(self._rows)
+        self._width = self._width or len(row)
+        return row + [""] * (self._width - len(row))
+
+
+def _columns(
+    file: Path,
+    reader: Any,
+    columns: Callable[[list[str]], Sequence[str]],
+    header_hint: str,
+    progress: Callable[[], None] | None,
+) -> tuple[dict[str, Column], NDArray[np.int64]]:
+    """The columns of rows of text, of which the first is the header, and the line of each."""
+    header = [name.strip() for name in next(reader, [])]
+    if not header:
+        raise TableError(f"{file} is empty; needed is a header: {header_hint}")
+    kept = list(columns(header))
+    places = [header.index(name) for name in kept]
+    blocks: list[list[Column]] = [[] for _ in kept]
+    lines: list[NDArray[np.int64]] = [np.zeros(0, dtype=np.int64)]
+    for numbers, rows in _blocks(file, reader, len(header)):
+        lines.append(numbers)
+        for name, place, filled in zip(kept, places, blocks, strict=True):
+            cells = [row[place].strip() for row in rows]
+            filled.append(_column(file, name, cells, numbers))
+        if progress is not None:
+            progress()
     empty = {name: np.zeros(0, np.str_ if name in TEXT else np.float64) for name in kept}
     found = {
         name: np.concatenate([empty[name], *filled])

@@ -1,4 +1,4 @@
-"""Tables from CSV and Parquet files, data frames and columns; errors name file, line and column."""
+"""Tables from files (CSV, Parquet, .xlsx), data frames and columns; errors name their place."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 
 from soilml.errors import TableError
 from soilml.io.atomic_files import refuse_device
-from soilml.io.csv_file import read_csv
+from soilml.io.csv_file import read_csv, read_sheet
 from soilml.io.parquet import ArrowStream, arrow_columns, own_columns, plain_column, read_parquet
+from soilml.io.spreadsheet import is_spreadsheet, split_sheet
 from soilml.io.table import TEXT, Column, Table, text_column
 from soilml.quantities import COLUMNS
 
@@ -65,10 +66,10 @@ def read_table(
     ----------
     path
         A Parquet file where the name ends in `.parquet`, a folder of Parquet files that `soilml
-        generate` wrote, otherwise a CSV file with a header and
-        comma as separator. Column names carry their units, such as load_N and torque_Nm. Data
-        frames of pandas, polars and pyarrow, and whatever else exports an Arrow stream, are read
-        with the same checks; `Table.to_arrow` gives one back.
+        generate` wrote, a spreadsheet (.xlsx, or BOOK.xlsx#SHEET where it has several sheets),
+        otherwise a CSV file with a header and comma as separator. Column names carry their units,
+        such as load_N and torque_Nm. Data frames of pandas, polars and pyarrow, and whatever else
+        exports an Arrow stream, are read with the same checks; `Table.to_arrow` gives one back.
     need
         Columns that must be present.
     filled
@@ -92,7 +93,7 @@ def read_table(
         For the first error in the file: a missing file, column or value, an unknown column, a cell
         that is not a number, or a value outside the limits of its quantity, such as a slip of 1.
     MissingLibraryError
-        For a Parquet file where pyarrow is not installed.
+        For a Parquet file where pyarrow is not installed, a spreadsheet without openpyxl.
 
     Examples
     --------
@@ -113,7 +114,7 @@ def read_table(
         return check_table(table, file, need, filled, limits)
     file = Path(path)
     try:
-        refuse_device(file)
+        refuse_device(split_sheet(file)[0])
         if file.suffix == ".parquet" or file.is_dir():
             table = _read_parquet(file, ignore_extra)
         else:
@@ -154,6 +155,11 @@ def _read_csv(
     file: Path, ignore_extra: bool, progress: Callable[[int], None] | None = None
 ) -> Table:
     hint = f"{', '.join(RUNS)}, ..."
+    if is_spreadsheet(file):
+        columns, lines = read_sheet(
+            file, lambda header: known_columns(file, header, ignore_extra), hint
+        )
+        return Table(columns, str(file), lines)
     columns, lines = read_csv(
         file, lambda header: known_columns(file, header, ignore_extra), hint, progress
     )

@@ -68,7 +68,8 @@ def import_log(
     Parameters
     ----------
     logs
-        One or several files: CSV and other text, Parquet, MATLAB, MCAP, bags of ROS 1 and 2.
+        One or several files: CSV and other text, Parquet, spreadsheets (one sheet as
+        `BOOK.xlsx#SHEET`), MATLAB, MCAP, bags of ROS 1 and 2.
     log_map
         The map: a TOML file, its content as a dictionary, or what `read_map` returns. `init_map`
         writes one.

@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("model", type=InputFile, metavar="MODEL.toml", help="gear, soil and noise")
     parser.add_argument(
-        "design", type=InputFile, metavar="DESIGN.csv", help="planned rows, CSV or Parquet"
+        "design", type=InputFile, metavar="DESIGN.csv", help="planned rows: CSV, Parquet or .xlsx"
     )
     parser.add_argument(
         "--free", metavar="A,B,...", help="soil parameters to fit (default: those with a prior)"

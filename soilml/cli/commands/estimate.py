@@ -84,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         type=InputFile,
         metavar="RUNS.csv",
-        help="measured rows, CSV or Parquet; without it, tell what the file is for",
+        help="measured rows: CSV, Parquet or .xlsx; without it, tell what the file is for",
     )
     parser.add_argument(
         "--by",

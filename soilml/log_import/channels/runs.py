@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.io.spreadsheet import split_sheet
 from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
@@ -135,8 +136,11 @@ def matched_files(
 
 
 def run_names(files: Sequence[Path]) -> list[str]:
-    """A name for each file: its stem, with folders where several files have the same one."""
-    stems = [file.stem if file.suffix else file.name for file in files]
+    """A name for each file: its stem, with folders where several files have the same one.
+
+    The name of a sheet of a spreadsheet stands behind that of its file.
+    """
+    stems = [_stem(*split_sheet(file)) for file in files]
     depth = 0
     names = list(stems)
     while len(set(names)) < len(names) and depth < 6:
@@ -146,6 +150,11 @@ def run_names(files: Sequence[Path]) -> list[str]:
             for file, stem in zip(files, stems, strict=True)
         ]
     return names
+
+
+def _stem(file: Path, sheet: str) -> str:
+    stem = file.stem if file.suffix else file.name
+    return f"{stem}_{sheet}" if sheet else stem
 
 
 def _words(text: str) -> list[str]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import refuse_device
+from soilml.io.spreadsheet import ENDINGS, split_sheet
 from soilml.log_import.readers.missing_codes import without_codes
 from soilml.log_import.readers.side_files import side_lines
 from soilml.log_import.recording import Recording
@@ -19,6 +20,7 @@ from soilml.log_import.recording import Recording
 #: Ending -> module and function; any other ending is read as text.
 _READERS = {
     ".parquet": ("parquet_log", "read_parquet_log"),
+    **dict.fromkeys(ENDINGS, ("spreadsheet_log", "read_spreadsheet_log")),
     ".mat": ("matlab", "read_matlab"),
     ".h5": ("matlab", "read_matlab"),
     ".hdf5": ("matlab", "read_matlab"),
@@ -30,7 +32,7 @@ _READERS = {
 }
 #: What to do with files of other kinds, by their ending.
 _OTHERS = {
-    **dict.fromkeys((".xls", ".xlsx", ".ods"), "is a spreadsheet; save its sheet as CSV"),
+    **dict.fromkeys((".xls", ".xlsb", ".ods"), "is a spreadsheet; save it as .xlsx"),
     **dict.fromkeys((".gz", ".zip", ".bz2", ".xz", ".7z", ".tar"), "is packed; unpack it"),
     ".tdms": "is a binary file of LabVIEW; save it as text (.lvm or CSV)",
 }
@@ -39,9 +41,11 @@ _OTHERS = {
 def read_log(path: str | Path) -> list[Recording]:
     """The recordings of a log, with what files beside it state.
 
+    path: A file, the folder of a bag, or a sheet of a spreadsheet as `BOOK.xlsx#SHEET`.
+
     Raises `InputError` where it is missing or cannot be read.
     """
-    file = Path(path)
+    file, sheet = split_sheet(path)
     if not file.exists():
         raise InputError(f"{file}: there is no such file")
     suffix = file.suffix.lower()
@@ -68,6 +72,7 @@ def read_log(path: str | Path) -> list[Recording]:
     try:
         refuse_device(file)
         beside = side_lines(file)
-        return [replace(own, about=(*own.about, *beside)) for own in map(without_codes, read(file))]
+        found_in = map(without_codes, read(Path(path) if sheet else file))
+        return [replace(own, about=(*own.about, *beside)) for own in found_in]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None

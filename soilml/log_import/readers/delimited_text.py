@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import datetime
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
 
@@ -48,7 +48,15 @@ def read_delimited_text(path: Path) -> list[Recording]:
     """
     text, encoding = decode_text(path.read_bytes(), path)
     text = _GROUPED.sub("", text)
-    lines = text.splitlines()
+    notes = []
+    if encoding not in ("utf-8", "utf-8-sig"):
+        notes.append(Remark("encoding", f"read as {encoding}", severity="note"))
+    return recordings_of(path, text.splitlines(), notes)
+
+
+def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> list[Recording]:
+    """The table of lines of text, with what its reader has found; raises as its caller does."""
+    notes = list(found)
     try:
         layout = find_layout(lines)
     except csv.Error as error:
@@ -62,9 +70,6 @@ def read_delimited_text(path: Path) -> list[Recording]:
         )
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
-    notes = []
-    if encoding not in ("utf-8", "utf-8-sig"):
-        notes.append(Remark("encoding", f"read as {encoding}", severity="note"))
     if layout.decimal_comma:
         notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
     if bad:

@@ -96,7 +96,8 @@ def test_times_of_day_are_seconds():
     [
         ("a.csv", b"no numbers here\nat all\n", "no line of this file looks like samples"),
         ("a.bin", bytes(range(256)) * 20, "is not a text file"),
-        ("a.xlsx", b"PK", "save its sheet as CSV"),
+        ("a.xlsx", b"PK", "is no .xlsx file"),
+        ("a.ods", b"PK", "save it as .xlsx and import that"),
         ("a.csv.gz", b"PK", "unpack it and import that"),
         ("a.tdms", b"TDSm", "save it as text"),
         ("a.json", b"[1, 2, 3]", "needed is a JSON object with numbers for each sample"),
