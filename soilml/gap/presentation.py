@@ -111,10 +111,16 @@ def _suspect_table(report: GapReport) -> str:
     if report.status not in ("suspected", "unknown", "not-testable"):
         return ""
     rows = [
-        (" + ".join(s.effects), format_probability(s.probability), f"{s.log_odds:+.1f}")
+        (
+            " + ".join(s.effects),
+            format_probability(s.probability),
+            f"{s.log_odds:+.1f}",
+            s.prediction,
+        )
         for s in report.suspects[:5]
     ]
-    return format_table(("suspect", "probability", "ln(odds)"), rows) if rows else ""
+    head = ("suspect", "probability", "ln(odds)", "ln(density kept back)")
+    return format_table(head, rows) if rows else ""
 
 
 def _discrepancy_table(report: GapReport) -> str:

@@ -97,13 +97,18 @@ def held_out_region(readings: Readings) -> tuple[str, NDArray[np.bool_]] | None:
 class HeldOutPrediction:
     """Predictions of the readings of one part, each by a fit to all readings outside its fold.
 
-    `log_density` is the logarithm of the probability density of the readings, fold by fold, with
-    the variance of noise, scatter, remainder and parameters.
+    `log_densities` are the logarithms of the probability density of each fold's readings, with the
+    variance of noise, scatter, remainder and parameters.
     """
 
     mean: Floats  # (m,), NaN outside the part and without equilibrium
     std: Floats  # (m,) of a reading, NaN outside the part
-    log_density: float
+    log_densities: tuple[float, ...] = ()
+
+    @property
+    def log_density(self) -> float:
+        """The logarithm of the density of all readings of the part."""
+        return sum(self.log_densities)
 
 
 def predict_parts(
@@ -150,7 +155,7 @@ def predict_parts(
             part.mean[~rest], part.std[~rest], log_density = _conditional(
                 solved, readings.measured, covariance[i], rest
             )
-        found[i][name] = replace(part, log_density=part.log_density + log_density)
+        found[i][name] = replace(part, log_densities=(*part.log_densities, log_density))
     return found
 
 
@@ -162,7 +167,7 @@ def of_selected(whiten: Whitening, selected: NDArray[np.bool_]) -> Whitening:
 
 
 def _nothing_yet(count: int) -> HeldOutPrediction:
-    return HeldOutPrediction(np.full(count, np.nan), np.full(count, np.nan), 0.0)
+    return HeldOutPrediction(np.full(count, np.nan), np.full(count, np.nan))
 
 
 def _conditional(

@@ -202,6 +202,7 @@ def suspect_table(report: GapReport) -> list[dict[str, Any]]:
             "effects": s.effects,
             "log_odds": s.log_odds,
             "probability": format_probability(s.probability),
+            "prediction": s.prediction,
         }
         for s in report.suspects[:_LISTED]
     ]

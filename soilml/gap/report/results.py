@@ -60,6 +60,15 @@ class Suspect:
     #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
     #: smooth remainder; None where no row was kept back for it
     predictive_gain: float | None = None
+    #: Standard error of that, by which the rows kept back differ by chance
+    predictive_gain_error: float | None = None
+
+    @property
+    def prediction(self) -> str:
+        """The predictive gain with its standard error, for tables; empty where none is known."""
+        if self.predictive_gain is None:
+            return ""
+        return f"{self.predictive_gain:+.1f} +- {self.predictive_gain_error or 0.0:.1f}"
 
 
 @dataclass(frozen=True)

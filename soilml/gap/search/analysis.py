@@ -142,9 +142,13 @@ def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bo
 
 
 def _predictive(found: Analysis) -> Explanation | None:
-    """The likeliest explanation that predicts rows kept back better than the soil alone does."""
+    """The likeliest explanation that predicts rows kept back no worse than the soil alone does.
+
+    Within sampling error; an explanation that was not scored is none.
+    """
     gains = predictive_gains(found.predictions)
-    return next((c for c in found.result.candidates if gains.get(c.names, 0.0) > 0.0), None)
+    scored = (c for c in found.result.candidates if c.names in gains)
+    return next((c for c in scored if not gains[c.names].is_worse), None)
 
 
 def _without_outliers(

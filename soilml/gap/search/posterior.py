@@ -23,8 +23,9 @@ IN_CATALOGUE = 0.95
 #: The same, relative to that, of an effect that explains the data by another law than the
 #: catalogue's: 1 of 4 on tuning sets, most of them with a cause outside the catalogue.
 OTHER_LAW = 0.3
-#: Smallest rise of log odds that counts: beyond rounding.
-RAISED = 1e-3
+#: Rise of log odds, by half, from which rows speak for an effect; a gain that they leave at its
+#: prior is no suspect, however likely it was beforehand.
+RAISED = 0.4
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
 
@@ -39,13 +40,15 @@ class Posterior:
     another cause may be at work, but for those of their effects, given with them, that explain
     most of the data without the others. A set with another law counts with `OTHER_LAW`.
 
-    Of these, the sets in `unlisted` are no suspects: they predict rows that were kept back no
-    better than the soil alone does, or need an implausible size.
+    Of these, the sets in `unlisted` are no suspects: they predict rows that were kept back worse
+    than the soil alone does, beyond sampling error, or need an implausible size. Those in
+    `unproven` predict them no better, within sampling error: they can be suspected, not named.
     """
 
     log_weights: dict[Names, float]
     refused: Mapping[Names, frozenset[str]] = field(default_factory=dict)
     unlisted: frozenset[Names] = frozenset()
+    unproven: frozenset[Names] = frozenset()
 
     def probability(self, *effects: str) -> float:
         """Probability that these effects are present, causes outside the catalogue included."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +21,28 @@ from soilml.gap.search.stepwise import SearchResult
 #: Explanations that are scored together, the likeliest first, and how often the next ones are
 #: scored where none of them predicts better than the soil alone.
 SCORED, ROUNDS = 4, 2
+
+
+@dataclass(frozen=True)
+class PredictiveGain:
+    """Log density of rows kept back, above that of the soil alone, and its standard error.
+
+    The error is that of a sum over folds that differ by chance; a part that is one fold adds none.
+    """
+
+    value: float
+    std_error: float
+
+    @property
+    def is_better(self) -> bool:
+        """Whether the rows are predicted better than by the soil alone."""
+        return self.value > 0.0
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether they are predicted no better, beyond what folds differ by chance."""
+        return self.value <= -self.std_error
+
 
 #: Predictions of each part that was kept back, by the effects of the explanation.
 Predictions = Mapping[Names, Mapping[str, HeldOutPrediction]]
@@ -43,23 +66,30 @@ def predict_with(problem: FitProblem, result: SearchResult, seed: int) -> Predic
         predicted = predict_parts(problem, models, parts)
         found |= {c.names: own for c, own in zip(asked, predicted, strict=True)}
         asked = []
-        if not waiting or any(gain > 0.0 for names, gain in predictive_gains(found).items()):
+        if not waiting or any(gain.is_better for gain in predictive_gains(found).values()):
             break
     return found
 
 
-def predictive_gains(predictions: Predictions) -> dict[Names, float]:
+def predictive_gains(predictions: Predictions) -> dict[Names, PredictiveGain]:
     """Log density of the rows kept back, above that of the soil alone, mean over the parts.
 
     By the effects of each explanation that was scored. Where each slip is predicted, its ends are
     among them, and the region of high slips does not count again.
 
-    References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
+    References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score);
+    Vehtari, Gelman and Gabry, Statistics and Computing 27, 2017, eq. 24 (its sampling error).
     """
     alone = predictions.get((), {})
-    counted = {part for part in alone if part != REGION or SLIPS not in alone}
-    return {
-        names: float(np.mean([own[p].log_density - alone[p].log_density for p in counted]))
-        for names, own in predictions.items()
-        if names
-    }
+    counted = sorted(part for part in alone if part != REGION or SLIPS not in alone)
+    gains = {}
+    for names, own in predictions.items():
+        if not names:
+            continue
+        by_fold = [
+            np.subtract(own[part].log_densities, alone[part].log_densities) for part in counted
+        ]
+        variance = sum(len(d) * float(np.var(d, ddof=1)) for d in by_fold if len(d) > 1)
+        value = float(np.mean([d.sum() for d in by_fold]))
+        gains[names] = PredictiveGain(value, np.sqrt(variance) / len(by_fold))
+    return gains

@@ -13,6 +13,7 @@ from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import Names, Posterior, not_rejected
+from soilml.gap.search.prediction import PredictiveGain
 from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.verdict.lookalikes import only_channels
 from soilml.quantities import column
@@ -97,11 +98,12 @@ def decide(
         return Decision("unknown", (), None)
     if _implausible(best.fit):
         return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
-    if best.names in result.posterior.unlisted:
+    not_proven = result.posterior.unlisted | result.posterior.unproven
+    if best.names in not_proven:
         text = NOT_PREDICTIVE.format(" + ".join(best.names))
         remark = Remark("not-predictive", text, best.names)
         return Decision("suspected", (), _first_suspect(result), remark)
-    listed = tuple(c for c in accepted if c.names not in result.posterior.unlisted)
+    listed = tuple(c for c in accepted if c.names not in not_proven)
     if _far_from_catalogue(problem, result, best):
         text = OTHER_LAW.format(" + ".join(best.names))
         shown = _first_suspect(result) or best
@@ -177,25 +179,28 @@ def is_left_open(result: SearchResult) -> bool:
 
 
 def with_refused_outside(
-    problem: FitProblem, result: SearchResult, gains: Mapping[Names, float]
+    problem: FitProblem, result: SearchResult, gains: Mapping[Names, PredictiveGain]
 ) -> SearchResult:
     """The result with refused explanations counted as causes outside the catalogue.
 
     They need an implausible size, or another law than the catalogue's, or they predict rows that
-    were kept back no better than the soil alone does. Where a part of such a set is accepted, what
-    is refused is its supplement, not that part.
+    were kept back worse than the soil alone does, beyond sampling error. Where a part of such a set
+    is accepted, what is refused is its supplement, not that part.
 
     gains: Log density of the rows kept back, above that of the soil alone, as far as it is known.
     """
     candidates = [c for c in result.candidates if c.names]
     unlisted = {c.names for c in candidates if _implausible(c.fit) or _implausibly_large(c.fit)}
-    unlisted |= {names for names, gain in gains.items() if gain <= 0.0}
+    unlisted |= {names for names, gain in gains.items() if gain.is_worse}
+    unproven = frozenset(names for names, gain in gains.items() if not gain.is_better)
     far = unlisted | {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
     parts = [set(c.names) for c in result.accepted if c.names not in far]
     refused = {
         names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
     }
-    found = replace(result.posterior, refused=refused, unlisted=frozenset(unlisted))
+    found = replace(
+        result.posterior, refused=refused, unlisted=frozenset(unlisted), unproven=unproven
+    )
     return replace(result, posterior=found)
 
 

@@ -28,7 +28,7 @@ from soilml.gap.report.results import (
 from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
-from soilml.gap.search.prediction import predictive_gains
+from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
@@ -132,9 +132,14 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
     ]
     gains = predictive_gains(analysis.predictions)
     return [
-        Suspect(names, odds, posterior.probability(*names), gains.get(names))
+        Suspect(names, odds, posterior.probability(*names), *_gain(gains.get(names)))
         for names, odds in [*ranked[first : first + 1], *rest[: LISTED_SUSPECTS - 1]]
     ]
+
+
+def _gain(gain: PredictiveGain | None) -> tuple[float | None, float | None]:
+    """A predictive gain and its standard error as entries of a report."""
+    return (None, None) if gain is None else (gain.value, gain.std_error)
 
 
 def conditions_of_suspects(

@@ -7,11 +7,13 @@ import pytest
 from gap_sets import case_of, driven, fit_problem
 from scipy.stats import norm, t
 
-from soilml.gap import gap
+from soilml.gap import gap, workflow
+from soilml.gap.evidence.held_out import HeldOutPrediction
 from soilml.gap.evidence.outliers import ends_of_monotone_series
 from soilml.gap.evidence.score_test import score_test
 from soilml.gap.report.results import GapReduction
 from soilml.gap.search.posterior import Posterior
+from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.reductions import without_grown
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -29,6 +31,44 @@ def test_a_set_that_is_not_listed_is_no_suspect():
     both = logs | {("a", "b"): -0.2}
     part = Posterior(both, {("a", "b"): frozenset("b")}, frozenset({("a", "b")}))
     assert dict(part.ranked())[("b",)] > dict(Posterior(logs).ranked())[("b",)]
+
+
+def scored(*by_fold):
+    return HeldOutPrediction(np.zeros(4), np.ones(4), by_fold)
+
+
+def test_a_gain_has_the_standard_error_of_a_sum_over_folds():
+    found = predictive_gains(
+        {
+            (): {"held_out_runs": scored(-1.0, -2.0, -3.0), "held_out_region": scored(-4.0)},
+            ("a",): {"held_out_runs": scored(0.0, -4.0, 0.0), "held_out_region": scored(-3.0)},
+        }
+    )
+    own = found[("a",)]
+    assert own.value == pytest.approx((2.0 + 1.0) / 2.0)
+    assert own.std_error == pytest.approx(np.sqrt(3.0 * np.var([1.0, -2.0, 3.0], ddof=1)) / 2.0)
+
+
+def test_a_gain_below_zero_within_its_error_is_neither_better_nor_worse():
+    assert PredictiveGain(0.5, 3.0).is_better
+    within = PredictiveGain(-2.0, 3.0)
+    assert not within.is_better
+    assert not within.is_worse
+    assert PredictiveGain(-3.5, 3.0).is_worse
+    assert PredictiveGain(0.0, 0.0).is_worse  # an effect that changes no prediction
+
+
+@pytest.mark.slow
+def test_what_predicts_no_better_within_sampling_error_is_suspected_and_not_named(monkeypatch):
+    case = case_of()
+    table = driven(case, [DIGGING(n1=0.4)], seed=2)
+    assert gap(case, table).status == "named"
+    doubtful = {("slip-sinkage",): PredictiveGain(-1.0, 3.0)}
+    monkeypatch.setattr(workflow, "predictive_gains", lambda _: doubtful)
+    report = gap(case, table)
+    assert report.status == "suspected"
+    assert report.suspects[0].effects == ("slip-sinkage",)
+    assert [r.code for r in report.reasons] == ["not-predictive"]
 
 
 def test_a_figure_that_grew_is_a_remark_and_no_reduction():
