@@ -7,7 +7,6 @@ what either has of the load.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -18,6 +17,7 @@ from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate, words_of
 from soilml.log_import.guesses.draft import Marked
+from soilml.log_import.guesses.vertical_axis import axis_in, families, with_sinkage_along
 from soilml.log_import.units import factor
 
 _FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "effort", "力"}
@@ -27,8 +27,6 @@ _MOMENTS |= {"momento", "couple", "coppia"}
 _TOGETHER = {"lc", "cell", "zelle", "celda", "cella", "corner"}
 #: Words before the number of a wheel.
 _OF_WHEELS = {"wheel", "rad", "motor", "joint", "axle", "leg"}
-#: Axis of a name, and number of a channel.
-_AXIS, _NUMBER = re.compile(r"[xyz](?![a-z])", re.IGNORECASE), re.compile(r"\d+")
 _BLOCKS, _FEWEST = 240, 12  # Means of which the behaviour is judged: most and fewest
 _DRIVES = 0.3  # Share of the usual speed from which a wheel drives
 #: How much larger the load is than another force; its scatter over its size; correlation of pull
@@ -106,20 +104,6 @@ def _in_newton(candidate: Candidate) -> float:
     return 1.0
 
 
-def alike(candidates: Sequence[Candidate], moments: bool) -> list[Candidate]:
-    """Forces, or moments, whose names differ by an axis or a number alone; the largest group."""
-    groups: dict[tuple[str, str], dict[str, Candidate]] = {}
-    for c in (c for c in candidates if _is_alike(c, moments)):
-        topic = c.address.removesuffix(c.name)
-        for pattern in (_AXIS, _NUMBER):
-            for match in pattern.finditer(c.name):
-                frame = f"{c.name[: match.start()]}\0{c.name[match.end() :]}".lower()
-                groups.setdefault((topic, frame), {})[c.address] = c
-    groups = {frame: own for frame, own in groups.items() if 2 <= len(own) <= 3}
-    best = max(groups.values(), key=len, default={})
-    return list(best.values())
-
-
 def _is_alike(candidate: Candidate, moments: bool) -> bool:
     words = {*words_of(candidate.name)}
     if words & (_TOGETHER | _OF_WHEELS) or candidate.about.count < 2 or candidate.about.constant:
@@ -130,8 +114,17 @@ def _is_alike(candidate: Candidate, moments: bool) -> bool:
 
 
 def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
-    """Give the load, the pull and the torque of alike columns the roles that they behave as."""
-    forces, moments = alike(candidates, False), alike(candidates, True)
+    """Give the load, the pull and the torque of alike columns the roles that they behave as.
+
+    What the first wheel's sensor shows holds for those of the others; a place along the axis of
+    the load is the sinkage.
+    """
+    of_forces = families(c for c in candidates if _is_alike(c, False))
+    of_moments = families(c for c in candidates if _is_alike(c, True))
+    forces, moments = ([*own[0].values()] if own else [] for own in (of_forces, of_moments))
+    if forces and not moments:  # a single moment, of whatever axis
+        moments = [c for c in candidates if _is_alike(c, True)][:2]
+        moments = moments if len(moments) == 1 else []
     if not forces and not moments:
         return Behaved(list(candidates), {})
     means = Means(run, candidates, (forces or moments)[0].address)
@@ -158,7 +151,33 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
             reasons[role] = "of its kind it varies most as the wheel drives"
             if pair[2] >= _TOGETHER_FROM:
                 reasons[role] = "pull and torque vary together"
-    return Behaved(_rescored(candidates, forces, moments, given), reasons)
+    known = [c.address for c in moments]
+    if len(known) == 1 and given.get("torque") == known[0] and pair[2] < _TOGETHER_FROM:
+        given.pop("torque"), reasons.pop("torque")
+    axes = [(role, axis_in(own[0], given[role])) for role, own in
+            (("load", of_forces), ("drawbar_pull", of_forces), ("torque", of_moments))
+            if role in given and own]  # fmt: skip
+    found = _rescored(candidates, forces, moments, {r: [a] for r, a in given.items()})
+    for own in (*of_forces[1:], *of_moments[1:]):
+        found = _as_first(found, own, dict(axes), own in of_moments)
+    vertical = dict(axes).get("load", "")
+    if vertical and not isinstance(reasons["load"], Marked):
+        found, sinkage = with_sinkage_along(found, vertical)
+        if sinkage:
+            reasons["sinkage"] = Marked(
+                f"CHANGE: a place along {vertical}, the axis of the load: is it the wheel's height?"
+            )
+    return Behaved(found, reasons)
+
+
+def _as_first(
+    candidates: list[Candidate], family: dict[str, Candidate], axes: dict[str, str], moments: bool
+) -> list[Candidate]:
+    """Give the columns of a further sensor the roles that the first one's axes have."""
+    roles = ("torque",) if moments else ("load", "drawbar_pull")
+    given = {r: [family[a].address] for r, a in axes.items() if r in roles and a in family}
+    members = [*family.values()]
+    return _rescored(candidates, [] if moments else members, members if moments else [], given)
 
 
 def _named(
@@ -247,7 +266,7 @@ def _rescored(
     candidates: Sequence[Candidate],
     forces: Sequence[Candidate],
     moments: Sequence[Candidate],
-    given: dict[str, str],
+    given: dict[str, list[str]],
 ) -> list[Candidate]:
     """Candidates whose roles are those of their behaviour, within the groups that it decides."""
     decided = [
@@ -260,8 +279,8 @@ def _rescored(
         scores = dict(c.scores)
         for role in taken.get(c.address, ()):
             scores.pop(role, None)
-        scores |= {role: _BY_BEHAVIOUR for role, address in given.items() if address == c.address}
-        if c.address in taken and c.address not in given.values():
+        scores |= {role: _BY_BEHAVIOUR for role, own in given.items() if c.address in own}
+        if c.address in taken and not any(c.address in own for own in given.values()):
             # an axis that is none of them is no other of them either
             scores = {role: s for role, s in scores.items() if role not in _ROLES}
         found.append(replace(c, scores=scores))

@@ -202,8 +202,8 @@ class _MapDrafting:
             mark_unsupported(group, inputs_of(group, self.run), radius, clear)
         add_errors(first, self.found, self.errors)
         for role, why in self.reasons.items():
-            if role in first:
-                first[role].comments.setdefault("column", why)
+            if role in first and (isinstance(why, Marked) or "column" not in first[role].comments):
+                first[role].comments["column"] = why
         lines += wheel_lines(first, self.found, self.run, self.stated.common, self.run_names)
         lines += load_lines(self.found, self.stated, self.run_names, len(self.labels))
         for role in ROLES:

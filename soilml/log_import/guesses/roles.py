@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from soilml.log_import.guesses.columns import WHEEL_WORDS, Candidate, wheel_word, words_of
+from soilml.log_import.guesses.vertical_axis import is_vertical
 
 #: Words of a place in the world, whose y may be constant where a rover drives straight.
 _OF_A_ROVER = {"odom", "odometry", "vo", "pose", "gps", "marker", "tracking"}
@@ -53,6 +54,8 @@ def axes_of(column: Candidate, candidates: Sequence[Candidate]) -> list[Candidat
         for letter in "yz":
             own = letter if match[0] == "x" else letter.upper()
             address = column.address[: match.start()] + own + column.address[match.end() :]
+            if address in known and is_vertical(known[address]):
+                continue
             if address in known and not known[address].about.constant:
                 others.append(known[address])
             elif letter == "y" and not (address in known and _OF_A_ROVER & {*words_of(address)}):
