@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.io.table import Table
+from soilml.log_import.channels.gear_of_run import wheels_by_gear
 from soilml.log_import.channels.inputs import channel_constant, our_slip
 from soilml.log_import.channels.runs import Run, run_names
-from soilml.log_import.channels.shared_errors import shared_errors
+from soilml.log_import.channels.shared_errors import SharedError, largest_errors, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of, slope_of
 from soilml.log_import.checks.column_units import unit_hints
 from soilml.log_import.checks.map_hints import map_hints
@@ -55,43 +57,44 @@ def import_rows(
     groups: list[tuple[WheelMap, Run, Sequence[WindowRow]]] = []
     left: list[Remark] = []
     wrong: list[Remark] = []
-    rows_of_wheels: list[tuple[WheelMap, list[WindowRow]]] = []
+    errors: list[tuple[dict[str, Noise], list[SharedError]]] = []
     for wheel in log_map.wheels:
-        rows: list[WindowRow] = []
-        every: list[WindowRow] = []
+        rows_of: dict[str, tuple[WheelMap, list[WindowRow], list[WindowRow]]] = {}
         for name, log in zip(names, logs, strict=True):
             for recording in log:
                 run = Run(name, (recording,), (np.arange(float(len(recording))),))
-                labels = _labels(run, log_map)
-                found = _rows(run, wheel, log_map)
-                every += found
-                for i, row in enumerate(found):
+                labelled = [replace(run, name=label) for label in _labels(run, log_map)]
+                found: dict[int, tuple[WheelMap, WindowRow]] = {}
+                for own, picked in wheels_by_gear(log_map, wheel, labelled):
+                    of_gear = _rows(run, own, log_map)
+                    found |= {i: (own, of_gear[i]) for i in picked}
+                for i, (own, row) in sorted(found.items()):
+                    _, every, rows = rows_of.setdefault(own.gear, (own, [], []))
+                    every.append(row)
                     if why := unusable(row, {}):
                         text = f"row {i + 1} of {recording.file.name} is left out: {why}"
                         left.append(replace(why, text=text))
                         continue
-                    groups.append((wheel, Run(labels[i], (recording,), run.times), [row]))
+                    groups.append((own, labelled[i], [row]))
                     rows.append(row)
         first = Run(names[0], tuple(logs[0]), tuple(np.arange(float(len(r))) for r in logs[0]))
-        hints = unit_hints(log_map, wheel, first)
-        hints += map_hints(log_map, wheel, values_of(every))
-        wrong += with_other_columns(hints, wheel, first, steady=True)
-        rows_of_wheels.append((wheel, rows))
+        for own, every, rows in rows_of.values():
+            hints = unit_hints(log_map, own, first)
+            hints += map_hints(log_map, own, values_of(every))
+            wrong += with_other_columns(hints, own, first, steady=True)
+            if rows:
+                errors.append(_shared_errors(log_map, own, rows))
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
     if not groups:
         raise InputError(f"{log_map.source}: no row can be used: {left[0] if left else 'empty'}")
     table = rows_as_table(groups, log_map)
     table = Table({k: v for k, v in table.columns.items() if k != "time_s"}, table.source)
-    wheel, rows = rows_of_wheels[0]
-    means = means_of(rows)
-    bias, parts = shared_errors(
-        lambda constants: quantities_of(means, log_map, wheel, constants),
-        constants_of(wheel, log_map.vehicle),
-    )
-    radius = wheel.radius.value if wheel.radius else None
+    bias, parts = largest_errors(errors)
+    radii = {wheel.radius.value if wheel.radius else None for wheel, _, _ in groups}
+    radius = radii.pop() if len(radii) == 1 else None
     remarks = [*left[:5], *without_torque(table), *_without_errors(table)]
-    remarks += table_hints(table.columns, radius)
+    remarks += table_hints(table.columns, table.columns.get("wheel_radius_m"))
     return ImportedLog(
         table=table,
         bias=bias,
@@ -102,6 +105,16 @@ def import_rows(
         radius=radius or float("nan"),
         sources=tuple(str(log[0].file) for log in logs),
         map_name=log_map.source,
+    )
+
+
+def _shared_errors(
+    log_map: LogMap, wheel: WheelMap, rows: Sequence[WindowRow]
+) -> tuple[dict[str, Noise], list[SharedError]]:
+    means = means_of(rows)
+    return shared_errors(
+        lambda constants: quantities_of(means, log_map, wheel, constants),
+        constants_of(wheel, log_map.vehicle),
     )
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.errors import InputError
 from soilml.io.table import Table
+from soilml.log_import.channels.gear_of_run import gear_of
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import constants_of, wheel_quantities
@@ -260,22 +260,6 @@ def without_torque(table: Table) -> list[Remark]:
         "identify a torque, a drawbar pull or a sinkage"
     )
     return [Remark("no-torque", text, ("torque",))]
-
-
-def gear_of(wheel: WheelMap, run: Run) -> str:
-    """The gear of a wheel in a run; "" where the map states none.
-
-    Raises `InputError` where neither the name of the run nor that of its file has it.
-    """
-    if wheel.gear_pattern is None:
-        return wheel.gear
-    for text in (run.name, run.recordings[0].file.name):
-        if match := wheel.gear_pattern.search(text):
-            return match[match.re.groups]
-    raise InputError(
-        f"[wheel] gear_from {wheel.gear_pattern.pattern!r} finds nothing in the name of the run "
-        f"{run.name!r}, nor in {run.recordings[0].file.name!r}"
-    )
 
 
 def rows_as_table(

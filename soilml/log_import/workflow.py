@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError, InputError
+from soilml.log_import.channels.gear_of_run import wheels_by_gear
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run, runs_of
-from soilml.log_import.channels.shared_errors import SharedError, shared_errors
+from soilml.log_import.channels.shared_errors import largest_errors, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of
 from soilml.log_import.checks.column_units import differing_units, unit_hints
 from soilml.log_import.checks.map_hints import map_hints
@@ -104,40 +104,37 @@ def import_log(
     if found.each_row:
         return import_rows(recordings, found, accept)
     runs = runs_of(recordings, found)
-    analyses = [_Wheel(found, wheel, runs, tell) for wheel in found.wheels]
+    parts_of_wheels = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
+    analyses = [
+        _Wheel(found, wheel, [runs[i] for i in own], tell) for wheel, own in parts_of_wheels
+    ]
+    # by run: its wheels, each in the analysis that has its gear, and the run's place there
+    by_run = [
+        (run, analysis, own.index(i))
+        for i, run in enumerate(runs)
+        for analysis, (_, own) in zip(analyses, parts_of_wheels, strict=True)
+        if i in own
+    ]
     wrong = [hint for analysis in analyses for hint in analysis.map_hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
-    table = rows_as_table(
-        [(a.wheel, run, a.kept[i]) for i, run in enumerate(runs) for a in analyses], found
-    )
+    table = rows_as_table([(a.wheel, run, a.kept[k]) for run, a, k in by_run], found)
     if len(table) == 0:
         raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(analyses)}")
-    bias: dict[str, Noise] = {}
-    parts: list[SharedError] = []
-    for analysis in analyses:
-        own, contributions = analysis.shared_errors()
-        for key, noise in own.items():
-            # rows of several wheels share one table [bias]: the largest errors stand in it
-            other = bias.get(key, noise)
-            bias[key] = replace(
-                noise,
-                share=max(noise.share, other.share),
-                constant=max(noise.constant, other.constant),
-            )
-        parts += contributions
-    radius = found.wheels[0].radius
+    bias, parts = largest_errors([analysis.shared_errors() for analysis in analyses])
+    radii = {a.wheel.radius.value if a.wheel.radius else None for a in analyses}
+    radius = radii.pop() if len(radii) == 1 else None
     remarks = [remark for analysis in analyses for remark in analysis.remarks()]
     remarks += without_torque(table)
-    remarks += table_hints(table.columns, radius.value if radius else None)
+    remarks += table_hints(table.columns, table.columns.get("wheel_radius_m"))
     return ImportedLog(
         table=table,
         bias=bias,
         shared=tuple(parts),
-        series=tuple(a.series(i) for i in range(len(runs)) for a in analyses),
+        series=tuple(a.series(k) for _, a, k in by_run),
         remarks=tuple(dict.fromkeys(remarks)),
         implausible=tuple(wrong),
-        radius=radius.value if radius else float("nan"),
+        radius=radius or float("nan"),
         sources=tuple(str(file) for file in files),
         map_name=found.source,
     )

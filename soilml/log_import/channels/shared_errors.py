@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,25 @@ class SharedError:
     constant: str
     quantity: str
     rms: float
+
+
+def largest_errors(
+    found: Sequence[tuple[Mapping[str, Noise], Sequence[SharedError]]],
+) -> tuple[dict[str, Noise], list[SharedError]]:
+    """What `shared_errors` gave for several wheels as one table [bias]: the largest errors of all.
+
+    Rows of several wheels share one table.
+    """
+    bias: dict[str, Noise] = {}
+    for own, _ in found:
+        for key, noise in own.items():
+            other = bias.get(key, noise)
+            bias[key] = replace(
+                noise,
+                share=max(noise.share, other.share),
+                constant=max(noise.constant, other.constant),
+            )
+    return bias, [part for _, parts in found for part in parts]
 
 
 def shared_errors(

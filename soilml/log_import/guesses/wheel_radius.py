@@ -12,7 +12,15 @@ from soilml.log_import.channels.inputs import Inputs, moving, our_slip
 from soilml.log_import.channels.resampling import on_grid
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate
-from soilml.log_import.guesses.draft import Draft, Marked, fastest_ratio, inputs_of, key_line
+from soilml.log_import.guesses.constants import gears_in_names
+from soilml.log_import.guesses.draft import (
+    Draft,
+    Marked,
+    fastest_ratio,
+    inputs_of,
+    key_line,
+    toml_value,
+)
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.units import spelling
 
@@ -32,6 +40,8 @@ def wheel_lines(
     run_names: Sequence[str] = (),
 ) -> list[str]:
     """The lines of the table."""
+    if several := gears_in_names(run_names):
+        return _lines_of_gears(*several)
     lines = ["", "[wheel]", *_gear_lines(run_names)]
     for key in ("radius", "diameter"):
         if key in stated:
@@ -69,6 +79,17 @@ def wheel_lines(
     if needed:
         return [*lines, Marked(f"{example}  # NEEDED{hint}")]
     return [*lines, f"{example}  # for checks{hint}"]
+
+
+def _lines_of_gears(pattern: str, gears: Mapping[str, tuple[str, str]]) -> list[str]:
+    """The tables where names of runs say wheels of different radius."""
+    why = f"the names say {', '.join(list(gears)[:4])}; [gears.NAME] of the model file"
+    lines = ["", "[wheel]", key_line("gear_from", pattern, why)]
+    for name, (key, value) in gears.items():
+        written = name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else toml_value(name)
+        lines += ["", f"[gears.{written}]"]
+        lines.append(key_line(key, f"{value} +- 1 %", "by the names"))
+    return lines
 
 
 def _gear_lines(run_names: Sequence[str]) -> list[str]:

@@ -176,6 +176,8 @@ class LogMap:
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
     each_row: bool = False
+    # Radius (m) of each gear of [gears.NAME]
+    gears: Mapping[str, Uncertain] = field(default_factory=dict)
 
     @property
     def splits_by_time(self) -> bool:
@@ -220,6 +222,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     pattern = _take_gear_pattern(shared_wheel)
     gear = shared_wheel.text("gear", "")
     shared_wheel.finish()
+    gears = _take_gears(settings)
     named = settings.table("wheels")
     defaults = shared_keys(settings, named.content)
     shared = _take_channels(settings)
@@ -232,21 +235,22 @@ def _take_map(settings: Settings, source: str) -> LogMap:
             settings.folder,
         )
         own_pattern = _take_gear_pattern(own) or pattern
+        own_gear = own.text("gear", gear)
         wheels.append(
             WheelMap(
                 name,
-                _take_radius(own) or radius,
+                _take_radius(own) or gears.get(own_gear) or radius,
                 shared | _take_channels(own),
-                own.text("gear", gear),
+                own_gear,
                 _take_axle(own),
                 own_pattern,
             )
         )
         own.finish()
     if not wheels:
-        wheels = [WheelMap("", radius, shared, gear, gear_pattern=pattern)]
+        wheels = [WheelMap("", gears.get(gear) or radius, shared, gear, gear_pattern=pattern)]
     for wheel in wheels:
-        _check_wheel(settings, wheel, vehicle)
+        _check_wheel(settings, wheel, vehicle, bool(gears))
     return LogMap(
         source=source,
         wheels=tuple(wheels),
@@ -262,7 +266,27 @@ def _take_map(settings: Settings, source: str) -> LogMap:
         windows=take_windows(settings.table("windows")),
         left_out=tuple(take_left_out(entry) for entry in settings.tables("leave_out")),
         each_row=each_row,
+        gears=gears,
     )
+
+
+def _take_gears(settings: Settings) -> dict[str, Uncertain]:
+    """The radius of each gear of [gears.NAME], m."""
+    named = settings.table("gears")
+    found: dict[str, Uncertain] = {}
+    for name in named.content:
+        own = Settings(
+            named.take(name, dict, f"a table [gears.{name}]"),
+            f"{settings.where} [gears.{name}]",
+            settings.folder,
+        )
+        radius = _take_radius(own)
+        if radius is not None:
+            found[name] = radius
+        else:
+            own.fail("the radius is missing; needed is radius or diameter, such as '0.15 m +- 1 %'")
+        own.finish()
+    return found
 
 
 def _take_channels(settings: Settings) -> dict[str, ChannelMap]:
@@ -342,7 +366,9 @@ def _take_vehicle(settings: Settings) -> Vehicle:
     return vehicle
 
 
-def _check_wheel(settings: Settings, wheel: WheelMap, vehicle: Vehicle | None) -> None:
+def _check_wheel(
+    settings: Settings, wheel: WheelMap, vehicle: Vehicle | None, with_gears: bool
+) -> None:
     """Raise `InputError` where slip or load cannot follow from the channels of a wheel."""
     has = wheel.channels.keys()
     of = f" of the wheel {wheel.name!r}" if wheel.name else ""
@@ -357,7 +383,8 @@ def _check_wheel(settings: Settings, wheel: WheelMap, vehicle: Vehicle | None) -
                     f"the {words}{of} is missing, from which slip follows; needed is one of "
                     f"{', '.join(f'[{n}]' for n in needed)}, or [slip]"
                 )
-        if wheel.radius is None and "rim_speed" not in has:
+        by_gear = with_gears and wheel.gear_pattern is not None
+        if wheel.radius is None and "rim_speed" not in has and not by_gear:
             settings.fail(
                 f"[wheel] radius{of} is missing; needed is the radius at which slip is defined, "
                 "such as radius = '0.15 m +- 1 %'"

@@ -46,3 +46,73 @@ def test_gear_from_names_of_files(tmp_path):
 def test_what_is_wrong_in_gear_from_is_said(wheel, said):
     with pytest.raises(InputError, match=said):
         map_from({"wheel": wheel, "slip": {"value": 0.1}, "load": {"value": 50}})
+
+
+def logs_of_radii(folder, radii):
+    """Logs of wheels that slip alike, whose radius in mm stands in the name of the file."""
+    logs = []
+    for size in radii:
+        d = drive(np.random.default_rng(size), (0.1, 0.4), [60] * 2)
+        omega = d.omega * 130 / size  # `drive` has a wheel of 130 mm
+        logs.append(folder / f"sand_R{size}mm_1.csv")
+        rows = table((d.t, omega, d.v, d.torque, d.load))
+        logs[-1].write_text("\n".join(["t,omega,v,torque,Fz", *rows]))
+    return logs
+
+
+def test_wheels_of_different_radius_have_their_own_slip(tmp_path):
+    logs = logs_of_radii(tmp_path, (100, 160))
+    (tmp_path / "map.toml").write_text(init_map(logs))
+    found = import_log(logs, tmp_path / "map.toml")
+    rows = found.table
+    radii = {"R100mm": 0.1, "R160mm": 0.16}
+    assert {str(gear) for gear in rows["gear"]} == radii.keys()
+    for gear, radius in radii.items():
+        own = rows.where("gear", gear)
+        assert set(own["wheel_radius_m"]) == {radius}
+        np.testing.assert_allclose(own["slip"], (0.1, 0.4), atol=0.02)
+    assert [series.run for series in found.series] == ["sand_R100mm_1", "sand_R160mm_1"]
+    assert found.bias["slip"].constant > 0.004  # of a radius that is known to 1 %
+    assert not found.implausible and np.isnan(found.radius)
+
+
+def test_a_gear_without_a_radius_is_asked_for(tmp_path):
+    logs = logs_of_radii(tmp_path, (100, 160))
+    text = init_map(logs)
+    (tmp_path / "map.toml").write_text(text.replace("[gears.R160mm]", "[gears.R150mm]"))
+    with pytest.raises(InputError, match=r"has the gear 'R160mm', and \[gears\] does not"):
+        import_log(logs, tmp_path / "map.toml")
+    (tmp_path / "map.toml").write_text(text.replace('diameter = "', 'depth = "').replace(
+        'radius = "', 'wide = "'))  # fmt: skip
+    with pytest.raises(InputError, match="the radius is missing"):
+        import_log(logs, tmp_path / "map.toml")
+
+
+def test_other_gears_have_the_radius_of_the_wheel():
+    settings = {
+        "wheel": {"gear": "wide", "radius": 0.1}, "gears": {"wide": {"diameter": "0.3 m"}},
+        "wheel_speed": {"value": 1.0}, "ground_speed": {"value": 0.1}, "load": {"value": 50},
+    }  # fmt: skip
+    assert map_from(settings).wheels[0].radius.value == 0.15
+    settings["wheel"] = {"gear": "narrow", "radius": 0.1}
+    assert map_from(settings).wheels[0].radius.value == 0.1
+
+
+def test_rows_of_a_table_have_the_radius_of_their_gear(tmp_path):
+    file = tmp_path / "runs.csv"
+    stages = [(0.1, 50), (0.3, 60), (0.5, 70)]
+    rows = [
+        f"{gear} {i},{1 / radius / (1 - slip)},1,{load},1.5"
+        for gear, radius in (("A", 0.1), ("B", 0.2))
+        for i, (slip, load) in enumerate(stages)
+    ]
+    file.write_text("\n".join(["test,omega,v,Fz,T", *rows]))
+    found = import_log(file, {
+        "runs": {"each_row": True, "column": "test"}, "wheel": {"gear_from": "^([AB])"},
+        "gears": {"a": {"radius": "0.1 m +- 1 %"}, "b": {"radius": "0.2 m"}},
+        "wheel_speed": {"column": "omega", "unit": "rad/s"}, "load": {"column": "Fz", "unit": "N"},
+        "ground_speed": {"column": "v", "unit": "m/s"}, "torque": {"column": "T", "unit": "N m"},
+    }).table  # fmt: skip
+    np.testing.assert_allclose(found["slip"], [0.1, 0.3, 0.5] * 2)
+    assert found["gear"].tolist() == ["a"] * 3 + ["b"] * 3
+    assert found["wheel_radius_m"].tolist() == [0.1] * 3 + [0.2] * 3
