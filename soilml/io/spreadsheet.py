@@ -46,6 +46,16 @@ def is_spreadsheet(path: str | Path) -> bool:
     return split_sheet(path)[0].suffix.lower() in ENDINGS
 
 
+def sheets_with_cells(file: Path) -> list[str]:
+    """The names of the sheets of a spreadsheet that have cells; raises as `SheetRows` does."""
+    _check_size(file)
+    book = _opened(file, data_only=True)
+    try:
+        return [sheet.title for sheet in book.worksheets if _has_cells(file, sheet)]
+    finally:
+        book.close()
+
+
 class SheetRows(Iterator[list[str]]):
     """The rows of a sheet as texts, like `csv.reader`: `line_num` is the row that came last.
 

@@ -34,6 +34,8 @@ _PARTS: dict[str, type] = {
     "values": dict,
     "run": str,
     "map": str,
+    "sheet": str,
+    "change": dict,
 }
 _KINDS: dict[type, str] = {str: "a text", dict: "an object"}
 #: What is said with a status that the server's library answers; others below 500 have the first.

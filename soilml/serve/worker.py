@@ -15,7 +15,7 @@ from soilml.errors import SoilmlError
 #: Module and function (request, tell) that answer each kind of job.
 KINDS = {
     "look": ("logs", "look"),
-    "map": ("logs", "guess_map"),
+    "map": ("map_editor", "edit"),
     "import": ("logs", "import_logs"),
     "estimate": ("estimate", "answer"),
     "gap": ("gap", "answer"),
@@ -40,6 +40,8 @@ def main(folder: str) -> int:
 
     from soilml.report.page import finite_or_null
 
+    if sheet := request.get("sheet"):
+        request["names"] = [f"{name}#{sheet}" for name in request["names"]]
     try:
         module, function = KINDS[request["kind"]]
         answer = getattr(importlib.import_module(f"soilml.serve.answers.{module}"), function)

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from soilml.io.read_table import RUNS, read_table
+from soilml.io.spreadsheet import SheetRows, is_spreadsheet, sheets_with_cells, split_sheet
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.log_import.checks.table_hints import table_remarks
-from soilml.log_import.guesses.map_text import draft_map
 from soilml.log_import.page import page
 from soilml.log_import.workflow import import_log
 from soilml.quantities import COLUMNS
@@ -26,23 +26,21 @@ _KNOWN, _DRAWN = {*RUNS, "drawbar_pull_N", "sinkage_m"}, 2000
 
 
 def look(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
-    """The kind of a file, and of a table of runs its content.
+    """The kind of a file, and of a table of runs its content; of a spreadsheet its sheets.
 
     Raises `TableError` for the first fault of a table.
     """
     names = request["names"]
     tell(f"reading {names[0]}")
+    file, sheet = split_sheet(names[0])
+    if is_spreadsheet(file) and not sheet:
+        sheets = sheets_with_cells(file)
+        if len(sheets) > 1:
+            return {"kind": "sheets", "sheets": sheets}
     if len(names) > 1 or not is_table_of_runs(Path(names[0])):
         return {"kind": "log"}
     table = read_table(names[0], RUNS)
     return {"kind": "runs", **table_summary(table), "remarks": texts(table_remarks(table, None))}
-
-
-def guess_map(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
-    """The text of the map, and how many of its lines need a look."""
-    tell("looking at the log")
-    draft = draft_map(request["names"])
-    return {"map": draft.text, "marked": draft.marked}
 
 
 def import_logs(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
@@ -84,6 +82,8 @@ def is_table_of_runs(file: Path) -> bool:
         from soilml.io.parquet import read_parquet
 
         header = set(read_parquet(file)[0])
+    elif is_spreadsheet(file):
+        header = set(next((row for row in SheetRows(file) if row), []))
     elif file.suffix.lower() in (".csv", ".txt", ".tsv"):
         with file.open("rb") as opened:
             line = opened.readline(1 << 16).decode("utf-8-sig", errors="replace")

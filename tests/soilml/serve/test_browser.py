@@ -213,21 +213,74 @@ def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
     assert "Gap report" in opened.value.title()
 
 
-def test_a_raw_log_goes_through_its_map(tab, tmp_path):
+def rig_log(tmp_path):
     sys.path.insert(0, str(ROOT / "examples" / "import"))
     from rig import write_logs
 
-    tab.set_input_files("#file", write_logs(tmp_path / "rig")[:1])
-    tab.wait_for_selector("#map-text", timeout=LONG)
+    return write_logs(tmp_path / "rig")[0]
+
+
+def settled(tab):
+    """Wait for the answer to a change of the map."""
+    tab.wait_for_timeout(50)
+    tab.wait_for_selector("#map-job", state="hidden", timeout=LONG)
+
+
+def test_a_raw_log_goes_through_its_map(tab, tmp_path):
+    tab.set_input_files("#file", rig_log(tmp_path))
+    tab.wait_for_selector("#map-panel:not([hidden])", timeout=LONG)
+    assert tab.locator("#map-columns tr").count() == 6
+    assert tab.locator("#map-curves figure").count() == 3
+    assert "gearbox" in tab.locator("#map-columns .wrong").inner_text()
     tab.get_by_role("button", name="Import", exact=True).click()
     tab.wait_for_selector("#map-error:not([hidden])", timeout=LONG)
-    text = tab.locator("#map-text").input_value()
-    tab.locator("#map-text").fill(text.replace("gear_ratio = 1 ", "gear_ratio = 99 "))
+    box = "document.querySelector('#map-text')"
+    marked = tab.evaluate(f"{box}.value.slice({box}.selectionStart, {box}.selectionEnd)")
+    assert marked.startswith("gear_ratio = 1 ")  # the error leads to its line
+    tab.get_by_label("[wheel_angle] gear_ratio").fill("99")
+    tab.keyboard.press("Tab")
+    settled(tab)
+    assert tab.locator("#map-panel .wrong").count() == 0
+    with tab.expect_download() as saved:
+        tab.get_by_role("button", name="Save map.toml").click()
+    assert saved.value.suggested_filename == "map.toml"
     tab.get_by_role("button", name="Import", exact=True).click()
     tab.wait_for_selector("#table-panel:not([hidden])", timeout=LONG)
     assert tab.get_by_role("link", name="Open the import report").is_visible()
-    tab.locator("#estimate-job").get_by_role("button", name="Cancel").click()
-    assert tab.locator("#estimate-job").is_hidden()
+
+
+def test_roles_and_units_are_chosen_by_keyboard_on_a_phone(tab, tmp_path):
+    tab.set_viewport_size({"width": 390, "height": 800})
+    tab.emulate_media(color_scheme="dark")
+    tab.set_input_files("#file", rig_log(tmp_path))
+    tab.wait_for_selector("#map-panel:not([hidden])", timeout=LONG)
+    tab.get_by_label("What Fx is").focus()
+    tab.keyboard.type("load")
+    settled(tab)
+    assert tab.get_by_label("What Fz is").input_value() == ""
+    assert tab.evaluate("document.activeElement.getAttribute('aria-label')") == "What Fx is"
+    tab.get_by_label("Unit of Fx").select_option("kN")
+    settled(tab)
+    assert 'unit = "kN"' in tab.locator("#map-text").input_value()
+    assert tab.locator("#map-panel .wrong").count() > 0
+    until(tab, "document.documentElement.scrollWidth <= 390")
+    assert tab.evaluate(CONTRAST) == [] and tab.evaluate(NAMELESS) == []
+
+
+def test_the_sheet_of_a_spreadsheet_is_asked_for(tab, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    rows = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))).read_text().splitlines()
+    for line in rows:
+        book.active.append([cell if i == 0 or line == rows[0] else float(cell or "nan")
+                            for i, cell in enumerate(line.split(","))])  # fmt: skip
+    book.create_sheet("notes").append(["by hand"])
+    book.save(tmp_path / "tests.xlsx")
+    tab.set_input_files("#file", tmp_path / "tests.xlsx")
+    tab.get_by_role("button", name="Sheet", exact=True).click()
+    tab.wait_for_selector("#pull-result figure, #estimate-error:not([hidden])", timeout=LONG)
+    assert "rows 12" in tab.locator("#table-panel").inner_text()
+    assert tab.locator("#estimate-error").is_hidden()
 
 
 #: Contrast of every visible text with what is behind it, by WCAG 2; the worst ones.

@@ -10,18 +10,18 @@ import { pullPlots } from "./pull_plots.js";
 import { sweepPlots } from "./plots.js";
 
 const ALL = "";
-const current = { file: null };
+const current = { file: null, sheet: "" };
 
 /** The table that estimates and gaps are made from: its key, and the run that is chosen. */
-export const currentTable = () => (current.file ? { files: [current.file], run: byId("run").value } : null);
+export const currentTable = () => (current.file ? { files: [current.file], sheet: current.sheet || null, run: byId("run").value } : null);
 
 export function startEstimate() {
   byId("estimate-start").addEventListener("click", estimate);
 }
 
 /** Take a table: show it, then estimate. */
-export async function takeTable(file, table, links = null) {
-  current.file = file;
+export async function takeTable(file, sheet, table, links = null) {
+  Object.assign(current, { file, sheet });
   const wheel = modelIsOwn() ? "" : setRadius(table.radius);
   if (wheel) table = { ...table, remarks: [...table.remarks, wheel] };
   showTable(table, links);

@@ -1,16 +1,16 @@
 // Files that are dropped or chosen: model files, tables of runs, raw logs.
 
 import { upload } from "./api.js";
-import { byId, showError } from "./dom.js";
+import { byId, element, showError } from "./dom.js";
 import { bytes } from "./format.js";
 import { work } from "./jobs.js";
 import { dropModel } from "./model_box.js";
 
 const CASE = /^\s*\[(gear|gears\.|soil|rover)/m;
 
-/** `taken` has functions `runs(file, table)`, `logs(files)` and `map(text)`. */
+/** `taken` has functions `runs(file, sheet, table)`, `logs(files, names, sheet)` and `map(text)`. */
 export function startFiles(largest, taken) {
-  byId("drop-note").textContent = `CSV, Parquet, MATLAB, MCAP, bags, TOML; up to ${bytes(largest)} each`;
+  byId("drop-note").textContent = `CSV, Parquet, spreadsheets, MATLAB, MCAP, bags, TOML; up to ${bytes(largest)} each`;
   const input = byId("file");
   input.addEventListener("change", async () => {
     const files = [...input.files];
@@ -68,8 +68,30 @@ async function takeToml(file, taken) {
 async function takeData(files, taken) {
   const keys = [];
   for (const file of files) keys.push((await upload(file)).id);
-  const done = await work("drop-job", { kind: "look", files: keys });
+  await look(keys, files.map((file) => file.name), "", taken);
+}
+
+async function look(keys, names, sheet, taken) {
+  byId("sheets").hidden = true;
+  const done = await work("drop-job", { kind: "look", files: keys, sheet: sheet || null });
   if (!done) return;
-  if (done.result.kind === "runs") await taken.runs(keys[0], done.result);
-  else await taken.logs(keys, files.map((file) => file.name));
+  const { kind, sheets } = done.result;
+  if (kind === "sheets") askForSheet(keys, names, sheets, taken);
+  else if (kind === "runs") await taken.runs(keys[0], sheet, done.result);
+  else await taken.logs(keys, names, sheet);
+}
+
+/** A spreadsheet with several sheets: a button for each. */
+function askForSheet(keys, names, sheets, taken) {
+  const choose = async (sheet) => {
+    try {
+      await look(keys, names, sheet, taken);
+    } catch (error) {
+      showError("drop-error", error.message);
+    }
+  };
+  byId("sheets").replaceChildren(element("span", {}, `Which sheet of ${names[0]}?`),
+    ...sheets.map((sheet) => element("button", { type: "button", onclick: () => choose(sheet) }, sheet)));
+  byId("sheets").hidden = false;
+  byId("sheets").querySelector("button").focus();
 }

@@ -6,7 +6,7 @@ import { startEstimate, takeTable } from "./estimate.js";
 import { startFiles } from "./files.js";
 import { startForward } from "./forward.js";
 import { startGap } from "./gap.js";
-import { showMap, takeMap } from "./log_import.js";
+import { showMap, takeMap } from "./map_editor.js";
 import { startModelBox } from "./model_box.js";
 
 async function start() {
@@ -16,12 +16,12 @@ async function start() {
   startEstimate();
   startGap();
   startFiles(choices.largest_file, {
-    runs: (file, table) => {
+    runs: (file, sheet, table) => {
       byId("map-panel").hidden = true;
-      return takeTable(file, table);
+      return takeTable(file, sheet, table);
     },
-    logs: (files, names) => showMap(files, names, takeTable),
-    map: (text) => takeMap(text, takeTable),
+    logs: (files, names, sheet) => showMap(files, names, sheet, takeTable),
+    map: takeMap,
   });
   await startForward(choices);
   document.documentElement.dataset.ready = "yes";

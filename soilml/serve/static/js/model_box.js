@@ -2,7 +2,7 @@
 
 import { ask } from "./api.js";
 import { chosen, droppedModel, takeModel } from "./forward.js";
-import { byId, showError } from "./dom.js";
+import { byId, jumpTo, saveText, showError } from "./dom.js";
 
 let own = false; // whether the text is the user's
 
@@ -64,6 +64,11 @@ export function modelFault(message) {
   if (!message.includes("MODEL.toml")) return false;
   byId("model-box").open = true;
   showError("model-error", message);
+  const shown = own ? Promise.resolve() : write();
+  shown.then(() => {
+    showError("model-error", message);
+    jumpTo(text(), message);
+  });
   return true;
 }
 
@@ -71,9 +76,5 @@ export const clearModelFault = () => showError("model-error", "");
 
 async function save() {
   if (!own) await write();
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([text().value], { type: "text/plain" }));
-  link.download = "MODEL.toml";
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  saveText("MODEL.toml", text().value);
 }

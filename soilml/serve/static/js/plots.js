@@ -12,11 +12,11 @@ export const colour = (name) =>
 /**
  * A plot in an element. `series` are { label, colour, dash, width, points, fill }, `bands` are
  * [upper, lower, colour] by the numbers of series; `marker` is a colour of a dot at the present
- * point.
+ * point; with `zero` the axis of y begins there.
  */
 export class Plot {
-  constructor(place, { x, y, series, bands = [], height = HEIGHT, reading = null, ticks = null }) {
-    Object.assign(this, { place, x, y, series, bands, height, reading, ticks });
+  constructor(place, { x, y, series, bands = [], height = HEIGHT, reading = null, ticks = null, zero = false }) {
+    Object.assign(this, { place, x, y, series, bands, height, reading, ticks, zero });
     this.data = [[], ...series.map(() => [])];
     this.marker = null;
     this.plot = null;
@@ -45,7 +45,7 @@ export class Plot {
     }));
     this.plot = new uPlot({
       width: this.width(), height: this.height, padding: [10, 14, 0, 0], pxAlign: 0,
-      legend: { show: false }, scales: { x: { time: false } },
+      legend: { show: false }, scales: { x: { time: false }, ...(this.zero ? { y: { range: (_, low, high) => [Math.min(0, low), 1.08 * Math.max(0, high) || 1] } } : {}) },
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
       series: [first, ...lines], bands, axes: [axis(this.x, 26), axis(this.y, 46)],
       hooks: { draw: [(u) => this.drawMarker(u)], setCursor: [(u) => this.read(u)] },

@@ -1,0 +1,221 @@
+"""The map of a log on the page: its columns with their roles, changes of it, and what it gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.errors import InputError, SoilmlError
+from soilml.log_import.channels.runs import Run, runs_of
+from soilml.log_import.guesses.columns import Candidate, candidates_of, liveliest
+from soilml.log_import.guesses.map_edits import (
+    channels_of,
+    columns_in,
+    open_lines,
+    parsed,
+    set_role,
+    set_unit,
+    set_value,
+)
+from soilml.log_import.guesses.map_text import draft_map, log_files
+from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.mapping.log_map import LogMap, read_map
+from soilml.log_import.readers import read_log
+from soilml.log_import.result import ImportedLog
+from soilml.log_import.rows import WheelSeries
+from soilml.log_import.workflow import import_log
+from soilml.serve.answers.job_files import Tell, setting_file
+
+MAP_FILE = "map.toml"  # Name of the map in messages
+_SPARK, _DRAWN = 60, 400  # Points of a picture of a column, and of a curve
+_MOST_COLUMNS = 200
+#: Units to choose from, by the unit of soilml.
+UNITS: dict[str, tuple[str, ...]] = {
+    "rad/s": ("rad/s", "deg/s", "rpm", "count/s"), "rad": ("rad", "deg", "count"),
+    "m/s": ("m/s", "mm/s", "cm/s"), "m": ("m", "mm", "cm"), "1": ("1", "%"),
+    "N m": ("N m", "mN m", "kgf cm"), "A": ("A", "mA"), "N": ("N", "kN", "kgf", "gf"),
+}  # fmt: skip
+#: Curves that are drawn: quantity and unit.
+_CURVES = (("slip", ""), ("load", "N"), ("torque", "N m"))
+
+
+def edit(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
+    """The map after a change, its columns, what is open in it, and the curves that it gives.
+
+    Without a `map` in the request it is guessed. `change` is one of {column, role, unit}, {role,
+    unit} and {line, value}.
+
+    Raises `InputError` for logs that cannot be read, a map that is no TOML, and a change that is
+    not possible; what is wrong with the map otherwise is part of the answer.
+    """
+    tell("looking at the log")
+    names = [str(file) for file in log_files(request["names"])]
+    text = request.get("map")
+    if not isinstance(text, str) or not text.strip():
+        text = draft_map(names).text
+    look = _Look(names, text)
+    change = request.get("change") or {}
+    if change:
+        text = _changed(text, change, look)
+        look = _Look(names, text)
+    tell("computing slip, load and torque")
+    return {
+        "map": text,
+        "marked": len(open_lines(text)),
+        "open": [vars(line) for line in open_lines(text)],
+        "roles": _roles(look.content),
+        "units": UNITS,
+        "columns": [_column(c, look) for c in look.columns[:_MOST_COLUMNS]],
+        "more": max(0, len(look.columns) - _MOST_COLUMNS),
+        "preview": _preview(names, look),
+    }
+
+
+class _Look:
+    """Logs as a map reads them: the run that is drawn, its columns, and the map's channels."""
+
+    def __init__(self, names: Sequence[str], text: str) -> None:
+        self.content = parsed(text)
+        self.map: LogMap | None = None
+        self.fault = ""
+        path = Path(MAP_FILE)
+        path.unlink(missing_ok=True)
+        try:
+            self.map = read_map(setting_file(MAP_FILE, text))
+        except InputError as error:
+            self.fault = str(error)
+        # what is wrong with its channels does not hide the columns
+        logs = [read_log(name) for name in names[: 1 if self._one_file_a_run() else None]]
+        try:
+            runs = runs_of(logs, self.map or LogMap(MAP_FILE, ()))
+        except InputError as error:
+            self.fault = self.fault or str(error)
+            runs = [Run("log", tuple(r), tuple(np.arange(float(len(x))) for x in r)) for r in logs]
+        self.run = liveliest(runs)
+        steady = self.map is not None and self.map.each_row
+        self.columns = candidates_of(self.run.recordings, steady)
+
+    def _one_file_a_run(self) -> bool:
+        return not self.content.get("files")
+
+
+def _changed(text: str, change: Mapping[str, Any], look: _Look) -> str:
+    given = {k: str(change.get(k) or "") for k in ("column", "role", "unit", "value")}
+    if "line" in change:
+        line = change["line"]
+        if isinstance(line, bool) or not isinstance(line, int | float):
+            raise InputError("line: needed is the number of a line of the map")
+        return set_value(text, int(line), given["value"])
+    if "column" in change:
+        return set_role(text, look.run, look.columns, given["column"], given["role"], given["unit"])
+    return set_unit(text, given["role"], given["unit"])
+
+
+def _roles(content: Mapping[str, Any]) -> list[dict[str, str]]:
+    """The channels that a column may be, by path."""
+    wheels = content.get("wheels")
+    names = [*wheels] if isinstance(wheels, dict) else []
+    found = [{"id": role, "label": _words(role), "unit": ROLES[role][0]} for role in ROLES]
+    for name in names:
+        of = f"{_words(name)}: "
+        found += [
+            {"id": f"wheels.{name}.{role}", "label": of + _words(role), "unit": ROLES[role][0]}
+            for role in ROLES
+        ]
+    return found
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _column(column: Candidate, look: _Look) -> dict[str, Any]:
+    """A column with its picture, its role and what is marked of it."""
+    channels = channels_of(look.content)
+    path = next((p for p, t in channels.items() if column.address in columns_in(t)), "")
+    role = path.rpartition(".")[2]
+    shared = channels.get(role, {})
+    own = {**shared, **channels.get(path, {})}
+    clock = look.map is not None and column.name == look.map.time_column
+    return {
+        "name": column.address,
+        "stated": column.unit,
+        "low": column.about.low,
+        "high": column.about.high,
+        "constant": column.about.constant,
+        "spark": _thinned(look.run.find(column.address)[1], _SPARK).tolist(),
+        "role": "time" if clock else path,
+        "unit": str(own.get("unit", "")),
+        "scaled": "scale" in own,
+    }
+
+
+def _thinned(values: Floats, most: int) -> Floats:
+    """At most so many samples, evenly over the whole."""
+    if values.size <= most:
+        return values
+    return np.asarray(values[np.linspace(0, values.size - 1, most).astype(int)])
+
+
+def _preview(names: Sequence[str], look: _Look) -> dict[str, Any]:
+    """The curves of the first log, what physics objects to, or the error in words."""
+    if look.map is None or look.fault:
+        return {"error": " ".join(look.fault.split())}
+    first = names[:1] if not look.map.files else names
+    try:
+        found = import_log(list(first), look.map, accept=True)
+    except SoilmlError as error:
+        return {"error": " ".join(str(error).split())}
+    hints = [
+        {"text": hint.text, "about": list(hint.about), "wrong": hint in found.implausible}
+        for hint in (*found.implausible, *found.remarks)
+    ]
+    return {
+        "error": "",
+        "hints": hints,
+        "rows": len(found.table),
+        "logs": len(names),
+        "log": Path(first[0]).name,
+        "curves": _curves(found),
+    }
+
+
+def _curves(found: ImportedLog) -> list[dict[str, Any]]:
+    """Slip, load and torque over time, and the share of them that is in steady windows."""
+    if not found.series:
+        return []
+    series = max(found.series, key=lambda one: sum(not s.why for s in one.stretches))
+    return [
+        {"quantity": name, "unit": unit, "run": series.run, **_curve(series, name)}
+        for name, unit in _CURVES
+        if name in series.quantities
+    ]
+
+
+def _curve(series: WheelSeries, name: str) -> dict[str, Any]:
+    time, values = series.time, np.asarray(series.quantities[name], dtype=np.float64)
+    width = max(1, time.size // _DRAWN)
+    count = time.size // width
+    # means of blocks, so that noise is no band of black
+    blocks = values[: count * width].reshape(count, width)
+    known = np.isfinite(blocks)
+    total = np.where(known, blocks, 0.0).sum(axis=1)
+    shown = np.where(known.any(axis=1), total / np.maximum(known.sum(axis=1), 1), np.nan)
+    at = time[: count * width].reshape(count, width).mean(axis=1)
+    steady, resting = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)
+    for stretch in series.stretches:
+        within = (at >= stretch.start) & (at <= stretch.stop)
+        if stretch.why is None:
+            steady |= within
+        resting |= within & (stretch.why is not None and stretch.why.code == "at-rest")
+    if name == "slip":  # at rest it is any number
+        shown = np.where((np.abs(shown) <= 1.0) & ~resting, shown, np.nan)
+    return {
+        "time": at.tolist(),
+        "values": shown.tolist(),
+        "steady": np.where(steady, shown, np.nan).tolist(),
+    }
