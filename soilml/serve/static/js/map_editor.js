@@ -78,7 +78,7 @@ function show(result) {
   byId("map-text").value = result.map;
   const { marked, preview } = result;
   byId("map-note").textContent = marked
-    ? `${counted(marked, "line")} of the map cannot be told from the log, or only guessed.`
+    ? `${counted(marked, "line")} of the map are in no log, or only guessed.`
     : "Names, units and physics agree with these guesses.";
   byId("map-note").className = marked ? "remark" : "soft";
   byId("map-open").replaceChildren(...result.open.map(openLine));
