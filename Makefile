@@ -76,6 +76,8 @@ bench-gap: $(VENV)/.ready ## 446 sets with hidden effects against gates and base
 	  --disable-pip-version-check --editable '.[bench]'
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 4 --write \
 	  --keep build/gap_records.json
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap_hybrid.py \
+	  --seed 10 11 --sets 10 --write
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap_speed.py --write
 
 bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of seeds to tune on: nothing is written

@@ -28,6 +28,7 @@ TITLES = {
     "systems": "Wheel-legs",
     "software": "Paths through the code and wall time",
     "gap": "Gap workflow: hidden effects",
+    "gap-hybrid": "Gap workflow: rows kept back",
     "gap-speed": "Gap workflow: seconds",
     "gap-measured": "Gap workflow: published tests",
 }

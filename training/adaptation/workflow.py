@@ -282,7 +282,7 @@ def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
         refusal = Remark(f"gap-{status}", text, severity="note")
     elif any(one["code"] == "prior-opened" for one in content["reasons"]):
         text = (
-            "the gap is explained by soils outside of [soil.prior] alone; give priors in which the "
+            "only soils outside of [soil.prior] explain the gap; give priors in which the "
             "soils to come lie, and in which gap/report.html finds that of the campaign"
         )
         refusal = Remark("prior-opened", text)
