@@ -178,8 +178,9 @@ def write(records: Sequence[Mapping[str, Any]], seeds: Sequence[int], sets: int)
         f"Written by `{command}`: blind sets of tiers {', '.join(TIERS)} in which the soil alone "
         "leaves a gap. A quarter of the rows is kept back at random, and rows at 1.3 to 1.6 times "
         "the heaviest load are predicted too. Figures are ratios of RMS distances to the "
-        "noise-free readings. *Hybrid* is the returned model with its learned remainder, *effect* is the same without "
-        "it, and *process* is a Gaussian process of the readings.\n\nGates: hybrid over soil at "
+        "noise-free readings. *Hybrid* is the returned model with its learned remainder, "
+        "*effect* is the same without it, and *process* is a Gaussian process of the readings."
+        "\n\nGates: hybrid over soil at "
         "most 0.5 in the median and 1.0 in the worst set; hybrid over process at most 1.0 in the "
         "median at each discrepancy; heavier loads no worse than the better of effect and process."
     )
