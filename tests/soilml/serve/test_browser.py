@@ -102,6 +102,13 @@ def runs_file(tmp_path, model, loads=(40.0, 90.0)):
     return tmp_path / "RUNS.csv"
 
 
+def confirm_the_wheel(tab):
+    """Answer the question which wheel drove the table."""
+    tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
+    assert tab.locator(".band").count() == 0 and tab.locator("#gap-start").is_disabled()
+    tab.get_by_role("button", name="These are right: estimate").click()
+
+
 def test_sliders_keys_and_typed_values_move_the_curves(tab):
     first = now(tab)
     expected = Model(Wheel(radius=0.15, width=0.12))(
@@ -150,9 +157,14 @@ def test_another_wheel_and_soil_are_chosen(tab):
 def test_a_table_leads_to_bands_and_back_to_the_sliders(tab, tmp_path):
     file = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
     tab.set_input_files("#file", file)
-    tab.wait_for_selector("#pull-result figure", timeout=LONG)
+    confirm_the_wheel(tab)
+    tab.wait_for_selector("#pull-result summary", timeout=LONG)
     assert tab.locator(".band").count() == 3
     assert tab.get_by_text("Drive next:").is_visible()
+    assert tab.locator("#pull-result figure").first.is_hidden()
+    tab.get_by_text("Drawbar pull and slope against slip").click()
+    assert tab.locator("#pull-result figure").first.is_visible()
+    assert tab.evaluate("document.querySelector('#estimate-result .bands').offsetHeight") < 300
     assert "rows 12" in tab.locator("#table-panel").inner_text()
     with tab.expect_download() as saved:
         tab.get_by_role("link", name="Save estimates").click()
@@ -167,10 +179,48 @@ def test_a_log_brings_the_radius_of_its_wheel(tab, tmp_path):
     header, *rows = file.read_text().splitlines()
     file.write_text("\n".join([f"{header},wheel_radius_m", *(f"{row},0.11" for row in rows)]))
     tab.set_input_files("#file", file)
-    tab.wait_for_selector("#pull-result figure, #estimate-error:not([hidden])", timeout=LONG)
+    tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
     assert number(tab, "gear-radius").input_value() == "110"
     assert "the radius of this log, 110" in tab.locator("#table-panel").inner_text()
+    tab.get_by_label("Width (mm)").fill("-3")
+    assert "needed is a value" in tab.locator("#ask-gear-width-error").inner_text()
+    tab.get_by_label("Width (mm)").fill("90")
+    tab.keyboard.press("Enter")
+    tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
     assert tab.locator("#estimate-error").is_hidden()
+    assert number(tab, "gear-width").input_value() == "90"
+
+
+def test_a_model_file_answers_which_wheel_it_was(tab, tmp_path):
+    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
+    tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
+    tab.locator("#model-box > summary").click()
+    until(tab, "document.querySelector('#model-text').value.includes('[gear]')")
+    text = tab.locator("#model-text").input_value()
+    (tmp_path / "m.toml").write_text(text)
+    tab.set_input_files("#file", tmp_path / "m.toml")
+    tab.wait_for_selector("#pull-result summary", timeout=LONG)
+    assert tab.locator("#ask-wheel").is_hidden()
+    tab.locator("#model-text").fill(text.replace("friction_angle = ", "friction_angle = -", 1))
+    tab.get_by_role("button", name="Estimate the soil").click()
+    tab.wait_for_selector("#model-error:not([hidden])", timeout=LONG)
+    box = "document.querySelector('#model-text')"
+    line = tab.evaluate(f"{box}.value.slice({box}.selectionStart, {box}.selectionEnd)")
+    assert line.startswith("friction_angle = -")
+
+
+def test_what_rows_do_not_determine_has_no_number(tab, tmp_path):
+    file = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)), (60.0,))
+    file.write_text("\n".join(file.read_text().splitlines()[:2]) + "\n")
+    tab.set_input_files("#file", file)
+    confirm_the_wheel(tab)
+    tab.wait_for_selector("#pull-result", timeout=LONG)
+    said = tab.locator("#estimate-result .sentence").inner_text()
+    assert said.startswith("These rows do not determine")
+    unknown = tab.locator(".band", has_text="not determined")
+    assert unknown.count() > 0
+    for head in unknown.locator("header").all_inner_texts():
+        assert not any(c.isdigit() for c in head)
 
 
 def test_a_faulty_table_is_answered_beside_the_drop_zone(tab, tmp_path):
@@ -196,7 +246,8 @@ def test_a_model_file_moves_the_sliders_and_its_faults_are_shown(tab, tmp_path):
 def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
     digging = Model(Wheel(radius=0.15, width=0.12)) + EFFECTS["slip-sinkage"](n1=0.5)
     tab.set_input_files("#file", runs_file(tmp_path, digging, (40.0, 90.0)))
-    tab.wait_for_selector("#pull-result figure, #estimate-error:not([hidden])", timeout=LONG)
+    confirm_the_wheel(tab)
+    tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
     start = tab.get_by_role("button", name="Look for a gap")
     start.click()
     tab.locator("#gap-job").get_by_role("button", name="Cancel").click()
@@ -206,7 +257,10 @@ def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
     start.click()
     tab.wait_for_selector(".verdict", timeout=LONG)
     assert "slip-sinkage" in tab.locator(".verdict").inner_text()
-    assert tab.locator("table.map").count() == 2
+    assert tab.evaluate("document.querySelector('#gap').offsetHeight") < 800  # one screen
+    assert tab.locator("table.map").first.is_hidden()
+    tab.get_by_text("Where the model disagrees").click()
+    assert tab.locator("table.map").first.is_visible() and tab.locator("table.map").count() == 2
     with tab.context.expect_page() as opened:
         tab.get_by_role("link", name="Open the full report").click()
     opened.value.wait_for_load_state()
@@ -278,7 +332,8 @@ def test_the_sheet_of_a_spreadsheet_is_asked_for(tab, tmp_path):
     book.save(tmp_path / "tests.xlsx")
     tab.set_input_files("#file", tmp_path / "tests.xlsx")
     tab.get_by_role("button", name="Sheet", exact=True).click()
-    tab.wait_for_selector("#pull-result figure, #estimate-error:not([hidden])", timeout=LONG)
+    confirm_the_wheel(tab)
+    tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
     assert "rows 12" in tab.locator("#table-panel").inner_text()
     assert tab.locator("#estimate-error").is_hidden()
 
@@ -307,10 +362,13 @@ NAMELESS = """() => [...document.querySelectorAll('input, select, textarea, butt
 
 
 def test_it_fits_has_contrast_and_names(tab, tmp_path):
+    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
+    tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
+    assert tab.evaluate(CONTRAST) == [] and tab.evaluate(NAMELESS) == []
+    confirm_the_wheel(tab)
+    tab.wait_for_selector("#pull-result summary", timeout=LONG)
     while (closed := tab.locator("details:not([open]) > summary")).count():
         closed.first.click()
-    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
-    tab.wait_for_selector("#pull-result figure", timeout=LONG)
     for width, scheme in ((1280, "light"), (1280, "dark"), (360, "dark"), (360, "light")):
         tab.emulate_media(color_scheme=scheme)
         tab.set_viewport_size({"width": width, "height": 800})

@@ -1,13 +1,14 @@
 // The soil from a table of runs: bands against the prior, abstentions in words, what to drive next.
 
 import { jobFile } from "./api.js";
-import { byId, drawn, element, options, showError, wordList } from "./dom.js";
-import { setRadius, setSoil, showReadings } from "./forward.js";
+import { byId, drawn, element, fold, options, showError, wordList } from "./dom.js";
+import { setRadius, setSoil, showReadings, wheelIsKnown } from "./forward.js";
 import { counted, number, percent, range, withUnit } from "./format.js";
 import { work } from "./jobs.js";
 import { clearModelFault, modelFault, modelIsOwn, modelOfEstimate } from "./model_box.js";
 import { pullPlots } from "./pull_plots.js";
 import { sweepPlots } from "./plots.js";
+import { askForWheel } from "./wheel_question.js";
 
 const ALL = "";
 const current = { file: null, sheet: "" };
@@ -28,11 +29,28 @@ export async function takeTable(file, sheet, table, links = null) {
   showReadings(table);
   options(byId("run"), [{ id: ALL, label: "all rows, as one soil" }, ...table.runs.map((run) => ({ id: run, label: `run ${run}` }))], ALL);
   byId("estimate-empty").hidden = true;
-  byId("estimate-actions").hidden = false;
-  byId("gap-start").disabled = false;
-  byId("gap-empty").hidden = true;
+  byId("estimate-result").replaceChildren();
   byId("gap-result").replaceChildren();
+  const known = modelIsOwn() || wheelIsKnown();
+  ready(known);
+  if (known) await estimate();
+  else askForWheel(table.name, wheelAnswered);
+}
+
+/** The wheel of the table is known now: by an answer, or by a model file. */
+export async function wheelAnswered() {
+  if (!current.file || byId("estimate-actions").hidden === false) return;
+  byId("ask-wheel").hidden = true;
+  ready(true);
   await estimate();
+}
+
+/** Whether the estimate and the gap can be asked for. */
+function ready(known) {
+  byId("estimate-actions").hidden = !known;
+  byId("gap-start").disabled = !known;
+  byId("gap-empty").hidden = known;
+  byId("gap-empty").textContent = "needs the wheel";
 }
 
 function showTable(table, links) {
@@ -66,12 +84,19 @@ async function estimate() {
 function show({ id, result }) {
   const values = Object.fromEntries(result.parameters.map((p) => [p.path, p.si]));
   const place = byId("estimate-result");
-  place.replaceChildren(
-    element("p", { class: "soft" }, `${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, averaged over explanations of the rows${explained(result.explanations)}. Brown: that of exact_model, the model file taken as exact.`),
-    ...(result.use ? [element("p", { class: "next" }, `${result.use[0].toUpperCase()}${result.use.slice(1)}.`)] : []),
+  const pull = element("div", { id: "pull-result" });
+  const unknown = result.parameters.filter((p) => !p.identified).map((p) => p.label);
+  place.replaceChildren(...[
+    element("p", { class: "sentence" }, unknown.length
+      ? `These rows do not determine ${unknown.join(" and ")}.`
+      : `${counted(result.used, "row")} determine the soil${weakly(result.parameters)}.`),
     element("div", { class: "bands" }, ...result.parameters.map(band)),
-    ...[wordList(result.words.slice(0, -1)), result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
-      wordList([...result.remarks, ...result.warnings], "remark")].filter(Boolean),
+    result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
+    wordList([...result.remarks, ...result.warnings], "remark"),
+    pull,
+    fold("How sure this is", element("p", { class: "soft" }, `${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, averaged over explanations of the rows${explained(result.explanations)}. Brown: that of exact_model, the model file taken as exact.`),
+      result.use ? element("p", {}, `${result.use[0].toUpperCase()}${result.use.slice(1)}.`) : null,
+      sureness(result.parameters), wordList(result.words.slice(0, -1))),
     element("div", { class: "buttons" },
       element("button", { type: "button", id: "use-soil", onclick: () => {
         setSoil(values);
@@ -79,30 +104,35 @@ function show({ id, result }) {
       } }, "Show this soil in the forward model"),
       element("a", { class: "button", href: jobFile(id, "model.toml") }, "Save MODEL.toml"),
       element("a", { class: "button", href: jobFile(id, "identify.json") }, "Save estimates")),
-    element("h3", {}, "Drawbar pull and slope"), element("div", { id: "pull-result" }));
-  pullPlots(byId("pull-result"), result.pull);
+  ].filter(Boolean));
+  pullPlots(pull, result.pull);
   sweepPlots();
 }
 
-/** One parameter: value, band, what it leaves of the prior, and a picture of both. */
-function band(parameter) {
-  const { label, symbol, unit, value, band: [low, high], left, identified, weak } = parameter;
-  const state = !identified
-    ? `not identified: ${percent(left)} of the prior's width remains`
-    : `${weak ? "weakly identified" : "identified"}: ${percent(left)} of the prior's width remains`;
-  return element("article", { class: "band" },
-    element("header", {}, element("h3", {}, `${label} `, element("span", { class: "unit" }, symbolText(symbol))),
-      element("span", { class: "value" }, identified ? `${withUnit(value, unit)} ` : "not known ",
-        element("span", { class: "unit" }, `90 %: ${range(low, high, unit)}`))),
-    picture(parameter),
-    element("p", { class: `state ${identified ? "yes" : "no"}` }, state), exactWords(parameter));
+/** The parameters that are determined weakly, in words. */
+function weakly(parameters) {
+  const names = parameters.filter((p) => p.weak).map((p) => p.label);
+  return names.length ? `, ${names.join(" and ")} weakly` : "";
 }
 
-/** The interval of the model file taken as exact, beside a value that is known. */
-function exactWords({ exact, exact_band: ends, identified, unit }) {
-  if (!ends) return null;
-  const value = identified ? `${withUnit(exact, unit)} ` : "";
-  return element("p", { class: "state second" }, `exact_model: ${value}(90 %: ${range(...ends, unit)})`);
+/** One parameter: its value and band before and after the log; what is not determined is said. */
+function band(parameter) {
+  const { label, symbol, unit, value, band: [low, high], identified } = parameter;
+  return element("article", { class: "band" },
+    element("header", {}, element("h3", {}, `${label} `, element("span", { class: "unit" }, symbolText(symbol))),
+      identified
+        ? element("span", { class: "value" }, `${withUnit(value, unit)} `, element("span", { class: "unit" }, `90 %: ${range(low, high, unit)}`))
+        : element("span", { class: "state no" }, "not determined")),
+    picture(parameter));
+}
+
+/** What each interval leaves of the prior, and the intervals of the model taken as exact. */
+function sureness(parameters) {
+  const heads = ["", "left of the prior's width", "90 %", "90 % of exact_model"];
+  return element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "How sure each parameter is" },
+    element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
+      element("tbody", {}, ...parameters.map((p) => element("tr", {}, element("th", { scope: "row" }, p.label),
+        ...[percent(p.left), range(...p.band, p.unit), p.exact_band ? range(...p.exact_band, p.unit) : "–"].map((text) => element("td", {}, text)))))));
 }
 
 /** The explanations with their probabilities, in words. */

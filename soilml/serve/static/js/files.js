@@ -8,7 +8,7 @@ import { dropModel } from "./model_box.js";
 
 const CASE = /^\s*\[(gear|gears\.|soil|rover)/m;
 
-/** `taken` has functions `runs(file, sheet, table)`, `logs(files, names, sheet)` and `map(text)`. */
+/** `taken` has functions `runs(file, sheet, table)`, `logs(files, names, sheet)`, `map(text)`, `wheel()`. */
 export function startFiles(largest, taken) {
   byId("drop-note").textContent = `CSV, Parquet, spreadsheets, MATLAB, MCAP, bags, TOML; up to ${bytes(largest)} each`;
   const input = byId("file");
@@ -60,7 +60,10 @@ async function take(files, largest, taken) {
 async function takeToml(file, taken) {
   const text = await file.text();
   if (!CASE.test(text)) return taken.map(text);
-  if (await dropModel(text, file.name)) byId("model-box").scrollIntoView({ block: "nearest" });
+  if (await dropModel(text, file.name)) {
+    byId("model-box").scrollIntoView({ block: "nearest" });
+    await taken.wheel();
+  }
   else throw new Error(`${file.name} is not taken: ${byId("choice-error").textContent}`);
   return null;
 }

@@ -13,7 +13,7 @@ const COLUMNS = { torque: ["torque_Nm", 1], pull: ["drawbar_pull_N", 1], sinkage
 const NEAR = 0.1; // readings under loads that differ by less are drawn beside the curves
 const OPEN = 2; // groups of sliders that are open at first
 
-const state = { model: "", modelName: "", sliders: new Map(), answer: null, held: null, readings: null };
+const state = { model: "", modelName: "", sliders: new Map(), wheelKnown: false, answer: null, held: null, readings: null };
 const plots = {};
 let generation = 0, busy = false, again = false;
 
@@ -25,6 +25,20 @@ export function chosen() {
   return { ...own, values };
 }
 
+/** Whether somebody has said which wheel drove: by a choice, a slider, an answer or a file. */
+export const wheelIsKnown = () => state.wheelKnown || Boolean(state.model);
+export const setWheelKnown = (known) => { state.wheelKnown = known; };
+
+/** The sliders of the wheel's sizes, and the list of wheels. */
+export const sizesOfWheel = () => ["gear.radius", "gear.width", "gear.base"].map((path) => state.sliders.get(path)).filter(Boolean);
+export const wheelList = () => state.choices.wheels;
+
+/** Choose a wheel of the list. */
+export async function chooseWheel(id) {
+  byId("wheel").value = id;
+  await choose();
+}
+
 /** The dropped model file, or an empty text. */
 export const droppedModel = () => state.model;
 
@@ -32,7 +46,10 @@ export async function startForward(choices) {
   state.choices = choices;
   fillChoices(choices.first);
   makePlots();
-  byId("wheel").addEventListener("change", choose);
+  byId("wheel").addEventListener("change", () => {
+    state.wheelKnown = true;
+    return choose();
+  });
   byId("soil").addEventListener("change", choose);
   byId("reset").addEventListener("click", () => {
     for (const slider of state.sliders.values()) slider.set(slider.first);
@@ -97,7 +114,10 @@ async function loadControls() {
   const opened = new Map([...document.querySelectorAll("details.group")].map((d) => [d.dataset.title, d.open]));
   state.sliders = new Map();
   const groups = found.groups.map(({ title, controls }, i) => {
-    const made = controls.map((control) => new Slider(control, update));
+    const made = controls.map((control) => new Slider(control, (slider) => {
+      if (slider.path.startsWith("gear.")) state.wheelKnown = true;
+      return update();
+    }));
     for (const slider of made) state.sliders.set(slider.path, slider);
     return element("details", { class: "group", "data-title": title, open: opened.get(title) ?? i < OPEN },
       element("summary", {}, title), ...made.map((slider) => slider.place));
@@ -264,7 +284,8 @@ export function setRadius(radius) {
   const before = withUnit(slider.shown, slider.unit);
   slider.set(radius);
   update();
-  return `The wheel has now the radius of this log, ${withUnit(slider.shown, slider.unit)} (it had ${before}): set its width, too.`;
+  state.wheelKnown = false; // its width is another, too
+  return `The wheel has now the radius of this log, ${withUnit(slider.shown, slider.unit)} (it had ${before}).`;
 }
 
 /** Set soil parameters (SI units by path), as an estimate found them. */

@@ -1,7 +1,7 @@
 // The gap analysis: started by a button, cancelled by another, its verdict in words and maps.
 
 import { jobFile } from "./api.js";
-import { byId, element, showError, wordList } from "./dom.js";
+import { byId, element, fold, showError, wordList } from "./dom.js";
 import { currentTable } from "./estimate.js";
 import { number, percent } from "./format.js";
 import { work } from "./jobs.js";
@@ -19,7 +19,6 @@ export function startGap() {
     try {
       const done = await work("gap-job", { kind: "gap", ...currentTable(), model: modelOfEstimate() });
       if (done) show(done);
-      else showError("gap-error", "");
     } catch (error) {
       if (!modelFault(error.message)) showError("gap-error", error.message);
     } finally {
@@ -33,30 +32,31 @@ function show({ id, result }) {
   const suspected = files.find((name) => name.startsWith("model_suspected"));
   byId("gap-result").replaceChildren(...[
     verdict(result),
-    result.maps.length ? element("h3", {}, "Where the model disagrees") : null,
-    result.maps.length ? element("p", { class: "soft" }, `Scores in σ of the readings in a range of slip and load against the fit of the soil alone; ★ where significant, ▲ measured above the model, ▼ below. Probability of such a gap under noise alone: ${result.p_gap}.`) : null,
-    element("div", { class: "maps" }, ...result.maps.map(map)),
-    ...effects(result.effects), sizes(result.sizes), suspects(result.suspects), nextRuns(result.next_runs),
-    result.notes.length ? element("h3", {}, "The data") : null, wordList(result.notes),
     element("div", { class: "buttons" },
       element("a", { class: "button", href: jobFile(id, "report.html", true), target: "_blank", rel: "noopener" }, "Open the full report"),
-      element("a", { class: "button", href: jobFile(id, "report.html") }, "Save the report"),
       element("a", { class: "button", href: jobFile(id, "model.toml") }, "Save MODEL.toml"),
       suspected ? element("a", { class: "button", href: jobFile(id, suspected) }, "Save the suspected model") : null,
       element("a", { class: "button", href: jobFile(id, "next_runs.csv") }, "Save the next runs"),
+      element("a", { class: "button", href: jobFile(id, "report.html") }, "Save the report"),
       element("a", { class: "button", href: jobFile(id, "gap.json") }, "Save gap.json")),
+    fold("Why", element("p", {}, result.meaning), ...result.lines.map((line) => element("p", {}, line)),
+      wordList(result.reasons.filter((reason) => reason !== result.sentence))),
+    result.maps.length ? fold("Where the model disagrees",
+      element("p", { class: "soft" }, `Scores in σ of the readings in a range of slip and load against the fit of the soil alone; ★ where significant, ▲ measured above the model, ▼ below. Probability of such a gap under noise alone: ${result.p_gap}.`),
+      element("div", { class: "maps" }, ...result.maps.map(map))) : null,
+    fold("Effects and the size of the gap", ...effects(result.effects), sizes(result.sizes), suspects(result.suspects)),
+    fold("What to drive or check next", nextRuns(result.next_runs)),
+    fold("The data", wordList(result.notes)),
   ].filter(Boolean));
+  byId("gap").scrollIntoView({ block: "start" });
 }
 
 function verdict(result) {
-  const causes = result.causes.map((names) => names.map((c) => c.name).join(" + ")).join(", or ");
-  const texts = result.reasons.filter((reason) => reason !== result.sentence);
+  const next = result.next_runs[0];
   return element("article", { class: "verdict" },
-    element("p", {}, element("span", { class: "badge" }, result.status), result.meaning),
-    element("p", { class: "sentence" }, result.sentence),
-    ...result.lines.map((line) => element("p", {}, line)),
-    causes ? element("p", {}, element("b", {}, "Explanations: "), causes) : null,
-    wordList(texts), element("p", {}, element("b", {}, "What to do: "), result.advice));
+    element("p", { class: "sentence" }, element("span", { class: "badge" }, result.status), result.sentence),
+    element("p", {}, element("b", {}, "What to do: "), result.advice),
+    next ? element("p", {}, element("b", {}, "Next run: "), `${next.kind}, ${next.text}`) : null);
 }
 
 function cell(entry) {

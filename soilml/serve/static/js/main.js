@@ -2,7 +2,7 @@
 
 import { get } from "./api.js";
 import { byId, showError } from "./dom.js";
-import { startEstimate, takeTable } from "./estimate.js";
+import { startEstimate, takeTable, wheelAnswered } from "./estimate.js";
 import { startFiles } from "./files.js";
 import { startForward } from "./forward.js";
 import { startGap } from "./gap.js";
@@ -16,6 +16,7 @@ async function start() {
   startEstimate();
   startGap();
   startFiles(choices.largest_file, {
+    wheel: wheelAnswered,
     runs: (file, sheet, table) => {
       byId("map-panel").hidden = true;
       return takeTable(file, sheet, table);

@@ -1,6 +1,6 @@
 // Drawbar pull and slope against slip, with bands of the log and of the prior.
 
-import { element, wordList } from "./dom.js";
+import { element, fold, wordList } from "./dom.js";
 import { number, range, withUnit } from "./format.js";
 import { Plot, sweepPlots } from "./plots.js";
 
@@ -9,15 +9,17 @@ export function pullPlots(place, pull) {
   if (pull.reason) return place.replaceChildren(element("p", { class: "remark" }, pull.reason));
   if (pull.text) return place.replaceChildren(element("pre", { tabindex: "0" }, pull.text));
   const view = element("div");
-  const choose = element("select", { id: "pull-load", onchange: () => draw(view, pull, Number(choose.value)) },
+  const choose = element("select", { id: "pull-load" },
     ...pull.loads.map((one, i) => element("option", { value: String(i) }, `${one.gear ? `${one.gear}, ` : ""}${number(one.load)} N`)));
-  place.replaceChildren(
-    element("div", { class: "buttons" }, element("label", { for: "pull-load" }, pull.loads[0].gear ? "Wheel and load" : "Load"), choose),
-    view, ...[wordList(pull.warnings, "soft")].filter(Boolean));
-  return draw(view, pull, 0);
+  const most = element("p", { class: "facts" });
+  const choice = element("div", { class: "buttons" }, element("label", { for: "pull-load" }, pull.loads[0].gear ? "Wheel and load" : "Load"), choose);
+  place.replaceChildren(most, fold("Drawbar pull and slope against slip", choice, view, wordList(pull.warnings, "soft")));
+  const show = () => draw(view, most, pull, Number(choose.value));
+  choose.addEventListener("change", show);
+  return show();
 }
 
-function draw(view, pull, index) {
+function draw(view, most, pull, index) {
   const one = pull.loads[index];
   const figure = (title, unit) => {
     const reading = element("span", { class: "reading" }), plot = element("div", { class: "plot" });
@@ -25,11 +27,10 @@ function draw(view, pull, index) {
   };
   const left = figure("Drawbar pull", "N"), right = figure("Slope that is climbed", "°");
   const [pullKnown, slopeKnown] = one.known;
-  view.replaceChildren(
-    element("ul", { class: "words" },
-      element("li", {}, answer("Largest pull", one.largest_pull, "N", pullKnown, ` at slip ${number(one.best_slip[1], 2)}`)),
-      element("li", {}, answer("Steepest slope", one.steepest_slope, "°", slopeKnown, ""))),
-    ...[wordList(one.warnings, "remark")].filter(Boolean),
+  most.replaceChildren(
+    element("span", {}, answer(`Largest pull under ${number(one.load)} N`, one.largest_pull, "N", pullKnown, ` at slip ${number(one.best_slip[1], 2)}`)),
+    element("span", {}, answer("steepest slope", one.steepest_slope, "°", slopeKnown, "")));
+  view.replaceChildren(...[wordList(one.warnings, "remark")].filter(Boolean),
     element("div", { class: "pair" }, left.whole, right.whole),
     element("p", { class: "key", "aria-hidden": "true" }, element("span", { class: "k-posterior" }, "after the log, 90 % band"),
       element("span", { class: "k-prior" }, "before the log, 90 % band"), element("span", { class: "k-measured" }, "measured")));
@@ -43,7 +44,7 @@ function draw(view, pull, index) {
 function answer(name, [low, middle, high], unit, known, where) {
   return known
     ? `${name}: ${withUnit(middle, unit)} (90 %: ${range(low, high, unit)})${where}`
-    : `${name}: not known (90 %: ${range(low, high, unit)}); the log leaves most of the prior's width`;
+    : `${name}: not determined`;
 }
 
 function curves(figure, unit, slip, [low, middle, high], [before, , after], points, description) {
