@@ -11,6 +11,7 @@ from typing import Any, BinaryIO
 from tornado.web import Application, StaticFileHandler, stream_request_body
 
 from soilml.errors import InputError
+from soilml.serve.answers import design
 from soilml.serve.answers.chosen_case import choices, model_text
 from soilml.serve.answers.forward import controls, forward
 from soilml.serve.guarded_handler import GuardedHandler, RefusedError, check_parts
@@ -21,6 +22,7 @@ from soilml.serve.worker import KINDS
 STATIC = Path(__file__).parent / "static"  # The page's own files
 #: Largest body of a request that is no file, bytes: a model file and a map with room to spare.
 LARGEST_BODY = 2 << 20
+WITHOUT_FILES = ("design",)  # Kinds of jobs that read no dropped file
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript",
           ".svg": "image/svg+xml", ".json": "application/json", ".csv": "text/csv"}  # fmt: skip
 #: A report may style itself, which the page may not; it runs no script and loads nothing.
@@ -34,7 +36,8 @@ def application(folder: Path, port: int) -> tuple[Application, Jobs]:
     pool = ThreadPoolExecutor(1)
     shared = {"uploads": uploads, "jobs": jobs, "pool": pool}
     routes: list[Any] = [(r"/api/choices", Choices)]
-    for name, function in (("controls", controls), ("forward", forward), ("model", model_text)):
+    for name, function in (("controls", controls), ("forward", forward), ("model", model_text),
+                           ("design", design.question)):  # fmt: skip
         routes.append((rf"/api/{name}", Question, {"function": function, "pool": pool}))
     routes += [
         (r"/api/files", Files, {"uploads": uploads}),
@@ -173,7 +176,7 @@ class StartJob(GuardedHandler):
         kind = request.pop("kind", None)
         keys = request.pop("files", None)
         known = isinstance(kind, str) and kind in KINDS
-        if not known or not isinstance(keys, list) or not keys:
+        if not known or not isinstance(keys, list) or not (keys or kind in WITHOUT_FILES):
             raise RefusedError(400, f"needed is a kind ({', '.join(KINDS)}) and a list of files")
         files = [self._file(key) for key in keys]
         if kind in ("estimate", "gap"):

@@ -36,6 +36,7 @@ _PARTS: dict[str, type] = {
     "map": str,
     "sheet": str,
     "change": dict,
+    "question": str,
 }
 _KINDS: dict[type, str] = {str: "a text", dict: "an object"}
 #: What is said with a status that the server's library answers; others below 500 have the first.

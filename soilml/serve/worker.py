@@ -19,6 +19,7 @@ KINDS = {
     "import": ("logs", "import_logs"),
     "estimate": ("estimate", "answer"),
     "gap": ("gap", "answer"),
+    "design": ("design", "answer"),
 }
 
 

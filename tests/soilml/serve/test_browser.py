@@ -338,6 +338,39 @@ def test_the_sheet_of_a_spreadsheet_is_asked_for(tab, tmp_path):
     assert tab.locator("#estimate-error").is_hidden()
 
 
+def test_wheels_are_compared_for_a_slope(tab):
+    tab.get_by_label("Slope (deg)").fill("8")
+    tab.keyboard.press("Tab")
+    text = "document.querySelector('#design-text').value"
+    until(tab, f"{text}.includes('8 deg')")
+    tab.get_by_label("Width (mm), from").fill("300")
+    tab.keyboard.press("Tab")
+    until(tab, f"{text}.includes('[0.3, 0.14]')")
+    start = tab.get_by_role("button", name="Compare the wheels")
+    start.click()
+    tab.wait_for_selector("#design-error:not([hidden])", timeout=LONG)
+    box = "document.querySelector('#design-text')"
+    line = tab.evaluate(f"{box}.value.slice({box}.selectionStart, {box}.selectionEnd)")
+    assert line.startswith("width = [0.3, 0.14]")
+    tab.get_by_label("Width (mm), from").fill("100")
+    tab.keyboard.press("Tab")
+    until(tab, f"{text}.includes('[0.1, 0.14]')")
+    tab.get_by_role("button", name="leave out wang2016/kls1").click()
+    until(tab, f"!{text}.includes('kls1')")
+    tab.select_option("#design-effort", "quick")
+    start.click()
+    tab.wait_for_selector("#design-result .verdict", timeout=LONG)
+    assert "climbs 8 deg" in tab.locator("#design-result .sentence").inner_text()
+    assert tab.locator("#design-result table").first.is_hidden()
+    tab.get_by_text("The best design on each soil").click()
+    assert tab.locator("#design-result table").nth(1).is_visible()
+    for width, scheme in ((1280, "light"), (390, "dark")):
+        tab.emulate_media(color_scheme=scheme)
+        tab.set_viewport_size({"width": width, "height": 800})
+        until(tab, f"document.documentElement.scrollWidth <= {width}")
+        assert tab.evaluate(CONTRAST) == [] and tab.evaluate(NAMELESS) == []
+
+
 #: Contrast of every visible text with what is behind it, by WCAG 2; the worst ones.
 CONTRAST = """() => {
   const parse = (c) => (c.match(/[\\d.]+/g) || []).map(Number);

@@ -2,6 +2,7 @@
 
 import { get } from "./api.js";
 import { byId, showError } from "./dom.js";
+import { startDesign } from "./design.js";
 import { startEstimate, takeTable, wheelAnswered } from "./estimate.js";
 import { startFiles } from "./files.js";
 import { startForward } from "./forward.js";
@@ -25,6 +26,7 @@ async function start() {
     map: takeMap,
   });
   await startForward(choices);
+  await startDesign();
   document.documentElement.dataset.ready = "yes";
 }
 

@@ -1,0 +1,112 @@
+// Wheels of a rover for a slope: a form for the question, the verdict, pictures and tables.
+
+import { ask, jobFile } from "./api.js";
+import { byId, element, fold, jumpTo, options, saveText, showError, wordList } from "./dom.js";
+import { work } from "./jobs.js";
+
+const NAMES = { rover: "Rover", wheel: "Wheel", goal: "Goal", soil: "Soil" };
+const text = () => byId("design-text");
+
+export async function startDesign() {
+  byId("design-start").addEventListener("click", run);
+  byId("design-save").addEventListener("click", () => saveText("rover.toml", text().value));
+  text().addEventListener("change", () => change(null));
+  await change(null);
+}
+
+/** Change a figure on the server, and show the question as it is then. */
+async function change(what) {
+  const focus = document.activeElement?.id;
+  try {
+    const found = await ask("/api/design", { question: text().value, change: what });
+    text().value = found.question;
+    if (!byId("design-effort").options.length) {
+      options(byId("design-effort"), found.efforts.map((id) => ({ id, label: id })), "usual");
+    }
+    show(found.fields);
+    byId(focus)?.focus({ preventScroll: true });
+    showError("design-error", "");
+  } catch (error) {
+    fault(error.message);
+  }
+}
+
+function fault(message) {
+  showError("design-error", message);
+  if (message.includes("rover.toml")) jumpTo(text(), message);
+}
+
+function show(fields) {
+  const groups = new Map();
+  fields.forEach((field, i) => {
+    if (!groups.has(field.table)) groups.set(field.table, []);
+    groups.get(field.table).push(figure(field, i));
+  });
+  byId("design-form").replaceChildren(...[...groups].map(([table, rows]) =>
+    element("fieldset", {}, element("legend", {}, NAMES[table]), ...rows)));
+}
+
+function figure(field, i) {
+  const id = `design-${i}`, label = `${field.label}${field.unit ? ` (${field.unit})` : ""}`;
+  const set = (value) => change({ field: i, value });
+  const row = (...inputs) => element("p", { class: "open" }, element("label", { for: id }, label), ...inputs);
+  if (field.value === null) return row(element("input", { type: "text", id, disabled: true, placeholder: "in the text below" }));
+  if (field.kind === "choice") {
+    const list = element("select", { id, onchange: () => set(list.value) });
+    options(list, field.choices.map((name) => ({ id: name, label: name.replaceAll("_", " ") })), field.value);
+    return row(list);
+  }
+  if (field.kind === "names") return soils(field, id, label, set);
+  const values = field.kind === "range" ? [field.value[0], field.value.at(-1)] : [field.value];
+  const inputs = values.map((value, k) => element("input", {
+    type: "number", step: "any", inputmode: "decimal", id: k ? `${id}-to` : id, value: String(value),
+    "aria-label": field.kind === "range" ? `${label}, ${k ? "to" : "from"}` : undefined,
+    onchange: () => set(field.kind === "range" ? inputs.map((input) => input.valueAsNumber) : inputs[0].valueAsNumber) }));
+  return row(inputs[0], inputs[1] ? element("span", {}, "to") : null, inputs[1] ?? null);
+}
+
+/** The published soils: those of the question as buttons that take them out, and a list to add one. */
+function soils(field, id, label, set) {
+  const add = element("select", { id, onchange: () => add.value && set([...field.value, add.value]) });
+  options(add, [{ id: "", label: "add a soil" }, ...field.choices.filter((name) => !field.value.includes(name)).map((name) => ({ id: name, label: name }))], "");
+  return element("div", { class: "open" }, element("label", { for: id }, label), add,
+    ...field.value.map((name) => element("button", { type: "button", "aria-label": `leave out ${name}`, onclick: () => set(field.value.filter((other) => other !== name)) }, `${name} ×`)));
+}
+
+async function run() {
+  showError("design-error", "");
+  const button = byId("design-start");
+  button.disabled = true;
+  try {
+    const done = await work("design-job", { kind: "design", files: [], question: text().value, effort: byId("design-effort").value });
+    if (done) answer(done);
+  } catch (error) {
+    fault(error.message);
+  } finally {
+    button.disabled = false;
+  }
+}
+
+function answer({ id, result }) {
+  byId("design-result").replaceChildren(...[
+    element("article", { class: "verdict" },
+      element("p", { class: "sentence" }, element("span", { class: "badge" }, result.badge), result.verdict),
+      result.next ? element("p", {}, element("b", {}, "What would tell more: "), result.next) : null),
+    element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Pictures of the designs" },
+      element("img", { class: "picture", src: result.picture.image, alt: result.picture.alt })),
+    element("div", { class: "buttons" },
+      element("a", { class: "button", href: jobFile(id, "design_report.html", true), target: "_blank", rel: "noopener" }, "Open the full report"),
+      element("a", { class: "button", href: jobFile(id, "design.json") }, "Save design.json"),
+      element("a", { class: "button", href: jobFile(id, "rover.toml") }, "Save rover.toml")),
+    ...result.tables.map(table),
+    fold("Remarks", wordList(result.remarks, "remark")),
+  ].filter(Boolean));
+  byId("design-result").scrollIntoView({ block: "start" });
+}
+
+function table({ title, heads, rows }) {
+  return fold(`${title[0].toUpperCase()}${title.slice(1)}`,
+    element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": title },
+      element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
+        element("tbody", {}, ...rows.map((row) => element("tr", {}, ...row.map((cell, i) => element(i ? "td" : "th", i ? {} : { scope: "row" }, cell))))))));
+}

@@ -1,0 +1,115 @@
+"""The question which wheels climb a slope: its form, and its answer."""
+
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+from served_page import ROOT
+
+from soilml.errors import InputError
+from soilml.optional_imports import tomllib
+from soilml.rover_design.study import read_study
+from soilml.serve.answers import design
+
+
+def silent(*stage):
+    """Progress that nobody sees."""
+
+
+def field(answer, label):
+    """Number and content of a figure of the form."""
+    return next((i, f) for i, f in enumerate(answer["fields"]) if f["label"] == label)
+
+
+def changed(label, value, text=None):
+    """The text of the question after a change of one figure."""
+    answer = design.question({"question": text})
+    change = {"field": field(answer, label)[0], "value": value}
+    return design.question({"question": answer["question"], "change": change})["question"]
+
+
+def test_the_form_begins_with_the_example():
+    packaged = files("soilml.rover_design").joinpath("example.toml").read_text()
+    assert packaged == (ROOT / "examples" / "design" / "rover.toml").read_text()
+    answer = design.question({})
+    assert answer["question"] == packaged
+    shown = {f["label"]: f["value"] for f in answer["fields"]}
+    assert shown["Width"] == [40, 140] and shown["Slope"] == 15 and shown["Mass"] == [12]
+    assert shown["Centre of mass above the ground"] == 180 and shown["Gravity"] == "earth"
+    assert shown["Soils, each as likely"][1] == "wang2016/kls1"
+
+
+@pytest.mark.parametrize(
+    ("label", "value", "table", "key", "written"),
+    [
+        ("Width", [50, 90], "wheel", "width", [0.05, 0.09]),
+        ("Width", [60, 60], "wheel", "width", 0.06),
+        ("Mass", [8, 8], "rover", "mass", 8),
+        ("Centre of mass above the ground", 250, "rover", "centre_of_mass", [0.0, 0.25]),
+        ("Gravity", "moon", "rover", "gravity", "moon"),
+        ("Slope", 12.5, "goal", "slope", "12.5 deg"),
+        ("Risk of failing that is accepted", 20, "goal", "risk", 0.2),
+        ("Soils, each as likely", ["mckay1994/jsc-1"], "soil", "names", ["mckay1994/jsc-1"]),
+    ],
+)
+def test_a_figure_is_written_into_the_text(tmp_path, label, value, table, key, written):
+    text = changed(label, value)
+    before, after = tomllib.loads(design.question({})["question"]), tomllib.loads(text)
+    assert after[table][key] == written
+    after[table][key] = before[table].get(key)
+    before[table].setdefault(key, None)
+    assert after == before
+    assert "# m, from the first axle to the last" in text
+    (tmp_path / "rover.toml").write_text(text)
+    read_study(tmp_path / "rover.toml")
+
+
+def test_a_figure_that_has_another_form_is_left_to_the_text():
+    text = design.question({})["question"].replace("width = [0.04, 0.14]", "width = {values=[0.1]}")
+    assert field(design.question({"question": text}), "Width")[1]["value"] is None
+
+
+@pytest.mark.parametrize(
+    ("request_", "said"),
+    [
+        ({"question": "[rover]\nmass ="}, "no valid TOML"),
+        ({"change": {"field": 99, "value": 1}}, "needed is the number of a figure"),
+        ({"change": {"field": 0, "value": None}}, "needed is a number"),
+        ({"change": {"field": 13, "value": []}}, "at least one soil"),
+    ],
+)
+def test_what_cannot_be_written_is_said(request_, said):
+    with pytest.raises(InputError, match=said):
+        design.question(request_)
+
+
+@pytest.mark.slow
+def test_the_answer_is_that_of_the_command(tmp_path, monkeypatch):
+    from soilml import design as designed
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(design.EFFORTS, "quick", (6, 60))
+    text = changed("Slope", 8)
+    found = design.answer({"question": text, "effort": "quick"}, silent)
+    report = designed("rover.toml", designs=6, draws=60)
+    share = f"{100 * report.best['probability']:.0f} %"
+    assert share in found["verdict"] and found["met"] == report.met
+    assert found["picture"]["image"].startswith("data:image/svg+xml")
+    assert found["tables"][0]["title"] == "designs" and found["remarks"]
+    assert set(found["files"]) == {"design_report.html", "design.json", "rover.toml"}
+    assert (Path("out") / "rover.toml").read_text() == text
+
+
+def test_questions_that_the_page_does_not_take(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = design.question({})["question"]
+    rows = text[: text.index("[soil]")] + '[soil]\nmodel = "/etc/m.toml"\nruns = "r.csv"\n'
+    rows += text[text.index("[goal]") :]
+    with pytest.raises(InputError, match="use `soilml design` on the command line"):
+        design.answer({"question": rows}, silent)
+    Path("rover.toml").unlink()
+    with pytest.raises(InputError, match="effort is 'endless'"):
+        design.answer({"question": text, "effort": "endless"}, silent)
+    Path("rover.toml").unlink()
+    with pytest.raises(InputError, match=r"rover.toml \[rover\].*mass is missing"):
+        design.answer({"question": text.replace("\nmass =", "\n# mass =")}, silent)
