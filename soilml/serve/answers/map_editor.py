@@ -23,8 +23,9 @@ from soilml.log_import.guesses.map_edits import (
 )
 from soilml.log_import.guesses.map_text import draft_map, log_files
 from soilml.log_import.mapping.channel_map import ROLES
-from soilml.log_import.mapping.log_map import LogMap, read_map
+from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import read_log
+from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import WheelSeries
 from soilml.log_import.workflow import import_log
@@ -33,6 +34,7 @@ from soilml.serve.answers.job_files import Tell, setting_file
 MAP_FILE = "map.toml"  # Name of the map in messages
 _SPARK, _DRAWN = 60, 400  # Points of a picture of a column, and of a curve
 _MOST_COLUMNS = 200
+_ANY_SLIP = 0.2  # Slip of a map that lacks the radius; it is not drawn
 #: Units to choose from, by the unit of soilml.
 UNITS: dict[str, tuple[str, ...]] = {
     "rad/s": ("rad/s", "deg/s", "rpm", "count/s"), "rad": ("rad", "deg", "count"),
@@ -69,14 +71,21 @@ def edit(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "open": [vars(line) for line in open_lines(text)],
         "roles": _roles(look.content),
         "units": UNITS,
-        "columns": [_column(c, look) for c in look.columns[:_MOST_COLUMNS]],
+        "columns": [
+            _column(column, samples, look)
+            for column, samples in zip(look.columns, look.samples, strict=True)
+        ][:_MOST_COLUMNS],
         "more": max(0, len(look.columns) - _MOST_COLUMNS),
         "preview": _preview(names, look),
     }
 
 
 class _Look:
-    """Logs as a map reads them: the run that is drawn, its columns, and the map's channels."""
+    """Logs as a map reads them: the run that is drawn, its columns, and the map's channels.
+
+    Where the radius alone is missing, the map has a constant slip, so that load and torque can be
+    drawn.
+    """
 
     def __init__(self, names: Sequence[str], text: str) -> None:
         self.content = parsed(text)
@@ -88,19 +97,33 @@ class _Look:
             self.map = read_map(setting_file(MAP_FILE, text))
         except InputError as error:
             self.fault = str(error)
+            self.map = self._without_slip()
         # what is wrong with its channels does not hide the columns
-        logs = [read_log(name) for name in names[: 1 if self._one_file_a_run() else None]]
+        logs = [read_log(name) for name in names[: None if self.content.get("files") else 1]]
+        steady = self.map is not None and self.map.each_row
         try:
-            runs = runs_of(logs, self.map or LogMap(MAP_FILE, ()))
+            runs = _as_rows(logs) if steady else runs_of(logs, self.map or LogMap(MAP_FILE, ()))
         except InputError as error:
             self.fault = self.fault or str(error)
-            runs = [Run("log", tuple(r), tuple(np.arange(float(len(x))) for x in r)) for r in logs]
-        self.run = liveliest(runs)
-        steady = self.map is not None and self.map.each_row
-        self.columns = candidates_of(self.run.recordings, steady)
+            runs = _as_rows(logs)
+        run = liveliest(runs)
+        self.run = run
+        self.columns = candidates_of(run.recordings, steady)
+        self.samples = [values for own in run.recordings for values in own.columns.values()]
 
-    def _one_file_a_run(self) -> bool:
-        return not self.content.get("files")
+    def _without_slip(self) -> LogMap | None:
+        wheel = self.content.get("wheel", {})
+        if not isinstance(wheel, dict) or {"radius", "diameter"} & wheel.keys():
+            return None
+        try:
+            return map_from({**self.content, "slip": {"value": _ANY_SLIP}})
+        except InputError:
+            return None
+
+
+def _as_rows(logs: Sequence[Sequence[Recording]]) -> list[Run]:
+    """Logs without a clock: a sample each second, to be looked at."""
+    return [Run("log", tuple(r), tuple(np.arange(float(len(x))) for x in r)) for r in logs]
 
 
 def _changed(text: str, change: Mapping[str, Any], look: _Look) -> str:
@@ -133,7 +156,7 @@ def _words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def _column(column: Candidate, look: _Look) -> dict[str, Any]:
+def _column(column: Candidate, samples: Floats, look: _Look) -> dict[str, Any]:
     """A column with its picture, its role and what is marked of it."""
     channels = channels_of(look.content)
     path = next((p for p, t in channels.items() if column.address in columns_in(t)), "")
@@ -147,7 +170,7 @@ def _column(column: Candidate, look: _Look) -> dict[str, Any]:
         "low": column.about.low,
         "high": column.about.high,
         "constant": column.about.constant,
-        "spark": _thinned(look.run.find(column.address)[1], _SPARK).tolist(),
+        "spark": _thinned(samples, _SPARK).tolist(),
         "role": "time" if clock else path,
         "unit": str(own.get("unit", "")),
         "scaled": "scale" in own,
@@ -163,13 +186,16 @@ def _thinned(values: Floats, most: int) -> Floats:
 
 def _preview(names: Sequence[str], look: _Look) -> dict[str, Any]:
     """The curves of the first log, what physics objects to, or the error in words."""
-    if look.map is None or look.fault:
-        return {"error": " ".join(look.fault.split())}
+    fault = " ".join(look.fault.split())
+    if look.map is None:
+        return {"error": fault}
     first = names[:1] if not look.map.files else names
     try:
         found = import_log(list(first), look.map, accept=True)
     except SoilmlError as error:
-        return {"error": " ".join(str(error).split())}
+        return {"error": fault or " ".join(str(error).split())}
+    if fault:
+        return {"error": fault, "curves": [c for c in _curves(found) if c["quantity"] != "slip"]}
     hints = [
         {"text": hint.text, "about": list(hint.about), "wrong": hint in found.implausible}
         for hint in (*found.implausible, *found.remarks)

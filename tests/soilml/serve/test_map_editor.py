@@ -141,6 +141,32 @@ def test_a_wheel_of_several_is_changed_alone(tmp_path, monkeypatch):
     assert by_name(answer)["fl_torque"]["role"] == ""
 
 
+def test_without_a_radius_load_and_torque_are_drawn(ask):
+    text = ask()["map"]
+    start = text.index("radius =")
+    text = text[:start] + "# " + text[start:]
+    preview = ask(map=text)["preview"]
+    assert "radius" in preview["error"]
+    assert [c["quantity"] for c in preview["curves"]] == ["load", "torque"]
+    load = np.asarray(preview["curves"][0]["steady"])
+    assert np.nanmean(load) == pytest.approx(40.0, abs=1.0)
+
+
+@pytest.mark.parametrize("name", ["a_line_per_reading", "pull_curves"])
+def test_columns_of_other_kinds_of_logs(tmp_path, monkeypatch, name):
+    monkeypatch.syspath_prepend(str(ROOT / "tests" / "soilml" / "log_import"))
+    import described_rigs
+    import foreign_rigs
+
+    write = getattr(foreign_rigs, name, None) or getattr(described_rigs, name)
+    write(np.random.default_rng(0), tmp_path)
+    monkeypatch.chdir(tmp_path)
+    answer = edit({"names": sorted(f.name for f in tmp_path.iterdir())}, silent)
+    assert sum(bool(c["role"]) for c in answer["columns"]) >= 3
+    assert all(len(c["spark"]) > 2 for c in answer["columns"])
+    assert "no recording" not in answer["preview"]["error"]
+
+
 MAP = """# Map
 # CHANGE and NEEDED first
 
