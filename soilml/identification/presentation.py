@@ -17,7 +17,7 @@ from soilml.report import numbers
 from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.parameter_lines import ParameterLine, parameter_lines, parameter_table
+from soilml.report.parameter_lines import ParameterLine, headline, parameter_lines, parameter_table
 from soilml.report.terminal import interval, rounded, shown_unit
 
 _MOST_EXPLANATIONS = 4  # Most explanations that a terminal shows
@@ -65,8 +65,7 @@ def identify_report(
     head = {name: f"{by} {name}: " if by else "" for name in (*found, *failed)}
     if len(found) <= _MOST_SENTENCES:
         answer = [
-            (f"{numbers.capitalised(label)}: " if label else "")
-            + " ".join(line.sentence for line in own)
+            (f"{numbers.capitalised(label)}: " if label else "") + headline(own)
             for label, own in list(lines.items())[: len(found)]
         ]
     else:

@@ -46,6 +46,26 @@ class ParameterLine:
         return f"{numbers.capitalised(self.name)} = {value} (90 %: {range_})."
 
 
+def headline(lines: Sequence[ParameterLine]) -> str:
+    """All parameters in one sentence, without their intervals; what is not determined comes first.
+
+    >>> known = ParameterLine("cohesion c", "1.3 ± 0.2", "1.0 to 1.6", "kPa", 0.4)
+    >>> unknown = ParameterLine("modulus K", "20 ± 9", "6 to 35", "mm", 0.95)
+    >>> headline([known, unknown]).replace(chr(160), " ")
+    'Modulus K is not determined by these rows; cohesion c = 1.3 ± 0.2 kPa.'
+    """
+    parts = []
+    unknown = [line.name for line in lines if not line.known]
+    if unknown:
+        others = "".join(f", nor {name}" for name in unknown[1:])
+        parts.append(f"{unknown[0]} is not determined by these rows{others}")
+    for line in lines:
+        if line.known:
+            value = numbers.with_unit(line.value, line.unit).replace(" ", "\N{NO-BREAK SPACE}")
+            parts.append(f"{line.name} = {value}")
+    return f"{numbers.capitalised('; '.join(parts))}."
+
+
 def parameter_lines(
     names: Sequence[str],
     units: Sequence[str],

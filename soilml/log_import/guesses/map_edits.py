@@ -22,7 +22,7 @@ from soilml.optional_imports import tomllib
 _HEADER = re.compile(r"\s*\[([^\[\]]+)\]\s*(?:#.*)?$")
 _KEY = re.compile(r"\s*(#\s*)?([A-Za-z_]+)(\s*=\s*)(\"(?:[^\"\\]|\\.)*\"|'[^']*'|\[[^\]]*\]|[^#]*?)"
                   r"\s*(#.*)?$")  # fmt: skip
-_MARK = re.compile(r"#[^#]*\b(?:CHANGE|NEEDED)\b:?\s*(.*)$")
+_MARK = re.compile(r"#[^#]*\b(?:CHANGE|NEEDED)\b[:;]?\s*(.*)$")
 #: Keys of a channel that hold for whatever column it has.
 _KEPT = ("bias", "noise")
 
