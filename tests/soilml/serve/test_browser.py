@@ -182,9 +182,9 @@ def test_a_log_brings_the_radius_of_its_wheel(tab, tmp_path):
     tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
     assert number(tab, "gear-radius").input_value() == "110"
     assert "the radius of this log, 110" in tab.locator("#table-panel").inner_text()
-    tab.get_by_label("Width (mm)").fill("-3")
+    tab.get_by_label("Width (mm)", exact=True).fill("-3")
     assert "needed is a value" in tab.locator("#ask-gear-width-error").inner_text()
-    tab.get_by_label("Width (mm)").fill("90")
+    tab.get_by_label("Width (mm)", exact=True).fill("90")
     tab.keyboard.press("Enter")
     tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
     assert tab.locator("#estimate-error").is_hidden()
