@@ -174,6 +174,29 @@ def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
     assert "MB unpacked" in refusal(file)
 
 
+def test_texts_that_cells_share_are_read(tmp_path):
+    """Spreadsheet programs keep texts in a part of their own."""
+    file = save(tmp_path / "runs.xlsx", A=RUNS)
+    inline = re.compile(rb't="inlineStr"><is><t>([^<]*)</t></is>')
+    texts = []
+
+    def shared(text):
+        texts.extend(inline.findall(text))
+        number = iter(range(len(texts)))
+        return inline.sub(lambda _: b't="s"><v>%d</v>' % next(number), text)
+
+    rewritten(file, "sheet1.xml", shared)
+    assert len(texts) == 6  # the header, and two names of runs
+    kind = b"application/vnd.openxmlformats-officedocument.spreadsheetml.sharedStrings+xml"
+    entry = b'<Override PartName="/xl/sharedStrings.xml" ContentType="%s"/></Types>' % kind
+    rewritten(file, "[Content_Types].xml", lambda text: text.replace(b"</Types>", entry))
+    space = b"http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    items = b"".join(b"<si><t>%s</t></si>" % text for text in texts)
+    with zipfile.ZipFile(file, "a") as book:
+        book.writestr("xl/sharedStrings.xml", b'<sst xmlns="%s">%s</sst>' % (space, items))
+    assert read_table(file)["run"].tolist() == ["a", "a"]
+
+
 @pytest.mark.parametrize("far", ["XFD2", "B1048576"])
 def test_a_far_cell_does_not_take_the_memory_of_a_sheet(tmp_path, monkeypatch, far):
     monkeypatch.setattr(spreadsheet, "MOST_CELLS", 10_000)
