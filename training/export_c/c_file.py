@@ -14,8 +14,6 @@ from soilml.onboard.set_contract import MEMORY_INPUTS, SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 from training.export_c.c_text import array, number
 from training.export_c.functions import (
-    ARRAYS,
-    WIDTH,
     GraphFunction,
     answer_function,
     single_function,
@@ -26,6 +24,7 @@ from training.export_c.graph_translation import rows_are_apart
 from training.export_c.interface import Interface, read_interface
 from training.export_c.program import Constant, SharedParts
 from training.export_c.single_precision import in_single_precision
+from training.export_c.stage_text import ARRAYS, WIDTH
 from training.export_c.tracker import tracker_values
 
 #: Bytes of an element, as all usual compilers have them; the C file checks what follows from it.
@@ -34,7 +33,12 @@ BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
 ROWS_PER_CALL = 32
 TEMPLATES = Path(__file__).parent / "templates"
 #: Functions of the C library in the kernels, by element type.
-_MATH = {"EXP": {"float": "expf", "double": "exp"}}
+_MATH = {
+    "EXP": {"float": "expf", "double": "exp"},
+    "SQRT": {"float": "sqrtf", "double": "sqrt"},
+    "FEW_ROWS": {"float": "20", "double": "20"},
+    "LEAST_REST": {"float": "1e-7f", "double": "1e-7"},
+}
 #: Entries of the metadata that tell one file from another, and what they were trained from.
 IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")
 #: Outputs that are one number for a row or set; others have one for each estimated quantity, or for
@@ -100,9 +104,7 @@ def write_c(
         "functions": functions,
         "arrays": _arrays(functions),
         "constants": [array(*parts) for parts in constants],
-        "kernels": [
-            kernel_text(kernel, kind, interface.small) for kernel, kind in sorted(shared.kernels)
-        ],
+        "kernels": kernel_texts(shared, interface.small),
         "unpacking": sorted(shared.unpacking),
         "rows": rows,
         "quantities": list(zip(fields["names"], fields["units"], strict=True)),
@@ -184,6 +186,20 @@ def _argument(interface: Interface, name: str) -> str:
         if field.name == name:
             return f"work->readings[{index}]"
     return f"&memory->context.{name}"
+
+
+def kernel_texts(shared: SharedParts, light: bool = False) -> list[str]:
+    """Texts of the kernels of a file, those that others call first."""
+    # one that calls another has a name after it, but for this one
+    ordered = sorted(shared.kernels, key=lambda kernel: (kernel[0] == "factor_rows", kernel))
+    texts = [kernel_text(kernel, kind, light) for kernel, kind in ordered]
+    helpers = [
+        f"{helper}_{kind}"
+        for kind in ("double", "float")
+        for helper in ("four", "plus_product")
+        if f"{helper}_{kind}" in "".join(texts)
+    ]
+    return [kernel_text(helper, "") for helper in helpers] + texts
 
 
 def kernel_text(name: str, kind: str, light: bool = False) -> str:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from training.export_c.tensor import Expression, Shape, Size, Tensor, strides
 
 WIDTH = 100  # Width of the lines that hold the numbers of an array
+LONG = 16  # Elements of a loop that stays one of a fixed length
 LARGEST_INT = 2**31 - 1  # The largest whole number that every C compiler's int holds (32 bits)
 
 
@@ -147,7 +148,13 @@ def _merge(sizes: list[Size], steps: list[list[Size]]) -> tuple[list[Size], list
     steps = [[own[axis] for axis in kept] for own in steps]
     for axis in range(len(sizes) - 1, 0, -1):
         both_variable = not sizes[axis].fixed and not sizes[axis - 1].fixed
-        if not both_variable and all(own[axis - 1] == own[axis] * sizes[axis] for own in steps):
+        # loops of a fixed number of elements are computed side by side by compilers
+        long = sizes[axis].fixed and sizes[axis].constant >= LONG and not sizes[axis - 1].fixed
+        if (
+            not both_variable
+            and not long
+            and all(own[axis - 1] == own[axis] * sizes[axis] for own in steps)
+        ):
             sizes[axis - 1] = sizes[axis - 1] * sizes[axis]
             del sizes[axis]
             for own in steps:

@@ -20,18 +20,16 @@ from soilml.onboard.set_contract import (
 )
 from training.export_c.graph_translation import added_rows, translate_graph
 from training.export_c.interface import Interface, input_shapes
-from training.export_c.program import MemoryPlan, Program, SharedParts, plan_memory
+from training.export_c.program import Program, SharedParts, plan_memory
+from training.export_c.stage_text import ARRAYS, WIDTH, stage_functions
 from training.export_c.tensor import Shape, Size, Tensor
 
-#: Names of the arrays of the working memory, by the type of their elements.
-ARRAYS = {"double": "doubles", "float": "floats", "int": "ints", "bool": "bools"}
 #: Element types of the constants that stand for inputs.
 DTYPES = {"double": np.float64, "float": np.float32, "int": np.int32, "bool": np.bool_}
 #: Counts that a function may be given: rows of readings, and rows of the state.
 ROWS, KEPT = "rows", "kept"
 #: Outputs that a step needs: the state, the counts, and which rows are in range.
 STEP_OUTPUTS = (*MEMORY_OUTPUTS, ROW_IN_RANGE)
-WIDTH = 100  # Width of lines of C
 
 
 @dataclass(frozen=True)
@@ -72,7 +70,9 @@ def update_function(
     inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size.of(KEPT)}, switch=True)
     program = Program(shared, {ROWS: rows, KEPT: interface.columns})
     added, *others = added_rows(model), *STEP_OUTPUTS[1:], *_answers(model)
-    function = graph_function("update_graph", model, program, inputs, [added, *others])
+    function = graph_function(
+        "update_graph", model, program, inputs, [added, *others], not interface.small
+    )
     outputs = {(MEMORY_OUTPUTS[0] if k == added else k): v for k, v in function.outputs.items()}
     return replace(function, outputs=outputs)
 
@@ -81,7 +81,8 @@ def answer_function(model: Any, interface: Interface, shared: SharedParts) -> Gr
     """The estimate from the state of a set."""
     inputs = _inputs(model, {ROWS: Size(0), KEPT: Size.of(KEPT)}, switch=True)
     program = Program(shared, {KEPT: interface.columns})
-    return graph_function("answer_graph", model, program, inputs, _answers(model))
+    wanted = _answers(model)
+    return graph_function("answer_graph", model, program, inputs, wanted, not interface.small)
 
 
 def _answers(model: Any) -> list[str]:
@@ -109,9 +110,14 @@ def _inputs(model: Any, counts: Mapping[str, Size], switch: bool) -> dict[str, T
 
 
 def graph_function(
-    name: str, model: Any, program: Program, inputs: Mapping[str, Tensor], wanted: Sequence[str]
+    name: str,
+    model: Any,
+    program: Program,
+    inputs: Mapping[str, Tensor],
+    wanted: Sequence[str],
+    in_tiles: bool = False,
 ) -> GraphFunction:
-    """Translate a graph and write the function.
+    """Translate a graph and write the function, and those of its stages, which it calls.
 
     Its parameters are the working memory, the counts of the program, the inputs that are read, and
     for each output a pointer that is set to it. It returns the length of an output of variable
@@ -120,11 +126,12 @@ def graph_function(
     given = tuple(program.bounds)
     state = inputs.get(MEMORY_INPUTS[0])
     unpacks = state is not None and state.value is None
-    found = translate_graph(model, program, inputs, wanted)
+    found = translate_graph(model, program, inputs, wanted, in_tiles)
     plan = plan_memory(program, frozenset(tensor.owner for tensor in found.values()))
     given_on = program.given | {tensor.owner for tensor in found.values()}
     read = [n for n, tensor in inputs.items() if tensor.name in given_on]
     varying = [t.shape[0] for t in found.values() if not t.count.fixed and t.rank > 1]
+    kinds = {tensor.name: tensor.kind for tensor in inputs.values()}
     parameters = [
         "WORK *work",
         *(["const MEMORY *memory"] if unpacks else []),
@@ -133,37 +140,25 @@ def graph_function(
         *(f"const {tensor.kind} **out_{key}" for key, tensor in found.items()),
     ]
     head = f"static {'int' if varying else 'void'} {name}({', '.join(parameters)})"
-    lines = [*textwrap.wrap(head, WIDTH, subsequent_indent=" " * 4), "{"]
-    lines += _statements(program, plan)
-    lines += [f"    *out_{key} = {tensor.name};" for key, tensor in found.items()]
+    stages, calls = stage_functions(name, program, plan, kinds)
+    lines = [*textwrap.wrap(head, WIDTH, subsequent_indent=" " * 4), "{", *calls]
+    for key, tensor in found.items():
+        place = tensor.name
+        if tensor.owner in program.memory:
+            kind = program.memory[tensor.owner][0]
+            at = f"work->{ARRAYS[kind]} + {plan.offsets[tensor.owner]}"
+            place = re.sub(rf"\b{tensor.owner}\b", at, tensor.name)
+        lines.append(f"    *out_{key} = {place};")
     lines += [f"    return {varying[0].c};"] if varying else []
     sizes = {k: (t.kind, t.count.constant if t.count.fixed else -1) for k, t in found.items()}
     code = " ".join(s.code for s in program.statements)
     names = {*re.findall(r"\bw\d+\b", code), *(tensor.owner for tensor in found.values())}
     return GraphFunction(
         name=name,
-        text="\n".join([*lines, "}"]),
+        text="\n\n".join([*stages, "\n".join([*lines, "}"])]),
         inputs=tuple(read),
         outputs=sizes,
         lengths=plan.lengths,
         unpacks=unpacks,
         constants=frozenset(names),
     )
-
-
-def _statements(program: Program, plan: MemoryPlan) -> list[str]:
-    """The statements of a program, each tensor declared where it is written first."""
-    lines: list[str] = []
-    born: set[str] = set()
-    for statement in program.statements:
-        if statement.comment:
-            text = f"/* {statement.comment} */"
-            lines += textwrap.wrap(text, WIDTH, initial_indent=" " * 4, subsequent_indent=" " * 7)
-        for own in statement.names:
-            if own not in born:
-                kind = program.memory[own][0]
-                place = f"work->{ARRAYS[kind]} + {plan.offsets[own]}"
-                lines.append(f"    {kind} *const {own} = {place};")
-                born.add(own)
-        lines.append(statement.code)
-    return lines

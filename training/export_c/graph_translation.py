@@ -10,15 +10,25 @@ import numpy as np
 
 from soilml.errors import ModelFileError
 from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_SWITCH
-from training.export_c.operators import OPERATORS
+from training.export_c.joined_nodes import joined
+from training.export_c.operators import OPERATORS as ONNX_OPERATORS
+from training.export_c.operators import together
 from training.export_c.operators.products import squares_of_product
-from training.export_c.program import Node, Program
+from training.export_c.point_stages import TILE, PointStage, in_stages
+from training.export_c.program import Node, Program, SharedParts
 from training.export_c.tensor import Size, Tensor
 from training.onnx_graph.builder import SHORTCUT, needed_nodes
 
+#: Operators of ONNX, and those that its nodes are joined to.
+OPERATORS = ONNX_OPERATORS | together.OPERATORS
+
 
 def translate_graph(
-    model: Any, program: Program, inputs: Mapping[str, Tensor], outputs: Sequence[str]
+    model: Any,
+    program: Program,
+    inputs: Mapping[str, Tensor],
+    outputs: Sequence[str],
+    in_tiles: bool = False,
 ) -> dict[str, Tensor]:
     """Append the computation of some outputs to a program.
 
@@ -29,6 +39,7 @@ def translate_graph(
     program: Receives the statements.
     inputs: Inputs of the graph by name: constants, or tensors that the C function is given.
     outputs: Outputs that are computed.
+    in_tiles: Whether points are computed a few at a time, where a graph treats them one by one.
 
     Raises `ModelFileError` for an operator, or a form of it, that is not known.
     """
@@ -40,9 +51,18 @@ def translate_graph(
     known |= inputs
     every = _with_sound_memory(_without_branches(model.graph, known))
     nodes, _ = needed_nodes(every, outputs)
+    steps: Sequence[Any] = nodes
+    if in_tiles:
+        nodes = steps = joined(nodes, known, outputs)
+        shapes, trial = dict(known), Program(SharedParts(), program.bounds)
+        tried = _Translation(trial, nodes, shapes, outputs, model.opset_import)
+        tried.add_all(nodes)
+        for name, product in tried.squared.items():  # only the squares of these are computed
+            left, right = (shapes[given] for given in product.input)
+            shapes[name] = Tensor(name, left.kind, (*left.shape[:-1], right.shape[-1]))
+        steps = in_stages(nodes, shapes, outputs)
     translation = _Translation(program, nodes, known, outputs, model.opset_import)
-    for place, node in enumerate(nodes):
-        translation.add(node, place)
+    translation.add_all(steps)
     return {name: program.stored(known[name]) for name in outputs if known[name].count != Size(0)}
 
 
@@ -70,6 +90,30 @@ class _Translation:
         self.made: dict[str, int] = {}  # where they were translated last
         state = known.get(MEMORY_INPUTS[0])
         self.state = None if state is None or state.value is not None else state
+
+    def add_all(self, steps: Sequence[Any]) -> None:
+        """Translate nodes, and stages of nodes that treat points one by one."""
+        for place, step in enumerate(steps):
+            if isinstance(step, PointStage):
+                self._add_stage(step)
+            else:
+                self.add(step, place)
+
+    def _add_stage(self, stage: PointStage) -> None:
+        """Translate a stage, whose inputs and outputs are stored for all points."""
+        made = {name for node in stage.nodes for name in node.output}
+        outside = {name for node in stage.nodes for name in node.input} - made
+        for name in sorted(outside & self.known.keys()):
+            if self.known[name].pending:
+                self.known[name] = self.program.stored(self.known[name])
+        known = {name: tensor for name, tensor in self.known.items() if name not in made}
+        with self.program.stage(stage.points):
+            for name in stage.tiled:
+                known[name] = self.program.tile_of(known[name], TILE)
+            inner = _Translation(self.program, stage.nodes, known, stage.outputs, self.opsets)
+            inner.add_all(stage.nodes)
+            for name in stage.outputs:
+                self.known[name] = self.program.whole_of(known[name], stage.points)
 
     def add(self, node: Any, place: int) -> None:
         """Translate the next node."""

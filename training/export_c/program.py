@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import ModelFileError
-from training.export_c.c_text import element_loops, leaves_of
+from training.export_c.c_text import element_loops, indices_of, leaves_of, nest, offset
 from training.export_c.tensor import Expression, Shape, Size, Tensor, kind_of_array, total
 
 LONGEST_EXPRESSION = 6  # Tensors that one expression reads at most; longer ones are hard to read
@@ -26,6 +27,7 @@ class Statement:
     names: tuple[str, ...]
     #: names whose elements are read before those of the first name are written, one by one
     replaceable: tuple[str, ...] = ()
+    stage: int = 0  # number of the stage of points that it belongs to; 0 for none
 
 
 Constant = tuple[str, NDArray[Any], str]  # Name, elements and C type of a constant array
@@ -66,6 +68,8 @@ class Program:
         self.statements: list[Statement] = []
         self.memory: dict[str, tuple[str, Shape]] = {}
         self.given: set[str] = set()
+        self.stages: dict[int, int] = {}  # points of each stage, by its number
+        self._stage = 0
         self._stored: dict[Tensor, Tensor] = {}
         self._comment = ""
 
@@ -81,8 +85,12 @@ class Program:
 
     def count(self, most: Size) -> str:
         """A new count, which statements must set; it is at most this size."""
+        return self.count_up_to(most.most(self.bounds))
+
+    def count_up_to(self, most: int) -> str:
+        """A new count, which statements must set; it is at most this number."""
         name = f"n{len(self.bounds)}"
-        self.bounds[name] = most.most(self.bounds)
+        self.bounds[name] = most
         return name
 
     def emit(self, code: str, *tensors: Tensor, replaceable: Iterable[Tensor] = ()) -> None:
@@ -93,8 +101,30 @@ class Program:
         self.given |= {t.owner for t in tensors if t.value is None and t.owner not in self.memory}
         names = tuple(dict.fromkeys(t.owner for t in tensors if t.owner in self.memory))
         places = tuple(t.owner for t in replaceable if t.owner in self.memory and not t.block_of)
-        self.statements.append(Statement(code, self._comment, names, places))
+        self.statements.append(Statement(code, self._comment, names, places, self._stage))
         self._comment = ""
+
+    @contextmanager
+    def stage(self, points: int) -> Iterator[None]:
+        """Statements within are those of some points at a time, those from `first` on."""
+        self._stage = len(self.stages) + 1
+        self.stages[self._stage] = points
+        yield
+        self._stage = 0
+
+    def tile_of(self, whole: Tensor, points: int) -> Tensor:
+        """The elements of some points, of those of all points along the last axis."""
+        whole = self.stored(whole)
+        part = self.new(whole.kind, (*whole.shape[:-1], Size(points)))
+        self.emit(_copied_points(part, whole, into_whole=False), part, whole)
+        return part
+
+    def whole_of(self, part: Tensor, points: int) -> Tensor:
+        """A tensor of all points, in which the elements of some are written."""
+        part = self.stored(part)
+        whole = self.new(part.kind, (*part.shape[:-1], Size(points)))
+        self.emit(_copied_points(part, whole, into_whole=True), whole, part)
+        return whole
 
     def computed(self, kind: str, shape: Shape, text: str, operands: Iterable[Tensor]) -> Tensor:
         """A tensor whose elements follow from those of others, by a C expression."""
@@ -143,6 +173,16 @@ class Program:
         lines = [f"    {out.name}[{i}] = {cast}{size.c};" for i, size in enumerate(sizes)]
         self.emit("\n".join(lines), out)
         return out
+
+
+def _copied_points(part: Tensor, whole: Tensor, into_whole: bool) -> str:
+    """C text that copies the points of a tile out of a tensor, or into it."""
+    sizes = (total(part.shape[:-1]), part.shape[-1])
+    i, j = indices_of(sizes)
+    of_part = f"{part.name}[{offset([sizes[1], Size(1)], [i, j])}]"
+    of_whole = f"{whole.name}[{offset([whole.shape[-1], Size(1), Size(1)], [i, 'first', j])}]"
+    target, source = (of_whole, of_part) if into_whole else (of_part, of_whole)
+    return nest(sizes, [i, j], f"{target} = {source};")
 
 
 @dataclass(frozen=True)
@@ -213,6 +253,11 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
         for name in statement.names:
             first.setdefault(name, index)
             last[name] = len(program.statements) if name in kept else index
+    for begin, end in _spans(program):  # what a stage shares with others lives during all of it
+        within = {n for s in program.statements[begin : end + 1] for n in s.names}
+        for name in within:
+            if first[name] < begin or last[name] > end:
+                first[name], last[name] = min(first[name], begin), max(last[name], end)
     needs = {name: _elements(program, name) for name in first}
     taken: dict[str, str] = {}  # whose place a tensor takes
     for index, statement in enumerate(program.statements):
@@ -227,7 +272,9 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
     offsets: dict[str, int] = {}
     lengths: dict[str, int] = {}
     placed: dict[str, list[tuple[int, int, int, int]]] = {}  # by type: first, last, start, end
-    for name in sorted(first.keys() - taken.keys(), key=lambda name: (-needs[name], first[name])):
+    for name in sorted(
+        (name for name in first if name not in taken), key=lambda name: (-needs[name], first[name])
+    ):
         kind, need = program.memory[name][0], needs[name]
         others = placed.setdefault(kind, [])
         busy = sorted(
@@ -245,6 +292,15 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
         lengths[kind] = max(lengths.get(kind, 0), start + need)
     offsets |= {name: offsets[place] for name, place in taken.items()}
     return MemoryPlan(offsets, lengths)
+
+
+def _spans(program: Program) -> list[tuple[int, int]]:
+    """First and last statement of each stage of points."""
+    places: dict[int, list[int]] = {}
+    for index, statement in enumerate(program.statements):
+        if statement.stage:
+            places.setdefault(statement.stage, []).append(index)
+    return [(found[0], found[-1]) for found in places.values()]
 
 
 def _elements(program: Program, name: str) -> int:

@@ -10,11 +10,12 @@ from compiled_c import COMPILERS, TYPES, WARNINGS
 from onnx import TensorProto, helper, numpy_helper
 
 from soilml.errors import ModelFileError
-from training.export_c.c_file import kernel_text
+from training.export_c.c_file import kernel_texts
 from training.export_c.c_text import array
-from training.export_c.functions import ARRAYS, graph_function
+from training.export_c.functions import graph_function
 from training.export_c.operators import OPERATORS
 from training.export_c.program import Program, SharedParts
+from training.export_c.stage_text import ARRAYS
 from training.export_c.tensor import Size, Tensor, kind_of_array, shape_of
 
 RNG = np.random.default_rng(0)
@@ -137,11 +138,11 @@ def library(folder, functions, shared):
     members = " ".join(f"{k} {ARRAYS[k]}[{length}];" for k, length in lengths.items())
     text = "\n".join(
         [
-            "#include <math.h>\n#include <stdbool.h>",
+            "#include <math.h>\n#include <stdbool.h>\n#include <string.h>",
             f"typedef struct {{ {members} }} WORK;",
             "WORK work;",
             *(array(*parts) for parts in shared.constants.values()),
-            *(kernel_text(*kernel) for kernel in sorted(shared.kernels)),
+            *kernel_texts(shared),
             *(f.text.removeprefix("static ").replace("static ", "") for f in functions),
         ]
     )

@@ -17,6 +17,7 @@ LIBRARY = {
 }
 #: Largest stack by file that the page states, bytes, where float is 4 and double 8.
 STACK = {"wheel_linear": 1000, "slip_torque": 1000, "wheel_lssvm": 20_000, "wheel": 12_000}
+LINES = 150  # Largest number of lines of a function that the page states
 BOUNDED = ("static", "dynamic,bounded")  # Frames whose size gcc knows, or its largest value
 SMALL = [name for name in STACK if name != "wheel"]
 gcc = pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
@@ -42,7 +43,7 @@ def deepest(name, stack, calls, above=()):
     """Bytes of stack of a function with all that it calls."""
     assert name not in above, f"{name} calls itself"
     below = [deepest(other, stack, calls, (*above, name)) for other in calls.get(name, ())]
-    return (stack[name] or 0) + max(below, default=0)
+    return (stack.get(name) or 0) + max(below, default=0)
 
 
 @gcc
@@ -66,6 +67,14 @@ def test_every_loop_counts_to_a_number_that_is_known_before_it_begins(name, expo
     assert not re.search(r"\b(while|goto|do|malloc|free|alloca|longjmp)\b", code)
     heads = re.findall(r"\bfor \((.*?)\)(?=\s*[\n{])", code)
     assert heads and all(head.count(";") == 2 and head.split(";")[1].strip() for head in heads)
+
+
+@pytest.mark.parametrize("name", [*SMALL, pytest.param("wheel", marks=pytest.mark.slow)])
+def test_no_function_is_longer_than_the_page_says(name, exported):
+    source = (exported(name) / f"{name}.c").read_text()
+    bodies = re.findall(r"^[a-z][^;={}]*\)\n\{\n(.*?)^\}", source, re.MULTILINE | re.DOTALL)
+    assert len(bodies) > 5
+    assert max(body.count("\n") for body in bodies) <= LINES
 
 
 @pytest.mark.slow

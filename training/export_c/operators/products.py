@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from training.export_c.c_text import element, indices_of, leaves_of, nest, number, offset
 from training.export_c.operators.rearrangement import transposed
 from training.export_c.program import Node, Program, Translation
-from training.export_c.tensor import Shape, Size, Tensor, broadcast, strides
+from training.export_c.tensor import Expression, Shape, Size, Tensor, broadcast, strides
 
 #: Constant matrices with fewer columns are multiplied as they are, though they be sparse.
 LEAST_SPARSE = 8
@@ -133,7 +133,7 @@ def _emit(
         tensor.name + (f" + {place}" if place != "0" else "")
         for tensor, place in zip((a, at.right, at.out), at.offsets, strict=True)
     ]
-    if transpose_b:
+    if transpose_b or (n == Size(1) and step == Size(1)):  # a column is a row by its side
         kernel, steps = program.shared.kernel("add_product_transposed", a.kind), row.c
     else:
         kernel, steps = program.shared.kernel("add_product", a.kind), f"{row.c}, {step.c}"
@@ -152,6 +152,10 @@ def _emit_by_rows(program: Program, a: Tensor, b: Tensor, alpha: float, out: Ten
     expression = a.expression
     assert expression is not None
     k, n = b.shape[1], b.shape[0]
+    below = _place_and_points(expression) if n == Size(1) and alpha == 1.0 else None
+    if below is not None:
+        _emit_shares_below(program, a.shape, below, b, out)
+        return
     row = program.new(a.kind, (k,))
     indices = indices_of(a.shape)
     inner = nest(
@@ -165,6 +169,39 @@ def _emit_by_rows(program: Program, a: Tensor, b: Tensor, alpha: float, out: Ten
     )
     body = nest(a.shape[:-1], indices[:-1], f"{{\n{inner}\n{call}\n}}")
     program.emit(body, row, out, b, *leaves_of(expression))
+
+
+def _place_and_points(expression: Expression) -> tuple[Tensor, Tensor] | None:
+    """Of places less points, limited to 0 to 1: places and points; None for another expression."""
+    for name, bound in (("at_most", 1.0), ("at_least", 0.0)):
+        inner, limit = [*expression.operands, None][:2]
+        if not expression.text.startswith(f"{name}_") or inner is None or inner.expression is None:
+            return None
+        if limit is None or limit.value is None or not np.array_equal(limit.value.flat, [bound]):
+            return None
+        expression = inner.expression
+    if expression.text != "{0} - {1}":
+        return None
+    place, points = expression.operands
+    fits = place.expression is None and place.shape[-1:] == (Size(1),)
+    return (place, points) if fits and points.expression is None else None
+
+
+def _emit_shares_below(
+    program: Program, shape: Shape, below: tuple[Tensor, Tensor], weights: Tensor, out: Tensor
+) -> None:
+    """The weight of the points below each place, with a step that is one wide."""
+    place, points = (program.stored(tensor) for tensor in below)
+    indices = indices_of(shape[:-1])
+    for name in ("at_least", "at_most"):
+        program.shared.kernel(name, out.kind)
+    kernel = program.shared.kernel("share_below", out.kind)
+    first, other = (
+        element(shape, Expression("{0}", (tensor,)), [*indices, "0"]) for tensor in (place, points)
+    )
+    target = offset(strides(shape[:-1]), indices)
+    code = f"{out.name}[{target}] = {kernel}({shape[-1].c}, {first}, &{other}, {weights.name});"
+    program.emit(nest(shape[:-1], indices, code), out, place, points, weights)
 
 
 def squares_of_product(program: Program, a: Tensor, b: Tensor, keepdims: bool) -> Tensor:

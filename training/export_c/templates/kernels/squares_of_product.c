@@ -1,43 +1,30 @@
-/*
- * y (n) = sums of squares of the columns of a b, with a (m x k) and b (k x n), both by rows. Of full
- * blocks of 32 columns, four rows of sums are formed side by side, as vector instructions do.
- */
+/* y (n) = sums of squares of the columns of a b, with a (m x k) and b (k x n), both by rows. */
 static void squares_of_product_REAL(int m, int k, int n, const REAL *a, const REAL *b, REAL *y)
 {
-    int j = 0;
-    for (; j + 32 <= n; j += 32) {
-        REAL total[32] = {0};
-        int i = 0;
-        for (; i + 4 <= m; i += 4) {
-            REAL s[4][32] = {{0}};
-            for (int p = 0; p < k; ++p) {
-                const REAL *left = a + i * k + p, *right = b + p * n + j;
-                for (int r = 0; r < 4; ++r)
-                    for (int q = 0; q < 32; ++q)
-                        s[r][q] += left[r * k] * right[q];
-            }
-            for (int r = 0; r < 4; ++r)
-                for (int q = 0; q < 32; ++q)
-                    total[q] += s[r][q] * s[r][q];
+    const int wide = n - n % 16;
+    four_REAL s[8];
+    for (int j = 0; j < wide; j += 16) {
+        four_REAL sum[4] = {{0}};
+        for (int i = 0; i < m - 1; i += 2) {
+            rows_of_product_REAL(k, n, a + i * k, k, 1, b + j, s);
+            for (int q = 0; q < 8; ++q)
+                sum[q % 4] = plus_product_REAL(sum[q % 4], s[q], s[q]);
         }
-        for (; i < m; ++i) {
-            REAL s[32] = {0};
-            for (int p = 0; p < k; ++p)
-                for (int q = 0; q < 32; ++q)
-                    s[q] += a[i * k + p] * b[p * n + j + q];
-            for (int q = 0; q < 32; ++q)
-                total[q] += s[q] * s[q];
+        if (m % 2 == 1) {
+            row_of_product_REAL(k, n, a + (m - 1) * k, 1, b + j, s);
+            for (int q = 0; q < 4; ++q)
+                sum[q] = plus_product_REAL(sum[q], s[q], s[q]);
         }
-        for (int q = 0; q < 32; ++q)
-            y[j + q] = total[q];
+        for (int q = 0; q < 4; ++q)
+            store_REAL(sum[q], y + j + 4 * q);
     }
-    for (; j < n; ++j) {
+    for (int j = wide; j < n; ++j) {
         y[j] = 0;
         for (int i = 0; i < m; ++i) {
-            REAL s = 0;
+            REAL sum = 0;
             for (int p = 0; p < k; ++p)
-                s += a[i * k + p] * b[p * n + j];
-            y[j] += s * s;
+                sum += a[i * k + p] * b[p * n + j];
+            y[j] += sum * sum;
         }
     }
 }
