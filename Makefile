@@ -7,7 +7,7 @@ export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-newest test-browser check models limit kls1 gap-real bench bench-gap bench-gap-quick fuzz faults disk-faults coverage mutation bounds endurance release lock sbom licences audit-packages docs clean
+.PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-newest test-browser check pages models limit kls1 gap-real bench bench-gap bench-gap-quick fuzz faults disk-faults coverage mutation bounds endurance release lock sbom licences audit-packages docs clean
 
 help: ## list the targets
 	@grep -E '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -54,6 +54,9 @@ test-browser: $(VENV)/.ready ## the live page with real clicks; needs Chromium: 
 check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \
 	  && $(BIN)/lint-imports > /dev/null && echo "format, types and layers hold"
+
+pages: $(VENV)/.ready ## write the blocks of pages that commands print; `tools/pages.py --check` compares them
+	@OMP_NUM_THREADS=1 $(BIN)/python tools/pages.py
 
 models: $(VENV)/.ready ## train the released models again, into exported/
 	@$(BIN)/python exported/make.py
