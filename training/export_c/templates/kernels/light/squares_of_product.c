@@ -39,8 +39,9 @@ static void squares_of_product_REAL(int m, int k, int n, const REAL *a, const RE
             y2 += r2 * r2 + s2 * s2 + t2 * t2 + u2 * u2;
             y3 += r3 * r3 + s3 * s3 + t3 * t3 + u3 * u3;
         }
+        const REAL *up = a + i * k;
         for (; i < m; ++i) {
-            const REAL *up = a + i * k, *right = b + j;
+            const REAL *right = b + j;
             REAL s0 = 0, s1 = 0, s2 = 0, s3 = 0;
             for (int p = 0; p < k; ++p) {
                 s0 += up[p] * right[0];
@@ -53,6 +54,7 @@ static void squares_of_product_REAL(int m, int k, int n, const REAL *a, const RE
             y1 += s1 * s1;
             y2 += s2 * s2;
             y3 += s3 * s3;
+            up += k;
         }
         y[j] = y0;
         y[j + 1] = y1;
