@@ -109,7 +109,7 @@ def counted_calls(folder: Path) -> list[CountedCall]:
 
     return [
         CountedCall("`Estimator.__call__`", lambda: estimator(slip=0.3, torque=4.2, load=60.0)),
-        CountedCall("`soilml identify --method nonlinear`", command("identify", *NONLINEAR), 55),
+        CountedCall("`soilml identify --method nonlinear`", command("identify", *NONLINEAR), 56),
         CountedCall(
             "`soilml identify`, which weighs the catalogue, without the files of effects",
             command("identify"),
