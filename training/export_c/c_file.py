@@ -193,13 +193,14 @@ def kernel_texts(shared: SharedParts, light: bool = False) -> list[str]:
     # one that calls another has a name after it, but for this one
     ordered = sorted(shared.kernels, key=lambda kernel: (kernel[0] == "factor_rows", kernel))
     texts = [kernel_text(kernel, kind, light) for kernel, kind in ordered]
-    helpers = [
-        f"{helper}_{kind}"
-        for kind in ("double", "float")
-        for helper in ("four", "plus_product")
-        if f"{helper}_{kind}" in "".join(texts)
-    ]
-    return [kernel_text(helper, "") for helper in helpers] + texts
+    helpers = []
+    for kind in ("double", "float"):
+        called = [f"{name}_{kind}" for name in ("four", "plus_product")]
+        for helper in [name for name in called if name in "".join(texts)]:
+            helpers.append(kernel_text(helper, ""))
+            if helper.startswith("four"):
+                helpers.append(kernel_text("products_in_fours", kind))
+    return helpers + texts
 
 
 def kernel_text(name: str, kind: str, light: bool = False) -> str:

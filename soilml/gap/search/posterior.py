@@ -23,8 +23,8 @@ IN_CATALOGUE = 0.95
 #: The same, relative to that, of an effect that explains the data by another law than the
 #: catalogue's: 1 of 4 on tuning sets, most of them with a cause outside the catalogue.
 OTHER_LAW = 0.3
-#: Rise of log odds, by half, from which rows speak for an effect; a gain that they leave at its
-#: prior is no suspect, however likely it was beforehand.
+#: Rise of log odds, by half, from which rows speak for an effect. One that they leave as likely as
+#: it was beforehand, such as a sensor's gain that nothing tests, is no further suspect.
 RAISED = 0.4
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
