@@ -63,14 +63,6 @@ def _shifted_arc() -> float:
     return float(np.rad2deg(shifted.entry - shifted.exit))
 
 
-#: Keys of inputs: wheel and sand of the catalogue have the printed values.
-INPUTS = frozenset(
-    (
-        *("radius", "width", "sensors", "diameter", "interval", "rim_speed", "saturation"),
-        *("deadband", "cohesion", "friction_angle", "modulus_flat"),
-    )
-)
-
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "radius": lambda: float(SensingWheel().radius),

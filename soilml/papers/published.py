@@ -5,7 +5,8 @@ from __future__ import annotations
 import csv
 import importlib
 import math
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib import resources
 
@@ -41,17 +42,37 @@ def chapters(name: str) -> tuple[str, ...]:
     return PAPERS[name].chapters or (name,)
 
 
+#: What a number is, as its row claims: code, and its name in tables.
+STATUSES = {
+    "reproduced": "reproduced independently",
+    "recovered": "recovered from its own input",
+    "arithmetic": "arithmetic on printed values",
+    "tuned": "tuned to match",
+    "missed": "missed, with reason",
+    "not_computed": "not computed: inputs not printed",
+    "given": "given: input or setting",
+    "own_check": "not printed: own check",
+    "wrong": "wrong: not what its row claims",
+}
+#: Statuses of rows whose computed number must lie within the tolerance.
+AGREEING = frozenset({"reproduced", "recovered", "arithmetic", "tuned", "own_check"})
+#: Units of orders and counts, which papers state in words or draw; all others are quantities.
+ORDINAL = frozenset({"rank", "legs"})
 #: Columns of the CSV file of a chapter.
-COLUMNS = ("key", "what", "source", "unit", "published", "tolerance", "reason")
+COLUMNS = (
+    *("key", "what", "source", "unit", "published", "tolerance"),
+    *("status", "counted_with", "reason"),
+)
 
 
 @dataclass(frozen=True)
 class PrintedNumber:
     """A number printed in a paper, with the tolerance within which a model must reproduce it.
 
-    `tolerance` is a fraction of the number where the file states per cent, else in its unit. A row
-    with a `reason` is known not to be reproduced; a row that nothing computes must have a reason.
-    An input (`is_input`) is kept by the model as printed: it is read back and is not a result.
+    `tolerance` is a fraction of the number where the file states per cent, else in its unit.
+    `claimed` is one of `STATUSES`; all but `reproduced` and `given` state a `reason`: what was put
+    in, or why the number is missed or not computed. `counted_with` names the row, KEY or PAPER:KEY,
+    that counts this number already; empty for a row that is counted.
     """
 
     paper: str
@@ -62,13 +83,14 @@ class PrintedNumber:
     published: float
     tolerance: float
     relative: bool
+    claimed: str
+    counted_with: str
     reason: str
-    is_input: bool
     compute: Callable[[], float] | None
 
     @property
     def allowed(self) -> float:
-        """Largest difference that counts as reproduced, in the number's unit."""
+        """Largest difference that counts as agreement, in the number's unit."""
         return self.tolerance * (abs(self.published) if self.relative else 1.0)
 
     def compare(self) -> Comparison:
@@ -79,20 +101,30 @@ class PrintedNumber:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A printed number, the computed one (NaN where nothing computes it), and the result."""
+    """A printed number, the computed one (NaN: nothing computes it), and if they agree."""
 
     row: PrintedNumber
     computed: float
-    reproduced: bool
+    agrees: bool
 
     @property
-    def verdict(self) -> str:
-        """yes, known, NO, given or not computed: see `soilml papers --help`."""
-        if self.reproduced:
-            return "given" if self.row.is_input else "yes"
-        if not self.row.reason:
-            return "NO"
-        return "not computed" if math.isnan(self.computed) else "known"
+    def status(self) -> str:
+        """The status that the row claims if the computed number bears it out, else `wrong`."""
+        claimed = self.row.claimed
+        if math.isnan(self.computed):
+            return claimed if claimed in ("not_computed", "given") else "wrong"
+        if claimed in AGREEING or claimed == "given":
+            return claimed if self.agrees else "wrong"
+        return "missed" if claimed == "missed" and not self.agrees else "wrong"
+
+
+def count_statuses(found: Iterable[Comparison]) -> dict[str, dict[str, int]]:
+    """Numbers by paper and status, each printed number once; only statuses that occur."""
+    counted = [c for c in found if not c.row.counted_with]
+    papers = dict.fromkeys(c.row.paper for c in counted)
+    counts = {paper: Counter(c.status for c in counted if c.row.paper == paper) for paper in papers}
+    occurring = [code for code in STATUSES if any(code in each for each in counts.values())]
+    return {paper: {code: each[code] for code in occurring} for paper, each in counts.items()}
 
 
 def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
@@ -103,7 +135,7 @@ def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
     Examples
     --------
     >>> number = next(printed_numbers("nagatani2009"))
-    >>> number.what, number.published, number.compare().verdict
+    >>> number.what, number.published, number.compare().status
     ('wheel radius', 0.055, 'given')
     """
     if paper is not None and paper not in PAPERS:
@@ -111,15 +143,14 @@ def printed_numbers(paper: str | None = None) -> Iterator[PrintedNumber]:
     for name in PAPERS if paper is None else (paper,):
         for chapter in chapters(name):
             module = importlib.import_module(f"soilml.papers.{chapter}")
-            inputs: frozenset[str] = getattr(module, "INPUTS", frozenset())
             text = resources.files("soilml.papers").joinpath(f"{chapter}.csv").read_text("utf-8")
             for entry in csv.DictReader(text.splitlines()):
                 compute = module.COMPUTED.get(entry["key"])
-                yield _parse_row(name, entry, compute, entry["key"] in inputs)
+                yield _parse_row(name, entry, compute)
 
 
 def _parse_row(
-    paper: str, entry: dict[str, str], compute: Callable[[], float] | None, is_input: bool
+    paper: str, entry: dict[str, str], compute: Callable[[], float] | None
 ) -> PrintedNumber:
     tolerance, relative = entry["tolerance"].strip(), entry["tolerance"].strip().endswith("%")
     return PrintedNumber(
@@ -131,7 +162,8 @@ def _parse_row(
         published=float(entry["published"]),
         tolerance=float(tolerance.rstrip("% ")) / 100.0 if relative else float(tolerance),
         relative=relative,
+        claimed=entry["status"],
+        counted_with=entry["counted_with"],
         reason=entry["reason"].strip(),
-        is_input=is_input,
         compute=compute,
     )

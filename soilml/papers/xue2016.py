@@ -140,8 +140,6 @@ def _least_readings(method: str, free: tuple[str, ...]) -> float:
     return float("nan")
 
 
-INPUTS = frozenset({"load", "theta_m", "theta_2"})  # Keys of inputs of the simplified wheel
-
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "load": lambda: float(_quadrature().load[1, 0]),
