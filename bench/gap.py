@@ -24,9 +24,9 @@ from gap_case import judged
 from gap_records import Judged, from_json
 
 from datagen.blind_sets.plans import Plan, benchmark_plans, plan_matrix
-from datagen.processes import process_map
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
+from soilml.processes import process_map
 
 #: Seeds of the published sets, on which nothing was tuned; the method was tuned on sets of others
 #: (0, 1, 2, 3, 4, 5, 7).

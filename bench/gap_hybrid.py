@@ -26,7 +26,6 @@ from gap_case import read_model
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan, benchmark_plans
-from datagen.processes import process_map
 from soilml.cli.progress import progress_bar
 from soilml.config.case import Case
 from soilml.fitting.operating_points import operating_points
@@ -34,6 +33,7 @@ from soilml.fitting.predictions import forces
 from soilml.gap import gap
 from soilml.io.atomic_files import save_text
 from soilml.io.table import Table
+from soilml.processes import process_map
 from soilml.quantities import CHANNELS, column
 
 #: Every so many rows are kept back, at random.

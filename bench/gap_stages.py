@@ -26,12 +26,12 @@ from gap_case import read_model
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan, active_mechanisms, benchmark_plans
-from datagen.processes import process_map
 from soilml.cli.progress import progress_bar
 from soilml.gap import gap
 from soilml.io.atomic_files import save_text
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
+from soilml.processes import process_map
 
 NONE = "none stated"
 #: Stage of a mechanism by the stage of the simulator at which it acts.

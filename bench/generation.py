@@ -20,9 +20,9 @@ import pyarrow.parquet as pq
 
 from datagen.dask_cluster import dask_map
 from datagen.generate import PART, WRITER
-from datagen.processes import process_map, usable_cores
 from datagen.recipe import Recipe, read_recipe
 from datagen.simulation import PIECE, Piece, data_schema, pieces, simulate_batch
+from soilml.processes import process_map, usable_cores
 
 #: Rows that are simulated for each line, unless an argument says otherwise.
 ROWS = 32 * PIECE

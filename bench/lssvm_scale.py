@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from datagen.generate import generate
-from datagen.processes import usable_cores
 from datagen.recipe import Block, read_recipe
 from soilml.io.atomic_files import atomic_output
+from soilml.processes import usable_cores
 from training.calibration.recalibration import Metrics, compute_metrics, recalibrate
 from training.dataset import Dataset, read_dataset
 from training.regressors.gaussian_regressor import FeatureSubset

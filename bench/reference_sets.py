@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from exact_sets import RankedPosterior, exact_set_posterior
 
-from datagen.processes import process_map
 from datagen.recipe import read_recipe
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel
+from soilml.processes import process_map
 from soilml.quantities import SHEAR
 from training.benchmark.designs import HASHED_DIGITS
 from training.set_posterior.families.recipe_family import RecipeFamily

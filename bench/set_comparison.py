@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from reference_sets import ReferenceSet
 from scipy.stats import chi2, chisquare
 
-from datagen.processes import process_map
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import ABSENT_STD, COMMON_ERROR_INPUTS
+from soilml.processes import process_map
 from training.benchmark.bayes_limit_file import BayesLimit
 from training.benchmark.paired_results import NOMINAL, jackknife_rmse_ratio_std
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily

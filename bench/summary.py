@@ -17,13 +17,13 @@ import physics
 from conftest import input_box, solved
 
 from datagen.generate import generate
-from datagen.processes import usable_cores
 from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating, Wheel, identify, read_table, soil
 from soilml.config.case import Case
 from soilml.gap import gap
 from soilml.identification.trained_estimator import for_simulated_case
 from soilml.io.table import Table
+from soilml.processes import usable_cores
 
 ROOT = Path(__file__).parents[1]
 REPEATS = 5

@@ -20,8 +20,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from datagen.processes import prepare_worker, usable_cores
 from soilml.errors import InputError, MissingLibraryError
+from soilml.processes import prepare_worker, usable_cores
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

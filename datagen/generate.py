@@ -17,11 +17,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from datagen.processes import process_map
 from datagen.recipe import Recipe
 from datagen.simulation import PIECE, Piece, data_schema, failed_rows, pieces, simulate_batch
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_output, create_folder
+from soilml.processes import process_map
 
 #: Settings of the Parquet files. A dictionary of numbers that do not repeat only takes time.
 WRITER: dict[str, Any] = {

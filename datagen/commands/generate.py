@@ -159,7 +159,7 @@ def _engine(args: argparse.Namespace) -> Engine:
     from functools import partial
 
     from datagen.dask_cluster import dask_map
-    from datagen.processes import FORKS, process_map
+    from soilml.processes import FORKS, process_map
 
     if args.engine == "dask":
         return partial(dask_map, workers=args.workers, scheduler=args.scheduler)

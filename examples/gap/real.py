@@ -24,10 +24,10 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 from benchmarks_file import TITLES, machine, page_file, source_state
 from measured_sets import PRIORS, SETS, MeasuredSet, model_text, table_text
 
-from datagen.processes import process_map
 from soilml.cli import main
 from soilml.cli.progress import progress_bar
 from soilml.io.atomic_files import save_text
+from soilml.processes import process_map
 
 HERE = Path(__file__).parent
 OUT = Path("demo/gap/real")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields, replace
-from os import cpu_count
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,15 +23,16 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.sinkage_estimate import coarse_estimate
 from soilml.physics.sinkage_search import equilibrium_near
 from soilml.physics.soils import Soil
+from soilml.processes import process_map, usable_cores
 from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.worlds import DrawnWorlds
 
 #: Slips of a sweep and of a reported design, as shares of the slip limit.
 SWEPT = np.asarray([0.12, 0.3, 0.55, 0.8, 1.0])
 REPORTED = np.asarray([0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0])
-#: Rows of wheel, slip and world that are solved at a time by a thread, which bounds the memory.
-BLOCK_ROWS = 60_000
-MOST_THREADS = 4
+#: Rows of wheel, slip and world that a process solves at a time, which bounds its memory. Worlds
+#: differ by their effects, and rows with one effect are solved together: few cost as much as many.
+BLOCK_ROWS = 300_000
 #: Of a rover, each slip and lug is reckoned by the rim, as `Grousers.rim_slip` says.
 RIM_SLIP = 1.0
 
@@ -108,31 +108,30 @@ def in_blocks(
     keep: Callable[[NDArray[np.int64], Outcomes], None],
     progress: Callable[[int], None] | None = None,
 ) -> None:
-    """Evaluate designs quickly, on the slips of a sweep, in blocks and by several threads.
+    """Evaluate designs quickly, on the slips of a sweep, in blocks and by several processes.
 
     keep: Given the numbers of some designs (b,) and their outcomes, which are not held.
     progress: Given the number of designs done.
     """
     count = len(designs["radius"])
     axles = max(1, int(designs["wheels"].max()) // 2)
-    size = max(1, BLOCK_ROWS // (worlds.count * len(SWEPT) * axles))
+    most = max(1, BLOCK_ROWS // (worlds.count * len(SWEPT) * axles))
+    size = max(1, min(most, count // usable_cores()))
     blocks = [np.arange(i, min(i + size, count)) for i in range(0, count, size)]
-
-    def solve(block: NDArray[np.int64]) -> Outcomes:
-        own = {name: column[block] for name, column in designs.items()}
-        return evaluate(study, own, worlds, shares=SWEPT, quick=True)
-
+    values = [{name: column[block] for name, column in designs.items()} for block in blocks]
+    solve = partial(_swept, study, worlds)
     done = 0
-    with ThreadPoolExecutor(min(MOST_THREADS, cpu_count() or 1)) as pool:
-        try:
-            for block, found in zip(blocks, pool.map(solve, blocks), strict=True):
-                keep(block, found)
-                done += len(block)
-                if progress is not None:
-                    progress(done)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    with process_map(solve, values) as results:
+        for block, found in zip(blocks, results, strict=True):
+            keep(block, found)
+            done += len(block)
+            if progress is not None:
+                progress(done)
+
+
+def _swept(study: DesignStudy, worlds: DrawnWorlds, designs: Mapping[str, Floats]) -> Outcomes:
+    """Quick outcomes of designs (k,) on the slips of a sweep."""
+    return evaluate(study, designs, worlds, shares=SWEPT, quick=True)
 
 
 def _of_equal_wheels(

@@ -17,10 +17,10 @@ from conftest import RECIPE
 from scipy.stats import qmc
 
 from datagen.generate import generate
-from datagen.processes import process_map
 from datagen.recipe import read_recipe
 from datagen.simulation import _skip, pieces
 from soilml.errors import InputError
+from soilml.processes import process_map
 
 
 def slow_first(number):
@@ -103,7 +103,7 @@ def is_alive(process):
 def test_workers_end_when_the_process_is_killed():
     code = (
         "import os, time\n"
-        "from datagen.processes import process_map\n"
+        "from soilml.processes import process_map\n"
         "def f(i):\n    time.sleep(0.2 * (i > 1)); return os.getpid()\n"
         "with process_map(f, range(1000), 2) as found:\n"
         "    print(next(found), next(found), flush=True); list(found)\n"

@@ -11,12 +11,12 @@ import pytest
 from conftest import RECIPE
 
 from datagen.generate import WRITER, generate, generate_folder
-from datagen.processes import process_map
 from datagen.recipe import read_recipe
 from datagen.simulation import pieces
 from soilml.cli import main
 from soilml.errors import InputError, TableError
 from soilml.io.read_table import read_table
+from soilml.processes import process_map
 
 BLOCKS = "[[runs]]\nrows = 1\nshare = 0.6\n[[runs]]\nrows = 8\nshare = 0.4\n"
 

@@ -11,9 +11,9 @@ from pathlib import Path
 import onnx
 
 from datagen.generate import generate
-from datagen.processes import limited_workers, process_map
 from datagen.recipe import Recipe, read_recipe
 from soilml.io.atomic_files import atomic_outputs, save_text
+from soilml.processes import limited_workers, process_map
 from soilml.quantities import SHEAR
 from training.adaptation.steps import ResumableSteps
 from training.dataset import read_dataset

@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 from numpy.polynomial.chebyshev import chebvander
 
-from datagen.processes import process_map
 from datagen.recipe import Recipe
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -22,6 +21,7 @@ from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.resampling import systematic_resampling
+from soilml.processes import process_map
 from training.benchmark.bayes_limit_file import FRACTIONS, HPD_DRAWS, PosteriorSummary
 from training.benchmark.designs import (
     DesignSets,

@@ -11,7 +11,6 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from datagen.processes import FORKS, process_map
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError
@@ -20,6 +19,7 @@ from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
+from soilml.processes import FORKS, process_map
 from soilml.quantities import Z_50, Z_90, column
 from training.benchmark.designs import select_channels
 from training.regressors.linear_gaussian import LinearGaussian

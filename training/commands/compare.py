@@ -115,7 +115,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("training.benchmark.suite", "compare")
-    from datagen.processes import limited_workers
+    from soilml.processes import limited_workers
 
     with limited_workers(args.workers):
         if args.limit is not None:

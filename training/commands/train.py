@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("training.train", "train")
-    from datagen.processes import limited_workers
+    from soilml.processes import limited_workers
     from training.spec import is_any_wheel_spec
 
     with limited_workers(args.workers):

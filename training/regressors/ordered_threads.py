@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from datagen.processes import usable_cores
+from soilml.processes import usable_cores
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")

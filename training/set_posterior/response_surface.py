@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
-from datagen.processes import process_map
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.set_contract import RESPONSE_CHANNELS
+from soilml.processes import process_map
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh
 from training.regressors.standardisation import Standardisation
 from training.regressors.tanh_network import TanhNetwork, evaluate_layers

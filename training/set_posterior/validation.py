@@ -10,7 +10,6 @@ from typing import Any, TypeVar
 import numpy as np
 from scipy.stats import chi2
 
-from datagen.processes import process_map
 from soilml.arrays import Floats
 from soilml.onboard.set_contract import (
     ABSENT_STD,
@@ -22,6 +21,7 @@ from soilml.onboard.set_contract import (
     RESPONSE_CHANNELS,
     empty_memory,
 )
+from soilml.processes import process_map
 from training.onnx_graph.builder import Graph, session_of
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.set_posterior.graph import SetPosteriorGraph

@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from datagen.processes import limited_workers
+from soilml.processes import limited_workers
 from training.regressors import exact_solution, nystrom_features
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from datagen.processes import limited_workers
+from soilml.processes import limited_workers
 from training.regressors.rbf_expansion import rbf
 from training.regressors.tiled_cholesky import TILE, TiledCholesky
 

@@ -5,8 +5,8 @@ from contextvars import copy_context
 import numpy as np
 import pytest
 
-from datagen.processes import FORKS, limited_workers, prepare_worker, process_map, usable_cores
 from datagen.recipe import read_recipe
+from soilml.processes import FORKS, limited_workers, prepare_worker, process_map, usable_cores
 from soilml.quantities import SHEAR
 from training.benchmark.bayes_limit import benchmark_sets
 from training.benchmark.methods import analytic_method

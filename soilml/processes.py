@@ -25,8 +25,6 @@ from multiprocessing.connection import wait
 from multiprocessing.process import BaseProcess
 from typing import Any, TypeVar
 
-from threadpoolctl import threadpool_limits
-
 from soilml.errors import InputError
 
 Item = TypeVar("Item")
@@ -70,7 +68,7 @@ def process_map(
     count = min(usable_cores() if workers is None else workers, len(items))
     if count <= 1:
         keep_freed_memory()
-        with threadpool_limits(1):
+        with _one_thread():
             yield map(function, items)
         return
     method = start_method or ("fork" if FORKS else "spawn")
@@ -89,8 +87,8 @@ def process_map(
         _end(pool, workers_here or set(multiprocessing.active_children()) - before)
         if isinstance(error, BrokenProcessPool):
             raise InputError(
-                f"one of {count} worker processes was killed, perhaps for want of memory; try "
-                "fewer with --workers"
+                f"one of {count} worker processes was killed, perhaps for want of memory; free "
+                "some, or take fewer workers"
             ) from None
         raise
     finally:
@@ -194,8 +192,15 @@ def prepare_worker() -> None:
 @cache
 def _prepare(process: int) -> None:
     _most.set(1)  # a task starts no workers of its own
-    threadpool_limits(1)
+    _one_thread()
     keep_freed_memory()
+
+
+def _one_thread() -> Any:
+    """One thread of linear algebra from here on; a context that ends that."""
+    from threadpoolctl import threadpool_limits
+
+    return threadpool_limits(1)
 
 
 @cache
