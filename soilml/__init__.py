@@ -47,6 +47,7 @@ _HOME = {
     "soil": "soilml.physics.soils",
     "soil_catalogue": "soilml.physics.soils",
     "design": "soilml.rover_design",
+    "export_soil": "soilml.soil_export",
     "Status": "soilml.row_status",
 }
 

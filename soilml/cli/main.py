@@ -38,6 +38,7 @@ friction angle and shear modulus, each with its uncertainty.
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
+  from soil to a simulator     soilml export-soil
   comparison of methods        soilml compare
   slopes that can be climbed   soilml pull (from measured rows)
                                soilml climb (from stress on the rims)
@@ -59,6 +60,7 @@ COMMANDS = {
     "simulate": "soilml.cli.commands.simulate",
     "identify": "soilml.cli.commands.identify",
     "bevameter": "soilml.cli.commands.bevameter",
+    "export-soil": "soilml.cli.commands.export_soil",
     "audit": "soilml.cli.commands.audit",
     "gap": "soilml.cli.commands.gap",
     "adapt": "training.commands.adapt",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.fitting.coordinates import select_free
 from soilml.identification.fit import Fit
 from soilml.io.text_tables import format_table
+from soilml.parameters import declared
+from soilml.physics.soils import Soil
 from soilml.remarks import Remark, about, texts
 from soilml.report import numbers
 from soilml.report.figure_style import picture
@@ -20,6 +23,8 @@ from soilml.report.parameter_figure import ParameterIntervals
 from soilml.report.parameter_lines import ParameterLine, headline, parameter_lines, parameter_table
 from soilml.report.terminal import interval, rounded, shown_unit
 
+#: Draws of the soil in the file: the standard error of a standard deviation is then 4 %.
+STORED_DRAWS = 400
 _MOST_EXPLANATIONS = 4  # Most explanations that a terminal shows
 _MOST_SENTENCES = 4  # Most results that the page describes in sentences; more are in its table
 
@@ -28,16 +33,18 @@ _MOST_SENTENCES = 4  # Most results that the page describes in sentences; more a
 class Identification:
     """A fit, and the next measurement that is advised.
 
-    `advice` has the further entries of the file that say the same as `next_rows`.
+    `advice` has the further entries of the file that say the same as `next_rows`, `soil` those of
+    the whole soil.
     """
 
     fit: Fit
     next_rows: tuple[Remark, ...] = ()
     advice: Mapping[str, Any] = field(default_factory=dict)
+    soil: Mapping[str, Any] = field(default_factory=dict)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file, for one fit."""
-        return self.fit.as_json() | dict(self.advice)
+        return self.fit.as_json() | dict(self.advice) | dict(self.soil)
 
     def text(self) -> str:
         """The fit as a table, its warnings, the exact model, and the advice."""
@@ -45,6 +52,29 @@ class Identification:
         second = [] if exact is None else ["", _exact_text(self.fit, exact)]
         messages = ["", *texts(self.next_rows)] if self.next_rows else []
         return "\n".join([_fit_text(self.fit), *second, *messages])
+
+
+def soil_entries(
+    case: Case, fit: Fit, free: Sequence[str] | None, with_draws: bool
+) -> dict[str, Any]:
+    """Entries of the file with which other programs know the whole soil, in SI units.
+
+    `model` has the effects and every parameter of the soil, at its value in the model file where it
+    was not identified. `draws` has equally likely values of the identified ones, where the method
+    drew samples and `with_draws`.
+    """
+    known = {name: float(getattr(case.soil, name)) for name in declared(Soil)}
+    found = dict(zip(fit.names, fit.values.tolist(), strict=True))
+    soil = {name: found.get(name, value) for name, value in known.items()}
+    effects = [effect.name for effect in case.model.effects]
+    entries: dict[str, Any] = {"model": {"soil": soil, "effects": effects}}
+    if with_draws and fit.samples is not None:
+        u = fit.samples.sample.u[fit.samples.equally_weighted(STORED_DRAWS)]
+        entries["draws"] = {
+            own.path: [float(f"{value:.7g}") for value in own.prior.at(u[:, i])]
+            for i, own in enumerate(select_free(case, free))
+        }
+    return entries
 
 
 def identify_report(

@@ -101,7 +101,11 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design.advice_after_results import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
-    from soilml.identification.presentation import Identification, identify_report
+    from soilml.identification.presentation import (
+        Identification,
+        identify_report,
+        soil_entries,
+    )
 
     table = read_rows(args, RUNS)
     effects = available_effects(args)
@@ -115,10 +119,11 @@ def run(args: argparse.Namespace) -> int:
     def solve(rows: Table) -> Identification:
         fit = identify(case, rows, free, args.method)
         advice = None if fit.samples is None else advice_after_fit(case, rows, free, fit)
+        soil = soil_entries(case, fit, free, with_draws=args.by is None)
         fit = replace(fit, samples=None)  # those of thousands of runs are not held together
         if advice is None:
-            return Identification(fit)
-        return Identification(fit, tuple(next_row_remarks(advice)), advice_as_json(advice))
+            return Identification(fit, soil=soil)
+        return Identification(fit, tuple(next_row_remarks(advice)), advice_as_json(advice), soil)
 
     found, failed = result_by_group(args, table, "identifying", solve)
     runs = {name: result.as_json() for name, result in found.items()}

@@ -45,6 +45,8 @@ _ERRORS = {
     "incertezza", "incertidumbre", "desv", "desviacion", "desviación", "ecart", "écart", "u",
     "标准差", "误差",
 }  # fmt: skip
+#: Words of a slip that is (r omega - v) / v: ISO 8855, and `GetLongitudinalSlip` of Chrono.
+_OF_TYRES = {"kappa", "long", "longitudinal"}
 _FILLERS = {
     "of", "the", "type", "standard", "estandar", "estándar", "mean", "avg", "average", "rel",
 }  # fmt: skip
@@ -160,8 +162,8 @@ def draft_of(
     if role == "slope" and column.address.endswith("orientation.pitch"):
         why = "of a quaternion (REP 103): there the nose is down where it is positive"
         draft.put("reverse", True, why)
-    if role == "slip" and "kappa" in words_of(column.name):
-        why = "of a kappa, as of tyres; remove this line where it is 1 - v/(r omega)"
+    if role == "slip" and _OF_TYRES & {*words_of(column.name)}:
+        why = "as of tyres, and of Chrono's rigs; remove this line where it is 1 - v/(r omega)"
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
@@ -47,6 +49,7 @@ _UNIT_SUFFICES = {
 }  # fmt: skip
 #: Least load, N, and largest range of a sinkage, mm, of columns without a unit.
 _LEAST_LOAD, _MOST_SINKAGE = 1.0, 900.0
+_FEWEST_PLACES = 10  # Fewest different values of a travel
 _CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
 _MOST_TEXTS = 12  # Most columns of text that are listed
 
@@ -182,6 +185,8 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
     monotone = own.travel > 0.6 or own.wraps_at > 0.0
     if role in ("wheel_angle", "position"):
         score += 1.5 if monotone else -2.5
+        if np.unique(values[np.isfinite(values)]).size < _FEWEST_PLACES:
+            score -= 4.0  # `s` of a few stages is a slip
     if role in ("wheel_speed", "ground_speed", "torque", "motor_current") and monotone:
         score -= 2.0
     if role == "load" and own.middle != 0.0:

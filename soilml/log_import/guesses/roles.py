@@ -148,6 +148,7 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
     ):
         # the load follows from the mass, on the slope that they show
         found.shared["slope"], found.parts["slope"] = angle[0], angle[1:]
+    _leave_constant_speeds(found)
     if {"wheel_speed", "wheel_angle", "rim_speed"} & found.roles() and (
         {"ground_speed", "position"} & found.roles()
     ):
@@ -156,6 +157,20 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
         if slip is not None:
             found.others.setdefault("slip", []).insert(0, slip)
     return found
+
+
+def _leave_constant_speeds(found: Assignment) -> None:
+    """Where a speed never changes, a slip that does is taken: a sensor is dead, or nothing is.
+
+    Simulated rigs write the speeds that they set, in which no sensor can be seen to live.
+    """
+    slip = found.shared.get("slip")
+    speeds = [r for r in ("wheel_speed", "rim_speed", "ground_speed") if r in found.shared]
+    if slip is None or slip.about.constant:
+        return
+    if any(found.shared[role].about.constant for role in speeds):
+        for role in {*speeds, "position", "wheel_angle"} & found.shared.keys():
+            found.others.setdefault(role, []).insert(0, found.shared.pop(role))
 
 
 def _take_unclear_slip(found: Assignment, candidates: Sequence[Candidate]) -> None:

@@ -21,6 +21,7 @@ from soilml.log_import.readers.text_layout import (
     decode_text,
     find_blocks,
     find_layout,
+    known_header,
     split_line,
 )
 from soilml.log_import.recording import Recording
@@ -68,6 +69,7 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
             "sample a line, separated by comma, semicolon, tab or spaces"
         )
+    layout = known_header(path, layout)
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
     if layout.decimal_comma:

@@ -1,0 +1,117 @@
+"""`soilml export-soil`: soil parameters for other simulators."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from soilml.cli.options import (
+    InputFile,
+    add_seed_option,
+    folder_outputs,
+    whole_number_from,
+)
+from soilml.errors import InputError
+from soilml.io.cell_text import read_number
+
+HELP = "soil parameters for Chrono, Gazebo, Isaac or a table"
+DESCRIPTION = """\
+Write the soil of FIT in the units and names of a simulator, with a README of
+the equations, of what is ignored and of what no wheel test reveals.
+
+  soilml identify MODEL.toml RUNS.csv --out result.json
+  soilml export-soil result.json --to chrono --out scm
+  soilml export-soil result.json --to chrono --out scm --draws 50
+  soilml export-soil MODEL.toml --to gazebo --out gazebo
+
+FIT is the file that `soilml identify --out` wrote, or a model file. Targets:
+  chrono      Project Chrono, deformable terrain SCM
+  chrono-crm  Project Chrono, continuum terrain CRM
+  gazebo      soil_params.yaml of gz-terramechanics, and friction of SDFormat
+  isaac       physics material for Isaac Sim and Isaac Lab: friction alone
+  csv         the parameters in SI units
+
+--draws N adds N soils of the posterior, a file each, for Monte Carlo runs. The
+posterior is that of the methods averaged and posterior; of a model file, draws
+are those of its priors. Parameters that rows cannot reveal, such as elastic_K
+of Chrono, have a default that is named as such; --set gives your value.
+
+FOLDER has the files, README.md, and export.json with the remarks. A warning
+says where one file hides that a parameter is not determined.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        "fit", type=InputFile, metavar="FIT", help="result.json of identify, or MODEL.toml"
+    )
+    parser.add_argument(
+        "--to", required=True, help="chrono, chrono-crm, gazebo, isaac or csv", metavar="TARGET"
+    )
+    parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the files")
+    parser.add_argument(
+        "--draws",
+        type=whole_number_from(0),
+        default=0,
+        metavar="N",
+        help="number of soils drawn from the posterior (default: 0)",
+    )
+    parser.add_argument(
+        "--set",
+        dest="given",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="value of a parameter of the target that rows cannot reveal; can be repeated",
+    )
+    parser.add_argument(
+        "--run", dest="run_name", metavar="NAME", help="which result of `identify --by`"
+    )
+    add_seed_option(parser)
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files of the folder that every export has."""
+    return folder_outputs("--out", args.out, ("README.md", "export.json"))
+
+
+def run(args: argparse.Namespace) -> int:
+    """Write the folder and say what is in it."""
+    from soilml.cli.output import show
+    from soilml.io.text_tables import format_table
+    from soilml.report.terminal import significant
+    from soilml.soil_export import export_soil
+
+    given: dict[str, float] = {}
+    for text in args.given:
+        name, equals, value = text.partition("=")
+        try:
+            given[name] = read_number(value)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise InputError(f"--set {text!r}: needed is NAME=NUMBER, such as elastic_K=1e8")
+    if not args.out:
+        raise InputError("--out is empty; needed is a folder")
+    words = getattr(args, "command_line", [])
+    export = export_soil(
+        args.fit,
+        args.to,
+        args.out,
+        draws=args.draws,
+        given=given,
+        run=args.run_name,
+        seed=args.seed,
+        words=words,
+    )
+    units = export.target.units
+    rows = [
+        (name, export.origin(name), significant(value), "" if units[name] == "1" else units[name])
+        for name, value in export.values.items()
+    ]
+    table = format_table(("parameter", "known from", "value", "unit"), rows, text_columns=2)
+    count = f", {len(export.draws)} draws" if export.draws else ""
+    head = f"{args.out}: {export.target.name}{count}; README.md says what is ignored"
+    show("\n".join([head, "", table, *(f"! {remark}" for remark in export.remarks)]))
+    return 0

@@ -1,0 +1,288 @@
+"""The folder of an export: a soil, draws of it, what they mean, and what they cannot mean."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from soilml.errors import InputError, did_you_mean
+from soilml.io.atomic_files import write_files
+from soilml.io.text_tables import csv_text
+from soilml.parameters import unit_text
+from soilml.remarks import Remark
+from soilml.report.page import Content, Provenance, json_text
+from soilml.report.terminal import significant
+from soilml.soil_export.known_soil import KnownSoil, read_known_soil
+from soilml.soil_export.targets import TARGETS, SoilTarget
+
+README, RECORD, DRAWS = "README.md", "export.json", "draws.csv"
+FORMAT_VERSION = 1  # Raised where a key of export.json changes its meaning or goes
+MOST_DRAWS = 9999
+
+
+@dataclass(frozen=True)
+class SoilExport:
+    """A soil in the terms of a program.
+
+    Attributes
+    ----------
+    target
+        The program.
+    known
+        What the file knows of the soil, in SI units.
+    values
+        Parameters by the program's names, in its units.
+    draws
+        The same of each draw.
+    given
+        Parameters that the user gave, by name.
+    remarks
+        What limits the files: codes `not-determined`, `not-measured`, `effects-lost`, `defaulted`.
+    """
+
+    target: SoilTarget
+    known: KnownSoil
+    values: dict[str, float]
+    draws: tuple[dict[str, float], ...]
+    given: dict[str, float]
+    remarks: tuple[Remark, ...]
+
+    def files(self, words: Sequence[str] = (), inputs: Iterable[str] = ()) -> dict[str, str]:
+        """The text of every file of the folder, by its name.
+
+        words: The words of the command line, for `export.json`.
+        inputs: Files that were read.
+        """
+        files = {name.format(""): text for name, text in self.target.files(self.values).items()}
+        digits = max(3, len(str(len(self.draws))))
+        for number, values in enumerate(self.draws, 1):
+            label = f"_{number:0{digits}d}"
+            own = self.target.files(values)
+            files |= {name.format(label): text for name, text in own.items()}
+        if self.draws:
+            columns = {name: [draw[name] for draw in self.draws] for name in self.values}
+            files[DRAWS] = csv_text(columns)
+        names = [*files, README, RECORD]
+        files[README] = readme(self, names)
+        files[RECORD] = json_text(self.as_json(names, Provenance.of(words, inputs)))
+        return files
+
+    def as_json(self, names: Sequence[str], origin: Provenance) -> dict[str, Any]:
+        """The content of `export.json`."""
+        units = self.target.units
+        parameters = {
+            name: {"value": value, "unit": units[name], "from": self.origin(name)}
+            for name, value in self.values.items()
+        }
+        return {
+            "format": "soilml-soil-export",
+            "version": FORMAT_VERSION,
+            "target": self.target.name,
+            "source": self.known.source,
+            "parameters": parameters,
+            "ignored": dict(self.target.ignored),
+            "draws": len(self.draws),
+            "remarks": [remark.as_json() for remark in self.remarks],
+            "written": list(names),
+            "command": origin.command,
+            "soilml_version": origin.version,
+            "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
+        }
+
+    def origin(self, name: str) -> str:
+        """Where the value of a parameter is from: `rows`, `model file`, `prior`, `given`, ..."""
+        for own in self.target.mapped:
+            if own.name == name:
+                return ", ".join(dict.fromkeys(self.known.origin[part] for part in own.soil))
+        return "given" if name in self.given else "default"
+
+
+def export_soil(
+    source: str | os.PathLike[str],
+    to: str,
+    out: str | os.PathLike[str] | None = None,
+    *,
+    draws: int = 0,
+    given: Mapping[str, float] | None = None,
+    run: str | None = None,
+    seed: int = 0,
+    words: Sequence[str] = (),
+) -> SoilExport:
+    """Write the soil of a fit, or of a model file, as a simulator takes it.
+
+    Parameters
+    ----------
+    source
+        result.json of `soilml identify --out`, or a model file.
+    to
+        A key of `TARGETS`.
+    out
+        Folder for the files; it is made where it is missing. None: nothing is written.
+    draws
+        Number of draws of the posterior, or of the priors of a model file, as files of their own.
+    given
+        Parameters of the program that no wheel test reveals, by name and in its unit.
+    run
+        Which result, where the file has one for each run.
+    seed
+        Seed of the choice of draws.
+    words
+        Words of the command line, for `export.json`.
+
+    Returns
+    -------
+    SoilExport
+
+    Raises
+    ------
+    InputError
+        For a target, a parameter or a run that does not exist, for values that the program would
+        misread, and where the source has not as many draws.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from pathlib import Path
+    >>> from soilml import export_soil
+    >>> text = '''
+    ... [gear]
+    ... type = "wheel"
+    ... radius = 0.15
+    ... width = 0.12
+    ... [soil]
+    ... name = "wong1989/dry_sand"
+    ... '''
+    >>> with TemporaryDirectory() as folder:
+    ...     model = Path(folder) / "model.toml"
+    ...     _ = model.write_text(text)
+    ...     export = export_soil(model, "chrono", Path(folder) / "chrono")
+    >>> print(export.values["Bekker_n"], round(export.values["Mohr_friction"], 2), "degrees")
+    1.1 28.0 degrees
+    """
+    if to not in TARGETS:
+        raise InputError(f"--to {to!r}; {did_you_mean(to, TARGETS)}there are: {', '.join(TARGETS)}")
+    target, given = TARGETS[to], dict(given or {})
+    _check_given(target, given)
+    if not 0 <= draws <= MOST_DRAWS:
+        raise InputError(f"--draws is {draws}; needed is a whole number from 0 to {MOST_DRAWS}")
+    known = read_known_soil(source, run)
+    remarks = list(known.remarks)
+    for own in target.asked:
+        if own.name not in given:
+            text = (
+                f"{own.name} = {own.default:g} {unit_text(own.unit)}".rstrip()
+                + f" is a default: {own.reason}; --set {own.name}=VALUE replaces it"
+            )
+            remarks.append(Remark("defaulted", text, (own.name,)))
+    values = target.values(known.values, given)
+    soils = known.drawn(draws, seed) if draws else []
+    drawn = tuple(target.values(soil, given) for soil in soils)
+    used = {part for own in target.mapped for part in own.soil}
+    kept = tuple(r for r in remarks if not _about_unused(r, used))
+    export = SoilExport(target, known, values, drawn, given, kept)
+    if out is not None:
+        _write(export, Path(out), words)
+    return export
+
+
+def _check_given(target: SoilTarget, given: Mapping[str, float]) -> None:
+    names = [own.name for own in target.asked]
+    for name in given:
+        if name not in names:
+            hint = f"there are: {', '.join(names)}" if names else f"{target.name} asks for none"
+            raise InputError(f"--set {name}: {did_you_mean(name, names)}{hint}")
+
+
+def _about_unused(remark: Remark, used: set[str]) -> bool:
+    """Whether a remark concerns only parameters that the program does not take."""
+    return remark.code in ("not-determined", "not-measured") and not used & {*remark.about}
+
+
+def _write(export: SoilExport, folder: Path, words: Sequence[str]) -> None:
+    """Write the folder as one set; draws of an earlier export there are removed."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"--out {folder} is a file; needed is a folder")
+    files: dict[Path, Content] = {
+        folder / name: text for name, text in export.files(words, [export.known.source]).items()
+    }
+    old = [path for path in _earlier(folder) if path not in files]
+    write_files(files, folders=[folder], remove=old)
+
+
+def _earlier(folder: Path) -> list[Path]:
+    """The files that an earlier export wrote into the folder."""
+    try:
+        names = json.loads((folder / RECORD).read_text(encoding="utf-8"))["written"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return []
+    plain = [name for name in names if isinstance(name, str) and Path(name).name == name]
+    return [folder / name for name in plain if (folder / name).is_file()]
+
+
+def readme(export: SoilExport, names: Sequence[str]) -> str:
+    """What the files of a folder are: equations, sources, defaults, what is ignored and lost."""
+    target, known = export.target, export.known
+    plain = [name for name in names if name not in (README, RECORD)]
+    shown = plain if len(plain) <= 5 else [*plain[:3], "...", plain[-1]]
+    lines = [
+        f"# Soil of {Path(known.source).name} for {target.name}",
+        "",
+        f"Written by `soilml export-soil` for {target.program}.",
+        f"Files: {', '.join(f'`{name}`' if name != '...' else name for name in shown)}.",
+        "`export.json` has the same in a form for programs, with checksums of what was read.",
+        "",
+        "## How the program reads them",
+        "",
+        target.loading,
+        "## Parameters",
+        "",
+        "| parameter | value | unit | known from | equation |",
+        "|---|---|---|---|---|",
+    ]
+    for own in target.mapped:
+        value = significant(export.values[own.name], 6)
+        row = (f"`{own.name}`", value, own.unit, export.origin(own.name), own.equation)
+        lines.append(f"| {' | '.join(row)} |")
+    for asked in target.asked:
+        value = significant(export.values[asked.name], 6)
+        reason = "given with --set" if asked.name in export.given else asked.reason
+        row = (f"`{asked.name}`", value, asked.unit, export.origin(asked.name), reason)
+        lines.append(f"| {' | '.join(row)} |")
+    lines += _intervals(known)
+    if target.ignored:
+        lines += ["", "## Ignored by the program", ""]
+        lines += [f"- `{name}`: {why}." for name, why in target.ignored.items()]
+    if target.lost:
+        lines += ["", "## What is lost", "", *(f"- {text}" for text in target.lost)]
+    if export.remarks:
+        lines += ["", "## Remarks", ""]
+        lines += [f"- {r.severity} `{r.code}`: {r}." for r in export.remarks]
+    if export.draws:
+        lines += [
+            "",
+            "## Draws",
+            "",
+            f"{len(export.draws)} equally likely soils, with the correlations of the parameters. "
+            "Simulate each, and take the spread of the results as that of the soil. `draws.csv` "
+            "has one row for each.",
+        ]
+    if target.sources:
+        lines += ["", "## Sources", "", *(f"- <{source}>" for source in target.sources)]
+    return "\n".join(lines) + "\n"
+
+
+def _intervals(known: KnownSoil) -> list[str]:
+    """The table of the identified parameters, in SI units."""
+    if not known.intervals:
+        return []
+    rows = [
+        f"| `{name}` | {significant(known.values[name])} | {significant(std)} | "
+        f"{significant(low)} to {significant(high)} |"
+        for name, (std, low, high) in known.intervals.items()
+    ]
+    head = ["", "Identified, in SI units:", "", "| parameter | value | std | 90 % interval |"]
+    return [*head, "|---|---|---|---|", *rows]

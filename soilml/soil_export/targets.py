@@ -1,0 +1,384 @@
+"""The programs that soils are written for: what they take, by which equation, what they ignore."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from soilml.errors import InputError
+from soilml.io.text_tables import csv_text
+from soilml.parameters import declared
+from soilml.physics.soils import Soil
+from soilml.report.page import json_text
+
+Values = Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class MappedParameter:
+    """A parameter of a program that follows from the soil.
+
+    `soil` are the parameters of `Soil` that it is made of; `value` computes it from them, in SI.
+    """
+
+    name: str
+    unit: str
+    equation: str
+    soil: tuple[str, ...]
+    value: Callable[[Values], float]
+
+
+@dataclass(frozen=True)
+class AskedParameter:
+    """A parameter of a program that no wheel test reveals, with its default and the reason for it.
+
+    `above` names a mapped parameter that it must exceed.
+    """
+
+    name: str
+    unit: str
+    default: float
+    reason: str
+    lower: float = 0.0
+    above: str = ""
+
+
+@dataclass(frozen=True)
+class SoilTarget:
+    """A program, or a part of one.
+
+    Attributes
+    ----------
+    name
+        What `--to` takes.
+    program
+        What it is, with the version or file that was read.
+    sources
+        Addresses of the documentation that units and equations are taken from.
+    mapped, asked
+        Its parameters.
+    ignored
+        Why it has no use for parameters of the soil, by name.
+    files
+        Text of each file from values by the program's names; `{}` in a file's name stands for the
+        label of a draw.
+    loading
+        How the program reads the files, as Markdown.
+    lost
+        What of the wheel's behaviour the program cannot show, in sentences.
+    check
+        Raises `InputError` for values that the program would misread.
+    """
+
+    name: str
+    program: str
+    sources: tuple[str, ...]
+    mapped: tuple[MappedParameter, ...]
+    asked: tuple[AskedParameter, ...]
+    ignored: dict[str, str]
+    files: Callable[[Values], dict[str, str]]
+    loading: str
+    lost: tuple[str, ...]
+    check: Callable[[Values], None] = lambda values: None
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each parameter."""
+        mapped = {own.name: own.unit for own in self.mapped}
+        return mapped | {own.name: own.unit for own in self.asked}
+
+    def values(self, soil: Values, given: Values) -> dict[str, float]:
+        """Every parameter by the program's name and in its unit.
+
+        Raises `InputError` for a value that the program would not take as meant.
+        """
+        found = {own.name: own.value(soil) for own in self.mapped}
+        for own in self.asked:
+            value = given.get(own.name, own.default)
+            least = max(own.lower, found[own.above] if own.above else own.lower)
+            if not (math.isfinite(value) and value >= own.lower) or (own.above and value <= least):
+                bound = f"above {own.above}, {least:g}" if own.above else f"{own.lower:g} or more"
+                raise InputError(
+                    f"{own.name} is {value:g} {own.unit}; {self.name} needs {bound}: give "
+                    f"--set {own.name}=VALUE"
+                )
+            found[own.name] = value
+        self.check(found)
+        return found
+
+
+def _same(name: str, unit: str, soil: str, equation: str) -> MappedParameter:
+    return MappedParameter(name, unit, equation, (soil,), lambda v: v[soil])
+
+
+def _friction(name: str) -> MappedParameter:
+    equation = "tan(friction_angle)"
+    return MappedParameter(
+        name, "1", equation, ("friction_angle",), lambda v: math.tan(v["friction_angle"])
+    )
+
+
+def _degrees(name: str) -> MappedParameter:
+    return MappedParameter(
+        name,
+        "deg",
+        "180/pi friction_angle, of Mohr-Coulomb: tau_max = c + sigma tan(phi)",
+        ("friction_angle",),
+        lambda v: math.degrees(v["friction_angle"]),
+    )
+
+
+_STRESS_ANGLE = "the pressure along the contact follows from depth, without an angle of its own"
+_NO_BEARING = "CRM has no pressure-sinkage law: bearing follows from density, friction and depth"
+_CHRONO = "https://github.com/projectchrono/chrono/blob/main/"
+
+_SCM_KEYS = {
+    "Bekker_Kphi": "Bekker Kphi", "Bekker_Kc": "Bekker Kc", "Bekker_n": "Bekker n",
+    "Mohr_cohesion": "Mohr Cohesion", "Mohr_friction": "Mohr Friction",
+    "Janosi_shear": "Janosi Shear", "elastic_K": "Elastic K", "damping_R": "Dampening R",
+}  # fmt: skip
+
+
+def _scm_files(values: Values) -> dict[str, str]:
+    content = {
+        "Name": "Soil by soilml",
+        "Type": "Terrain Properties",
+        "Template": "SCM Soil Parameters",
+        "Soil Parameters": {key: values[name] for name, key in _SCM_KEYS.items()},
+    }
+    return {"scm_soil{}.json": json_text(content)}
+
+
+def _crm_files(values: Values) -> dict[str, str]:
+    return {"crm_soil{}.json": json_text(dict(values))}
+
+
+def _gazebo_files(values: Values) -> dict[str, str]:
+    rows = [f"  {key}: {values[key]:.9g}" for key in ("k_c", "k_phi", "c", "phi", "K", "rho", "n")]
+    mu = f"{values['mu']:.9g}"
+    surface = (
+        '<?xml version="1.0"?>\n<surface>\n  <friction>\n    <ode>\n'
+        f"      <mu>{mu}</mu>\n      <mu2>{mu}</mu2>\n"
+        "    </ode>\n  </friction>\n</surface>\n"
+    )
+    return {
+        "soil_params{}.yaml": "\n".join(["soilml:", "  k: 0.0", *rows]) + "\n",
+        "surface{}.sdf": surface,
+    }
+
+
+def _check_gazebo(values: Values) -> None:
+    if values["k_phi"] == 0.0:
+        raise InputError(
+            "kphi is 0; gz-terramechanics computes its modulus from k_c and k_phi only where k_phi "
+            "is not 0: give kphi, which with kc / width carries the wheel"
+        )
+
+
+def _isaac_files(values: Values) -> dict[str, str]:
+    text = f"""#usda 1.0
+(
+    defaultPrim = "Soil"
+    doc = "Friction of a soil by soilml"
+)
+
+def Material "Soil" (
+    prepend apiSchemas = ["PhysicsMaterialAPI", "PhysxMaterialAPI"]
+)
+{{
+    float physics:staticFriction = {values["staticFriction"]:.9g}
+    float physics:dynamicFriction = {values["dynamicFriction"]:.9g}
+    float physics:restitution = {values["restitution"]:.9g}
+    uniform token physxMaterial:frictionCombineMode = "multiply"
+}}
+"""
+    return {"soil_material{}.usda": text}
+
+
+def _csv_files(values: Values) -> dict[str, str]:
+    units = [declared(Soil)[name].unit for name in values]
+    numbers = list(values.values())
+    text = csv_text({"parameter": list(values), "value": numbers, "unit": units})
+    return {"soil{}.csv": text}
+
+
+_CHRONO_SCM = SoilTarget(
+    name="chrono",
+    program="Project Chrono, deformable terrain SCM (`SCMTerrain::SetSoilParameters`)",
+    sources=(
+        f"{_CHRONO}src/chrono_vehicle/terrain/SCMTerrain.h",
+        f"{_CHRONO}src/chrono_vehicle/terrain/SCMTerrain.cpp",
+        f"{_CHRONO}src/chrono_vehicle/wheeled_vehicle/test_rig/ChWheelTestRig.cpp",
+    ),
+    mapped=(
+        _same("Bekker_Kphi", "N/m^(n+2)", "kphi", "kphi, of sigma = (Kc/b + Kphi) z^n"),
+        _same("Bekker_Kc", "N/m^(n+1)", "kc", "kc; 1/b is perimeter / (2 area) of the contact"),
+        _same("Bekker_n", "1", "n", "n"),
+        _same("Mohr_cohesion", "Pa", "cohesion", "cohesion, of tau_max = c + sigma tan(phi)"),
+        _degrees("Mohr_friction"),
+        _same("Janosi_shear", "m", "shear_modulus", "K, of tau = tau_max (1 - exp(-j/K))"),
+    ),
+    asked=(
+        AskedParameter(
+            "elastic_K", "Pa/m", 2e8,
+            "unloading was not measured; 2e8 is what Chrono's own ChWheelTestRig sets",
+            above="Bekker_Kphi",
+        ),
+        AskedParameter(
+            "damping_R", "Pa s/m", 3e4,
+            "damping was not measured; 3e4 is what Chrono's own ChWheelTestRig sets",
+        ),
+    ),
+    ignored={
+        "a0": _STRESS_ANGLE,
+        "a1": _STRESS_ANGLE,
+        "unit_weight": "SCM has no weight of the soil; bulldozing has parameters of its own",
+    },
+    files=_scm_files,
+    loading="""\
+```
+import json
+soil = json.load(open("scm_soil.json"))["Soil Parameters"]
+terrain.SetSoilParameters(*soil.values())  # in the order of the file, before Initialize
+```
+""",
+    lost=(
+        "SCM has no angle of maximum stress: pressure follows from the depth of each node.",
+        "Its width b is that of the contact patch, not that of the wheel: with kc other than 0, "
+        "the pressure at one depth differs.",
+        "Below elastic_K times depth, pressure is elastic; damping_R acts on all vertical motion.",
+    ),
+)  # fmt: skip
+
+_CHRONO_CRM = SoilTarget(
+    name="chrono-crm",
+    program="Project Chrono, continuum terrain CRM (`ChFsiFluidSystemSPH::SoilProperties`)",
+    sources=(
+        f"{_CHRONO}src/chrono_fsi/sph/ChFsiFluidSystemSPH.h",
+        "https://api.projectchrono.org/manual_fsi_mu_i_rheology.html",
+    ),
+    mapped=(
+        MappedParameter(
+            "density", "kg/m^3", "unit_weight / 9.80665 m/s^2", ("unit_weight",),
+            lambda v: v["unit_weight"] / 9.80665,
+        ),
+        _friction("mu_fric_s"),
+        _friction("mu_fric_2"),
+        _same("cohesion_coeff", "Pa", "cohesion", "cohesion, of tau_max = mu p + c"),
+    ),
+    asked=(
+        AskedParameter("Young_modulus", "Pa", 1e6, "not measured; the default of Chrono"),
+        AskedParameter("Poisson_ratio", "1", 0.3, "not measured; the default of Chrono"),
+        AskedParameter("mu_I0", "1", 0.03, "without effect while mu_fric_2 is mu_fric_s"),
+        AskedParameter("average_diam", "m", 0.005, "not measured; the default of Chrono"),
+    ),
+    ignored=dict.fromkeys(("kc", "kphi", "n"), _NO_BEARING) | {
+        "shear_modulus": "CRM shears by its Young's modulus, not by a displacement K",
+        "a0": _STRESS_ANGLE,
+        "a1": _STRESS_ANGLE,
+    },
+    files=_crm_files,
+    loading="""\
+Set the fields of these names of `SoilProperties` (`ElasticMaterialProperties` in earlier versions),
+and leave the rheology at `MU_OF_I`.
+""",
+    lost=(
+        "What was measured of bearing (kc, kphi, n) and of K is lost: check sinkage and pull "
+        "of one wheel in CRM against your rows.",
+    ),
+)  # fmt: skip
+
+_GAZEBO = SoilTarget(
+    name="gazebo",
+    program="Gazebo: soil_params.yaml of gz-terramechanics, and friction of SDFormat",
+    sources=(
+        "https://github.com/unitsSpaceLab/gz-terramechanics/blob/main/config/soil_params.yaml",
+        "https://github.com/unitsSpaceLab/gz-terramechanics/blob/main/src/TerramechanicsSystem.cc",
+        "http://sdformat.org/spec?elem=surface",
+    ),
+    mapped=(
+        _same("k_c", "N/m^(n+1)", "kc", "kc; the plugin takes k = k_c / b + k_phi"),
+        _same("k_phi", "N/m^(n+2)", "kphi", "kphi"),
+        _same("c", "Pa", "cohesion", "cohesion"),
+        _degrees("phi"),
+        _same("K", "m", "shear_modulus", "K, of tau = (c + sigma tan(phi)) (1 - exp(-j/K))"),
+        _same("rho", "N/m^3", "unit_weight", "unit_weight: rho is a weight, for bulldozing"),
+        _same("n", "1", "n", "n"),
+        _friction("mu"),
+    ),
+    asked=(),
+    ignored={
+        "a0": "gz-terramechanics puts the maximum stress at half the entry angle",
+        "a1": "gz-terramechanics puts the maximum stress at half the entry angle",
+    },
+    files=_gazebo_files,
+    loading="""\
+Take one of the two, not both: the plugin expects wheels without friction of their own.
+
+- `soil_params.yaml`: copy it into the folder `config_path` of the plugin gz-terramechanics, and
+  name the soil in `terrain_mapping.yaml`: `default_soil: soilml`.
+- `surface.sdf`: without the plugin, put `<surface>` into `<collision>` of the ground.
+""",
+    lost=(
+        "The plugin's stress is largest at theta_1 / 2, that of the fit at (a0 + a1 s) theta_1.",
+        "surface.sdf is Coulomb friction on rigid ground: no sinkage, no cohesion, no bearing, no "
+        "K. Its mu bounds the pull; `soilml pull` tells what is left of it at a slip.",
+    ),
+    check=_check_gazebo,
+)
+
+_ISAAC = SoilTarget(
+    name="isaac",
+    program="Isaac Sim and Isaac Lab: a physics material of USD for PhysX",
+    sources=(
+        "https://nvidia-omniverse.github.io/PhysX/physx/5.6.0/_api_build/structPxCombineMode.html",
+        "https://openusd.org/release/api/class_usd_physics_material_a_p_i.html",
+    ),
+    mapped=(_friction("staticFriction"), _friction("dynamicFriction")),
+    asked=(
+        AskedParameter("restitution", "1", 0.0, "not measured; the default of USD: no rebound"),
+    ),
+    ignored=dict.fromkeys(
+        ("cohesion", "shear_modulus", "kc", "kphi", "n", "a0", "a1", "unit_weight"),
+        "PhysX has no soil model: the ground is rigid, and friction has no cohesion",
+    ),
+    files=_isaac_files,
+    loading="""\
+Reference `soil_material.usda` in the stage and bind `/Soil` to the ground as physics material.
+Give the wheels a friction of 1: the combine mode is multiply, so that the pair has the soil's.
+PhysX takes the later of two modes in the order average, min, multiply, max.
+
+```
+sim_utils.RigidBodyMaterialCfg(
+    static_friction=..., dynamic_friction=..., friction_combine_mode="multiply"
+)
+```
+""",
+    lost=(
+        "Only tan(friction_angle) is kept. Sinkage, its resistance, cohesion, and the growth of "
+        "shear stress with slip are lost.",
+        "tan(friction_angle) bounds the pull of a wheel on soil: on this ground rovers climb more "
+        "than on yours. `soilml pull` tells what is left of it at a slip.",
+    ),
+)
+
+_CSV = SoilTarget(
+    name="csv",
+    program="a table in SI units, for any other program",
+    sources=(),
+    mapped=tuple(
+        _same(name, parameter.unit, name, parameter.text)
+        for name, parameter in declared(Soil).items()
+    ),
+    asked=(),
+    ignored={},
+    files=_csv_files,
+    loading="Rows are parameters, in SI units; angles are in radians.\n",
+    lost=(),
+)
+
+#: Every target by the name that `--to` takes.
+TARGETS: dict[str, SoilTarget] = {
+    target.name: target for target in (_CHRONO_SCM, _CHRONO_CRM, _GAZEBO, _ISAAC, _CSV)
+}

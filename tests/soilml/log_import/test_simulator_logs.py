@@ -1,0 +1,98 @@
+"""Logs of the wheel rigs of other simulators, with the names of their sources."""
+
+import numpy as np
+import pytest
+
+from soilml.log_import import import_log, init_map
+from soilml.optional_imports import tomllib
+
+#: Slip by 1 - v/(r omega), torque, pull and sinkage of three stages of 20 s, and the load.
+STAGES = ((0.1, 2.1, 9.0, 0.012), (0.3, 4.2, 18.0, 0.015), (0.5, 5.0, 20.0, 0.019))
+LOAD, RADIUS, OMEGA, STEP = 60.0, 0.15, 0.7, 0.05
+
+
+@pytest.fixture
+def samples():
+    rng = np.random.default_rng(3)
+    slip, torque, pull, sinkage = np.repeat(np.asarray(STAGES), round(20 / STEP), axis=0).T
+    noise = rng.standard_normal((4, slip.size))
+    time = STEP * np.arange(slip.size)
+    zero = np.zeros(slip.size)
+    return {
+        "time": time, "slip": slip, "zero": zero, "omega": np.full(slip.size, OMEGA),
+        "v": OMEGA * RADIUS * (1 - slip), "torque": torque + 0.05 * noise[0],
+        "pull": pull + 0.3 * noise[1], "load": LOAD + 0.3 * noise[2],
+        "sinkage": sinkage + 1e-4 * noise[3],
+    }  # fmt: skip
+
+
+def write(path, columns):
+    rows = [",".join(columns), *(",".join(f"{x:.7g}" for x in row) for row in zip(
+        *columns.values(), strict=True))]  # fmt: skip
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+def imported(folder, log, *edits):
+    """The table of a log by a guessed map with these edits."""
+    text = init_map([log])
+    for old, new in edits:
+        assert old in text, text
+        text = text.replace(old, new)
+    (folder / "map.toml").write_text(text)
+    return import_log([log], folder / "map.toml").table
+
+
+def test_chrono_wheel_test_rig(tmp_path, samples):
+    """In the order in which demo_VEH_WheelTestRig prints them; its slip is (r omega - v) / v."""
+    s = samples
+    columns = {
+        "time": s["time"], "long_slip": s["slip"] / (1 - s["slip"]), "slip_angle": s["zero"],
+        "camber_angle": s["zero"], "frc.x": s["pull"], "frc.y": s["zero"], "frc.z": s["load"],
+        "pnt.x": s["v"] * s["time"], "pnt.y": s["zero"], "pnt.z": -0.5 - s["sinkage"],
+        "trq.x": s["zero"], "trq.y": -s["torque"], "trq.z": s["zero"],
+    }  # fmt: skip
+    rows = imported(tmp_path, write(tmp_path / "rig.csv", columns))
+    found = np.stack([rows[c] for c in ("slip", "torque_Nm", "drawbar_pull_N")], axis=1)
+    assert found == pytest.approx(np.asarray(STAGES)[:, :3], rel=0.03)
+    assert rows["load_N"] == pytest.approx([LOAD] * 3, rel=0.01)
+
+
+def test_chrono_drawbar_pull_rig_without_a_header(tmp_path, samples):
+    """DBP.dat of ChVehicleCosimWheeledMBSNode: two spaces, seven digits, no names."""
+    s = samples
+    columns = (s["time"], s["v"], s["omega"], s["slip"], s["slip"], s["pull"], s["pull"])
+    lines = ["  ".join(f"{x:.7e}" for x in row) + "  " for row in zip(*columns, strict=True)]
+    log = tmp_path / "DBP.dat"
+    log.write_text("\n".join(lines) + "\n")
+    content = tomllib.loads(init_map([log]))
+    # the speed that the rig sets is constant: the slip that it writes is taken
+    assert content["slip"] == {"column": "slip", "unit": "1"}
+    assert not {"wheel_speed", "ground_speed"} & content.keys()
+    assert content["drawbar_pull"] == {"column": "DBP", "unit": "N"}
+    load = ("[windows]", '[load]\nvalue = "60 N"\n[windows]')
+    rows = imported(tmp_path, log, load)
+    assert rows["slip"] == pytest.approx([stage[0] for stage in STAGES], abs=0.005)
+    assert rows["drawbar_pull_N"] == pytest.approx([stage[2] for stage in STAGES], rel=0.02)
+    # the names are those of this file alone
+    log.rename(tmp_path / "other.dat")
+    assert "lin_vel" not in init_map([tmp_path / "other.dat"])
+
+
+def test_gz_terramechanics(tmp_path, samples):
+    """The topics /terra/WHEEL/state and /forces, whose data have the names of the source."""
+    s = samples
+    omega = s["omega"] + 1e-4 * np.sin(s["time"])  # as the controller of the joint lets it turn
+    columns = {
+        "time": s["time"], "omega": omega, "v_x": omega * s["v"] / OMEGA, "v_y": s["zero"],
+        "s": s["slip"],
+        "beta": s["zero"], "W": s["load"], "h_0": s["sinkage"], "F_x": s["pull"],
+        "F_y": s["zero"], "F_z": s["load"], "M_x": s["zero"], "M_y": -s["torque"],
+        "M_z": s["zero"],
+    }  # fmt: skip
+    rows = imported(tmp_path, write(tmp_path / "gz.csv", columns))
+    found = np.stack(
+        [rows[c] for c in ("slip", "torque_Nm", "drawbar_pull_N", "sinkage_m")], axis=1
+    )
+    assert found == pytest.approx(np.asarray(STAGES), rel=0.03)
+    assert rows["load_N"] == pytest.approx([LOAD] * 3, rel=0.01)
