@@ -16,7 +16,7 @@ from soilml.parameters import unit_text
 from soilml.remarks import Remark
 from soilml.report.page import Content, Provenance, json_text
 from soilml.report.terminal import significant
-from soilml.soil_export.known_soil import KnownSoil, read_known_soil
+from soilml.soil_export.source_soil import SourceSoil, read_source_soil
 from soilml.soil_export.targets import TARGETS, SoilTarget
 
 README, RECORD, DRAWS = "README.md", "export.json", "draws.csv"
@@ -45,7 +45,7 @@ class SoilExport:
     """
 
     target: SoilTarget
-    known: KnownSoil
+    known: SourceSoil
     values: dict[str, float]
     draws: tuple[dict[str, float], ...]
     given: dict[str, float]
@@ -169,7 +169,7 @@ def export_soil(
     _check_given(target, given)
     if not 0 <= draws <= MOST_DRAWS:
         raise InputError(f"--draws is {draws}; needed is a whole number from 0 to {MOST_DRAWS}")
-    known = read_known_soil(source, run)
+    known = read_source_soil(source, run)
     remarks = list(known.remarks)
     for own in target.asked:
         if own.name not in given:
@@ -275,7 +275,7 @@ def readme(export: SoilExport, names: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _intervals(known: KnownSoil) -> list[str]:
+def _intervals(known: SourceSoil) -> list[str]:
     """The table of the identified parameters, in SI units."""
     if not known.intervals:
         return []

@@ -16,7 +16,7 @@ from soilml.io.cell_text import read_number
 
 HELP = "soil parameters for Chrono, Gazebo, Isaac or a table"
 DESCRIPTION = """\
-Write the soil of FIT in the units and names of a simulator, with a README of
+Write the soil of FIT.json in the units and names of a simulator, with a README of
 the equations, of what is ignored and of what no wheel test reveals.
 
   soilml identify MODEL.toml RUNS.csv --out result.json
@@ -24,7 +24,7 @@ the equations, of what is ignored and of what no wheel test reveals.
   soilml export-soil result.json --to chrono --out scm --draws 50
   soilml export-soil MODEL.toml --to gazebo --out gazebo
 
-FIT is the file that `soilml identify --out` wrote, or a model file. Targets:
+FIT.json is the file that `soilml identify --out` wrote, or a model file. Targets:
   chrono      Project Chrono, deformable terrain SCM
   chrono-crm  Project Chrono, continuum terrain CRM
   gazebo      soil_params.yaml of gz-terramechanics, and friction of SDFormat
@@ -44,7 +44,7 @@ says where one file hides that a parameter is not determined.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        "fit", type=InputFile, metavar="FIT", help="result.json of identify, or MODEL.toml"
+        "fit", type=InputFile, metavar="FIT.json", help="result of identify, or MODEL.toml"
     )
     parser.add_argument(
         "--to", required=True, help="chrono, chrono-crm, gazebo, isaac or csv", metavar="TARGET"

@@ -27,7 +27,7 @@ PRIOR_DRAWS = 400
 
 
 @dataclass(frozen=True)
-class KnownSoil:
+class SourceSoil:
     """The nine parameters of a soil in SI units, and how well they are known.
 
     Attributes
@@ -76,7 +76,7 @@ class KnownSoil:
         ]
 
 
-def read_known_soil(path: str | os.PathLike[str], run: str | None = None) -> KnownSoil:
+def read_source_soil(path: str | os.PathLike[str], run: str | None = None) -> SourceSoil:
     """The soil in the file that `soilml identify --out` wrote, or in a model file.
 
     Parameters
@@ -88,7 +88,7 @@ def read_known_soil(path: str | os.PathLike[str], run: str | None = None) -> Kno
 
     Returns
     -------
-    KnownSoil
+    SourceSoil
 
     Raises
     ------
@@ -137,7 +137,7 @@ def _no_fit(path: str) -> NoReturn:
     raise InputError(f"{path} is no result of `soilml identify`; needed is its file of --out")
 
 
-def _of_fit(fit: Mapping[str, Any], path: str) -> KnownSoil:
+def _of_fit(fit: Mapping[str, Any], path: str) -> SourceSoil:
     """The soil of one fit: identified values, and those that its model file fixed."""
     if not isinstance(fit.get("model"), dict) or not isinstance(fit["model"].get("soil"), dict):
         raise InputError(
@@ -175,7 +175,7 @@ def _of_fit(fit: Mapping[str, Any], path: str) -> KnownSoil:
         remarks.append(Remark("effects-lost", text, tuple(effects)))
     draws = _draws(fit.get("draws"), parameters, path)
     why = "only averaged and posterior of `soilml identify` draw samples, and not with --by"
-    return KnownSoil(path, values, origin, intervals, draws, tuple(remarks), "" if draws else why)
+    return SourceSoil(path, values, origin, intervals, draws, tuple(remarks), "" if draws else why)
 
 
 def _remarks(entries: Any) -> list[Remark]:
@@ -220,7 +220,7 @@ def _check_bounds(values: Mapping[str, float], path: str) -> None:
             )
 
 
-def _of_case(case: Case, path: str) -> KnownSoil:
+def _of_case(case: Case, path: str) -> SourceSoil:
     """The soil of a model file, with draws of its priors."""
     values = {name: float(getattr(case.soil, name)) for name in declared(Soil)}
     unknown = [name for name in case.prior if name in values]
@@ -240,4 +240,4 @@ def _of_case(case: Case, path: str) -> KnownSoil:
         text = f"the model has {', '.join(effects)}: no target knows these, and forces will differ"
         remarks.append(Remark("effects-lost", text, effects))
     why = "" if draws else "its parameters have no prior in [soil.prior]"
-    return KnownSoil(path, values, origin, {}, draws, tuple(remarks), why)
+    return SourceSoil(path, values, origin, {}, draws, tuple(remarks), why)
