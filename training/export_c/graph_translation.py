@@ -14,7 +14,7 @@ from training.export_c.joined_nodes import joined
 from training.export_c.operators import OPERATORS as ONNX_OPERATORS
 from training.export_c.operators import together
 from training.export_c.operators.products import squares_of_product
-from training.export_c.point_stages import TILE, PointStage, in_stages
+from training.export_c.point_stages import TILE, PointStage, in_stages, with_late_copies
 from training.export_c.program import Node, Program, SharedParts
 from training.export_c.tensor import Size, Tensor
 from training.onnx_graph.builder import SHORTCUT, needed_nodes
@@ -52,6 +52,7 @@ def translate_graph(
     every = _with_sound_memory(_without_branches(model.graph, known))
     nodes, _ = needed_nodes(every, outputs)
     steps: Sequence[Any] = nodes
+    late: frozenset[str] = frozenset()
     if in_tiles:
         nodes = steps = joined(nodes, known, outputs)
         shapes, trial = dict(known), Program(SharedParts(), program.bounds)
@@ -60,8 +61,9 @@ def translate_graph(
         for name, product in tried.squared.items():  # only the squares of these are computed
             left, right = (shapes[given] for given in product.input)
             shapes[name] = Tensor(name, left.kind, (*left.shape[:-1], right.shape[-1]))
-        steps = in_stages(nodes, shapes, outputs)
-    translation = _Translation(program, nodes, known, outputs, model.opset_import)
+        nodes, late = with_late_copies(nodes, shapes, outputs)
+        steps = in_stages(nodes, shapes, outputs, late)
+    translation = _Translation(program, nodes, known, outputs, model.opset_import, late)
     translation.add_all(steps)
     return {name: program.stored(known[name]) for name in outputs if known[name].count != Size(0)}
 
@@ -81,12 +83,16 @@ class _Translation:
         known: dict[str, Tensor],
         outputs: Sequence[str],
         opsets: Any,
+        late: frozenset[str] = frozenset(),
     ) -> None:
         self.program, self.nodes, self.known, self.opsets = program, nodes, known, opsets
         self.uses = Counter(name for node in nodes for name in node.input)
         self.uses.update(dict.fromkeys(outputs, 2))
         self.squared: dict[str, Any] = {}  # products that are only squared and summed
-        self.moved: dict[str, Any] = {}  # nodes that move elements of the memory, by output
+        self.late = late  # results that are computed where they are needed
+        self.moved: dict[
+            str, Any
+        ] = {}  # nodes that move elements and are computed again, by output
         self.made: dict[str, int] = {}  # where they were translated last
         state = known.get(MEMORY_INPUTS[0])
         self.state = None if state is None or state.value is not None else state
@@ -131,9 +137,10 @@ class _Translation:
             self.known[node.output[0]] = self.known[node.input[0]]
             return
         from_memory = any(self._of_memory(name) for name in node.input)
-        if from_memory and node.op_type in MOVING:
+        if node.output[0] in self.late or (from_memory and node.op_type in MOVING):
             self.moved |= dict.fromkeys(node.output, node)
-        self._translate(node, place)
+        if node.output[0] not in self.late:
+            self._translate(node, place)
 
     def _translate(self, node: Any, place: int) -> None:
         if node.op_type == "Transpose" and self._is_memory(node.input[0]):
@@ -150,13 +157,13 @@ class _Translation:
         """An input of a node; the memory of a set, and what is moved of it, anew."""
         if self._is_memory(name):
             return self._unpacked("unpack", 0)
-        if name in self.moved and place - self.made[name] > FAR:
+        if name in self.moved and place - self.made.get(name, place - FAR - 1) > FAR:
             self._translate(self.moved[name], place)
         return self.known.get(name)
 
     def _of_memory(self, name: str) -> bool:
         """Whether a value is the memory of a set, or elements of it that were moved."""
-        return self._is_memory(name) or name in self.moved
+        return self._is_memory(name) or (name in self.moved and name not in self.late)
 
     def _is_memory(self, name: str) -> bool:
         return self.state is not None and self.known.get(name) is self.state

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from training.export_c.integrated_errors import (
     INTEGRATION,
@@ -20,6 +21,7 @@ from training.export_c.integrated_errors import (
     with_errors_integrated_out,
 )
 from training.export_c.tensor import Tensor
+from training.onnx_graph.builder import needed_nodes
 
 ROWS, SUMS = "ProductsOfRows", "GaussNewtonSums"
 APART, FACTOR, MEAN = "ErrorsApart", "RowFactor", "MeanOfScales"
@@ -35,7 +37,29 @@ def joined(nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str
     found = with_errors_integrated_out(nodes, known, outputs)
     found = _with_gauss_newton_sums(_with_products_of_rows(found, known), known)
     found = _with_factors(_with_errors_apart(found, known), known)
-    return _without_zeros(found, known)
+    found = _without_zeros(_without_repeats(found, frozenset(outputs)), known)
+    return needed_nodes(found, list(outputs))[0]
+
+
+def _without_repeats(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]:
+    """The nodes, with those that compute what an earlier one has computed left out."""
+    first: dict[bytes, Any] = {}
+    same: dict[str, str] = {}  # names by those that stand for the same value
+    result = []
+    for node in nodes:
+        own = type(node)()
+        own.CopyFrom(node)
+        own.input[:] = [same.get(name, name) for name in node.input]
+        bare = type(node)()
+        bare.CopyFrom(own)
+        bare.ClearField("output")
+        bare.ClearField("name")
+        earlier = first.setdefault(bare.SerializeToString(deterministic=True), own)
+        if earlier is own or len(earlier.output) != len(own.output) or outputs & {*own.output}:
+            result.append(own)
+        else:
+            same |= dict(zip(own.output, earlier.output, strict=True))
+    return result
 
 
 def _without_zeros(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[Any]:
@@ -44,26 +68,41 @@ def _without_zeros(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[Any]:
 
     result = []
     for node in nodes:
-        if node.op_type == SUMS:
-            new = type(node)()
-            new.CopyFrom(node)
-            for place in (1, 3):
-                constant = known.get(node.input[place])
-                if constant is None or constant.value is None:
-                    continue
-                rows = np.flatnonzero(np.abs(constant.value).max(axis=1))
-                if len(rows) == len(constant.value):
-                    continue
-                columns, kept = (f"{node.input[place - k]}_not_zero" for k in (1, 0))
+        if node.op_type != SUMS:
+            result.append(node)
+            continue
+        new = type(node)()
+        new.CopyFrom(node)
+        for place in (1, 3):
+            constant = known.get(node.input[place])
+            if constant is None or constant.value is None:
+                continue
+            rows = np.flatnonzero(np.abs(constant.value).max(axis=1))
+            if len(rows) == len(constant.value):
+                continue
+            new.input[place] = _kept(node.input[place], rows, known)
+            if place == 1:
+                columns = f"{node.input[0]}_not_zero"
                 numbers = f"{columns}_numbers"
-                known[kept] = Tensor.constant(constant.value[rows], kept)
                 known[numbers] = Tensor.constant(rows.astype(np.int64), numbers)
-                picked = [node.input[place - 1], numbers]
-                result.append(helper.make_node("Gather", picked, [columns], axis=1))
-                new.input[place - 1], new.input[place] = columns, kept
-            node = new
-        result.append(node)
+                result.append(
+                    helper.make_node("Gather", [node.input[0], numbers], [columns], axis=1)
+                )
+                new.input[0] = columns
+            else:
+                for of_slope in (4, 5):
+                    new.input[of_slope] = _kept(node.input[of_slope], rows, known)
+        result.append(new)
     return result
+
+
+def _kept(name: str, rows: NDArray[np.intp], known: dict[str, Tensor]) -> str:
+    """The name of a constant with some rows of another one."""
+    values = known[name].value
+    assert values is not None
+    kept = f"{name}_not_zero"
+    known[kept] = Tensor.constant(values[rows], kept)
+    return kept
 
 
 def _with_products_of_rows(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any]:
@@ -97,7 +136,12 @@ def _picks_rows(node: Any, known: Mapping[str, Tensor], users: Mapping[str, list
 
 
 def _with_gauss_newton_sums(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any]:
-    """The nodes, with the sums that Gauss-Newton steps need as one node each."""
+    """The nodes, with the sums that Gauss-Newton steps need as one node each.
+
+    Its inputs: a system and the monomials of points; a system, the numbers of whose columns, times
+    factors, are that of the derivatives, with the monomials of these between the two; further rows
+    of both systems, where these are the same.
+    """
     from onnx import helper
 
     users, makers = users_of(nodes), makers_of(nodes)
@@ -116,8 +160,17 @@ def _with_gauss_newton_sums(nodes: Sequence[Any], known: Mapping[str, Tensor]) -
         matrices = residual is not None and residual.op_type == slope.op_type == "MatMul"
         if not matrices or len(users[residual.output[0]]) != 1:
             continue
+        derived: Any = makers.get(slope.input[0])
+        picked: Any = derived and makers.get(derived.input[0])
+        if not picked or (picked.op_type, derived.op_type) != ("Gather", "Mul"):
+            continue
         later = residual if _place(nodes, residual) > _place(nodes, slope) else slope
-        inputs = [*residual.input, *slope.input]
+        factors = known.get(derived.input[1])
+        numbers = known.get(picked.input[1])
+        if any(t is None or t.value is None or t.rank != 1 for t in (factors, numbers)):
+            continue
+        columns = [picked.input[0], slope.input[1], picked.input[1], derived.input[1]]
+        inputs = [*residual.input, *columns]
         new[id(later)] = helper.make_node(SUMS, inputs, [squares.output[0], node.output[0]])
         gone |= {id(n) for n in (residual, slope, product, squares, node)}
     return [new.get(id(node), node) for node in nodes if id(node) not in gone or id(node) in new]
@@ -149,6 +202,7 @@ def _with_errors_apart(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[A
     one = {found.output[0]: matrix}  # the system in place of several
     gone = {id(copies), id(reshaped), id(columns)}
     factors: dict[str, Any] = {}  # the nodes of the rows without errors, by system
+    tops: dict[str, str] = {}  # the first rows, by system: the others are not needed any more
     rest_of: dict[str, str] = {}  # the same rows, by the mean of the first rows over scales
     for node in nodes:
         name = next((name for name in node.input if name in one), None)
@@ -164,17 +218,20 @@ def _with_errors_apart(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[A
             one[node.output[0]] = copy.output[0]
             new[id(node)] = [copy]
             if copy.op_type == "Div" and one[name] in factors:
+                copy.input[0] = tops[one[name]]
+                tops[copy.output[0]] = copy.output[0]
                 rest = f"{copy.output[0]}_rest"
                 inputs = [factors[one[name]].output[0], node.input[1]]
                 factors[copy.output[0]] = helper.make_node("Div", inputs, [rest])
             continue
         (user,) = users[node.output[0]][:1]
-        own = factors.setdefault(
-            one[name], helper.make_node(FACTOR, [one[name]], [f"{one[name]}_rest"], skipped=errors)
-        )
-        rest = own.output[0]
+        if one[name] not in factors:
+            tops[one[name]] = f"{one[name]}_top"
+            both = [f"{one[name]}_rest", tops[one[name]]]
+            factors[one[name]] = helper.make_node(FACTOR, [one[name]], both, skipped=errors)
+        rest, top = factors[one[name]].output[0], tops[one[name]]
         if node.op_type == "MatMul" and node.input[0] == name and _sums_squares(user, known):
-            parts = [one[name], shares, rest, node.input[1]]
+            parts = [top, shares, rest, node.input[1]]
             gone.add(id(node))
             new[id(user)] = [helper.make_node(SQUARES, parts, list(user.output))]
         elif node.op_type == "Reshape":
@@ -182,7 +239,7 @@ def _with_errors_apart(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[A
                 (last,) = users[product.output[0]]
                 if product.op_type != "MatMul" or last.op_type != "Reshape":
                     return list(nodes)
-                parts = [one[name], shares, product.input[0]]
+                parts = [top, shares, product.input[0]]
                 gone.add(id(product))
                 new[id(last)] = [helper.make_node(MEAN, parts, list(last.output))]
                 rest_of[last.output[0]] = rest
@@ -199,24 +256,12 @@ def _with_errors_apart(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[A
 
 def _with_further_rows(nodes: Sequence[Any], rest_of: Mapping[str, str]) -> list[Any]:
     """The nodes, with the rows without errors in the sums over the mean of the first rows."""
-    makers = makers_of(nodes)
     result: list[Any] = []
-    made: set[str] = set()
     for node in nodes:
         if node.op_type == SUMS and node.input[0] in rest_of:
-            slope = makers[node.input[2]]
-            picked, rest = makers[slope.input[0]], rest_of[node.input[0]]
-            first, second = (type(node)() for _ in range(2))
-            for copy, old, source in ((first, picked, rest), (second, slope, f"{rest}_picked")):
-                copy.CopyFrom(old)
-                copy.input[0] = source
-            first.output[0], second.output[0] = f"{rest}_picked", f"{rest}_slope"
-            if rest not in made:
-                result += [first, second]
-                made.add(rest)
             new = type(node)()
             new.CopyFrom(node)
-            new.input.extend([rest, f"{rest}_slope"])
+            new.input.append(rest_of[node.input[0]])
             node = new
         result.append(node)
     return result
@@ -250,25 +295,15 @@ def _sums_squares(node: Any, known: Mapping[str, Tensor]) -> bool:
 
 
 def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any]:
-    """The nodes, with systems of which only sums of squares are needed replaced by fewer rows.
-
-    A system may also be read for the derivatives of its residuals, which are columns of it times
-    constants: their rows are reflected as those of the system are.
-    """
+    """The nodes, with systems of which only sums of squares are needed replaced by fewer rows."""
     from onnx import helper
 
-    users, makers = users_of(nodes), makers_of(nodes)
+    users = users_of(nodes)
     changed: dict[int, tuple[int, ...]] = {}  # inputs of nodes that are replaced
     wanted: set[str] = set()  # systems with fewer rows
-    slopes: set[str] = set()
     for node in nodes:
-        if node.op_type == SUMS and len(node.input) == 4:
-            slope: Any = makers.get(node.input[2])
-            picked: Any = slope and makers.get(slope.input[0])
-            derived = picked and (picked.op_type, slope.op_type) == ("Gather", "Mul")
-            if derived and picked.input[0] == node.input[0]:
-                changed[id(node)] = (0, 2)
-                slopes |= {node.input[2], slope.input[0]}
+        if node.op_type == SUMS and len(node.input) == 6 and node.input[0] == node.input[2]:
+            changed[id(node)] = (0, 2)
         elif node.op_type == "MatMul" and node.input[0] not in known:
             (*others, user) = users[node.output[0]]
             if not others and user.op_type == "ReduceSumSquare" and _over_rows(user, known):
@@ -284,15 +319,11 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
             for place in changed[id(node)]:
                 new.input[place] = f"{node.input[place]}_factor"
         result.append(new)
-        for name in node.output:
-            if name in wanted:
-                result.append(helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0))
-            if name in slopes:
-                new = type(node)()
-                new.CopyFrom(node)
-                new.input[0] = f"{node.input[0]}_factor"
-                new.output[0] = f"{name}_factor"
-                result.append(new)
+        result += [
+            helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0)
+            for name in node.output
+            if name in wanted
+        ]
     return result
 
 

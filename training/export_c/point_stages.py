@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from training.export_c.integrated_errors import users_of
 from training.export_c.joined_nodes import ROWS, SQUARES, SUMS
 from training.export_c.operators.elementwise import OPERATORS as ELEMENTWISE
 from training.export_c.operators.reductions import REDUCTIONS
@@ -24,6 +25,8 @@ PRODUCTS = ("Gemm", "MatMul", SQUARES, SUMS)
 #: Results of so many numbers a point, which another stage needs, are stored; wider ones are
 #: computed again there, if they follow from others without products or functions.
 STORED = 8
+#: Of the numbers that `with_late_copies` computes again, one in so many varies at most.
+LEAST_CONSTANT = 4
 _POINTS_AT = {"Gemm": 1, "MatMul": 1, SUMS: 1, SQUARES: 3}  # the input that has the points
 RECOMPUTED = (*MOVING, ROWS, "Add", "Identity", "Mul", "Sub")
 
@@ -44,16 +47,68 @@ class PointStage:
     outputs: tuple[str, ...]
 
 
-def in_stages(
-    nodes: Sequence[Any], known: Mapping[str, Tensor], outputs: Iterable[str]
-) -> list[Any]:
-    """Nodes in an order in which those that treat the same points stand together, as stages.
+def with_late_copies(
+    nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str]
+) -> tuple[list[Any], frozenset[str]]:
+    """Nodes, and the results among theirs that are computed where they are needed, if need be anew.
+
+    Those are constants joined to a few rows of points: large, and no more work than a copy. A stage
+    that needs the same has it from a node of its own.
 
     nodes: All nodes, in an order in which they can be computed.
-    known: The value of each name that a node reads or makes, with its shape.
+    known: The value of each name that a node reads or makes; those of new nodes are added.
     outputs: Names that are needed in the end.
     """
-    points = [_points(node, known) for node in nodes]
+    groups = _groups(nodes, known)
+    treats = {id(nodes[i]): own for (_, own), group in groups.items() for i in group}
+    users, late = users_of(nodes), set[str]()
+    renamed: dict[int, dict[str, str]] = {}  # inputs of nodes that read a copy
+    copied: list[Any] = []
+    for node in nodes:
+        copied.append(node)
+        name = node.output[0]
+        if name in outputs or not _is_mostly_constant(node, known):
+            continue
+        others = [user for user in users[name] if not treats[id(user)]]
+        again = name
+        if others and len(others) < len(users[name]):
+            again = f"{name}_again"
+            copied.append(_with_names(node, {}, again))
+            known[again] = known[name]
+            for user in others:
+                renamed.setdefault(id(user), {})[name] = again
+        if others:
+            late.add(again)
+    return [_with_names(node, renamed.get(id(node), {})) for node in copied], frozenset(late)
+
+
+def _with_names(node: Any, names: Mapping[str, str], output: str = "") -> Any:
+    """A node with other names of inputs, and of its output; itself where nothing changes."""
+    if not names and not output:
+        return node
+    new = type(node)()
+    new.CopyFrom(node)
+    new.input[:] = [names.get(name, name) for name in node.input]
+    if output:
+        new.output[:] = [output]
+    return new
+
+
+def _is_mostly_constant(node: Any, known: Mapping[str, Tensor]) -> bool:
+    """Whether a node joins constants to a few rows of points."""
+    whole = known.get(node.output[0])
+    if node.op_type != "Concat" or whole is None or not whole.count.fixed:
+        return False
+    varying = [known[name].count for name in node.input if known[name].value is None]
+    few = sum(count.constant for count in varying) * LEAST_CONSTANT <= whole.count.constant
+    return whole.rank > 1 and whole.shape[-1].constant >= LEAST_POINTS and bool(varying) and few
+
+
+def _groups(
+    nodes: Sequence[Any], known: Mapping[str, Tensor], late: frozenset[str] = frozenset()
+) -> dict[tuple[int, int], list[int]]:
+    """Numbers of nodes by their level, and by the number of points that they treat one by one."""
+    points = [0 if node.output[0] in late else _points(node, known) for node in nodes]
     while True:
         levels = _levels(nodes, points, known)
         groups: dict[tuple[int, int], list[int]] = {}
@@ -66,9 +121,25 @@ def in_stages(
             for index in members
         ]
         if not slight:
-            break
+            return groups
         for index in slight:
             points[index] = 0
+
+
+def in_stages(
+    nodes: Sequence[Any],
+    known: Mapping[str, Tensor],
+    outputs: Iterable[str],
+    late: frozenset[str] = frozenset(),
+) -> list[Any]:
+    """Nodes in an order in which those that treat the same points stand together, as stages.
+
+    nodes: All nodes, in an order in which they can be computed.
+    known: The value of each name that a node reads or makes, with its shape.
+    outputs: Names that are needed in the end.
+    late: Results that are computed outside of stages (`with_late_copies`).
+    """
+    groups = _groups(nodes, known, late)
     wanted = set(outputs)
     whole = {(k, n): [nodes[i] for i in group] for (k, n), group in groups.items()}
     stages = {key: _with_recomputed(whole[key], key[1], nodes, known) for key in whole if key[1]}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -229,6 +231,7 @@ Translation = Callable[[Program, Node], list[Tensor]]
 #: Elements to a multiple of which places of large tensors are rounded: a cache line of 64 bytes has
 #: 16 floats.
 GRAIN = 16
+TRIES = 40  # Orders in which tensors are placed, at most
 
 
 @dataclass(frozen=True)
@@ -240,7 +243,7 @@ class MemoryPlan:
 
 
 def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
-    """Place every tensor of a program, the largest first, as low as others in its time allow.
+    """Place every tensor of a program, as low as others in its time allow, at first the largest.
 
     program: Statements with the tensors that they touch.
     kept: Names that are needed after the last statement.
@@ -269,29 +272,67 @@ def plan_memory(program: Program, kept: frozenset[str]) -> MemoryPlan:
             )
             if fits and name not in taken and first[name] == last[place] == index:
                 taken[name], last[place] = place, last[name]
+    own = {name: program.memory[name][0] for name in first if name not in taken}
     offsets: dict[str, int] = {}
     lengths: dict[str, int] = {}
-    placed: dict[str, list[tuple[int, int, int, int]]] = {}  # by type: first, last, start, end
-    for name in sorted(
-        (name for name in first if name not in taken), key=lambda name: (-needs[name], first[name])
-    ):
-        kind, need = program.memory[name][0], needs[name]
-        others = placed.setdefault(kind, [])
-        busy = sorted(
-            (begin, end)
-            for born, dead, begin, end in others
-            if born <= last[name] and dead >= first[name]
-        )
+    for kind in dict.fromkeys(own.values()):
+        lives = {n: (first[n], last[n], needs[n]) for n in first if own.get(n) == kind}
+        placed, lengths[kind] = _places(lives)
+        offsets |= placed
+    offsets |= {name: offsets[place] for name, place in taken.items()}
+    return MemoryPlan(offsets, lengths)
+
+
+def _places(lives: Mapping[str, tuple[int, int, int]]) -> tuple[dict[str, int], int]:
+    """Offsets of tensors in one array, and its length, from first and last statement and size.
+
+    The one that ends last in the array is placed earlier, and so on, while there is hope.
+    """
+    least = _most_at_once(lives)
+    order = sorted(lives, key=lambda name: (-lives[name][2], lives[name][0]))
+    best, length = _placed_in_turn(order, lives)
+    found = best
+    for _ in range(TRIES):
+        if length == least:
+            break
+        ends = {name: found[name] + lives[name][2] for name in order}
+        worst = max(order, key=ends.__getitem__)
+        order.remove(worst)
+        order.insert(0, worst)
+        found, own = _placed_in_turn(order, lives)
+        if own < length:
+            best, length = found, own
+    return best, length
+
+
+def _most_at_once(lives: Mapping[str, tuple[int, int, int]]) -> int:
+    """Elements of the tensors that live at the same time, at most."""
+    changes: Counter[int] = Counter()
+    for born, dead, size in lives.values():
+        changes[born] += size
+        changes[dead + 1] -= size
+    return max(accumulate(changes[at] for at in sorted(changes)))
+
+
+def _placed_in_turn(
+    order: Sequence[str], lives: Mapping[str, tuple[int, int, int]]
+) -> tuple[dict[str, int], int]:
+    """Offsets of tensors that are placed one by one, as low as those before allow, and the end."""
+    offsets: dict[str, int] = {}
+    for name in order:
+        born, dead, need = lives[name]
         start = 0
+        busy = sorted(
+            (at, at + lives[other][2])
+            for other, at in offsets.items()
+            if lives[other][0] <= dead and lives[other][1] >= born
+        )
         for begin, end in busy:
             if begin - start >= need:
                 break
             start = max(start, end)
         offsets[name] = start
-        others.append((first[name], last[name], start, start + need))
-        lengths[kind] = max(lengths.get(kind, 0), start + need)
-    offsets |= {name: offsets[place] for name, place in taken.items()}
-    return MemoryPlan(offsets, lengths)
+    return offsets, max(offsets[name] + lives[name][2] for name in order)
 
 
 def _spans(program: Program) -> list[tuple[int, int]]:

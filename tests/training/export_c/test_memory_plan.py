@@ -1,8 +1,12 @@
 """Tensors that are needed at the same time do not share memory; others may."""
 
 import numpy as np
+import onnx
+import pytest
+from compiled_c import ROOT
 
-from training.export_c.program import Program, SharedParts, plan_memory
+from training.export_c.c_file import write_c
+from training.export_c.program import GRAIN, Program, SharedParts, plan_memory
 from training.export_c.tensor import Size, total
 
 
@@ -54,3 +58,28 @@ def test_memory_is_shared():
     plan = plan_memory(program, frozenset())
     needed = sum(total(shape).most(program.bounds) for _, shape in program.memory.values())
     assert sum(plan.lengths.values()) < 0.6 * needed
+
+
+def test_tensors_are_packed_close():
+    """Largest first leaves holes; other orders are tried until the array is short."""
+    for seed in range(20):
+        program = program_of(seed)
+        plan, life = plan_memory(program, frozenset()), lives(program, frozenset())
+        for kind, length in plan.lengths.items():
+            own = {
+                name: -(-total(shape).most(program.bounds) // GRAIN) * GRAIN
+                for name, (other, shape) in program.memory.items()
+                if other == kind
+            }
+            most = max(
+                sum(size for name, size in own.items() if life[name][0] <= at <= life[name][1])
+                for at in range(len(program.statements))
+            )
+            assert length <= 1.05 * most
+
+
+@pytest.mark.slow
+def test_one_row_at_a_time_fits_the_memory_of_a_small_board():
+    model = onnx.load(ROOT / "exported" / "any_wheel.onnx")
+    metadata = {entry.key: entry.value for entry in model.metadata_props}
+    assert write_c(model, metadata, "any_wheel", "", rows=1).work_bytes < 96_000

@@ -42,36 +42,33 @@ def translate_integration(program: Program, node: Node) -> list[Tensor]:
     errors = int(node.attributes["errors"])
     *batch, m, _ = parts[0].shape
     columns = sum((part.shape[-1] for part in parts), Size(0)).constant
-    kept, step = columns - errors, -(-columns // GRAIN) * GRAIN
+    kept = columns - errors
     kind = parts[0].kind
-    out = program.new(kind, (*batch, m, Size(kept)))
-    system = program.new(kind, (m, Size(step)))
-    change = program.new(kind, (Size(step),))
+    system = program.new(kind, (m, Size(columns)))
+    shape = (*batch, m, Size(kept))
+    # of one system, rows are moved together in its place
+    out = program.new(kind, shape) if batch else system.block(Size(0), shape)
+    change = program.new(kind, (Size(columns),))
     count = batch[0] if batch else Size(1)
     determinants = program.new(kind, (Size(errors), count))
     outer = indices_of(batch)
     lines, start = [], 0
     for part in parts:
         own = [*outer, *indices_of(part.shape[-2:], len(outer))]
-        to = offset([Size(step), Size(1)], own[-2:])
+        to = offset([Size(columns), Size(1)], own[-2:])
         to = f"{start} + {to}" if start else to
         body = f"{system.name}[{to}] = {_element(part, own)};"
         lines.append(nest(part.shape[-2:], own[-2:], body))
         start += part.shape[-1].constant
-    if step > columns:  # the numbers that fill up rows
-        own = indices_of([m, Size(step - columns)], len(outer))
-        to = offset([Size(step), Size(1)], own)
-        zero = f"{system.name}[{columns} + {to}] = {number(0.0, kind)};"
-        lines.append(nest([m, Size(step - columns)], own, zero))
     kernel = program.shared.kernel("integrate_out", kind)
     place = offset([count, Size(1)], ["error", outer[0] if outer else "0"])
     lines += [
         f"    for (int error = 0; error < {errors}; ++error)",
         f"        {determinants.name}[{place}] = "
-        f"{kernel}({m.c}, {columns - 1} - error, {step}, {system.name}, {change.name});",
+        f"{kernel}({m.c}, {columns - 1} - error, {columns}, {system.name}, {change.name});",
     ]
     own = [*outer, *indices_of(out.shape[-2:], len(outer))]
-    source = offset([Size(step), Size(1)], own[-2:])
+    source = offset([Size(columns), Size(1)], own[-2:])
     target = offset(strides(out.shape), own)
     lines.append(nest(out.shape[-2:], own[-2:], f"{out.name}[{target}] = {system.name}[{source}];"))
     text = "\n".join(lines)
@@ -81,7 +78,8 @@ def translate_integration(program: Program, node: Node) -> list[Tensor]:
             batch, outer, "{\n" + "\n".join(INDENT + x for x in inside.splitlines()) + "\n}"
         )
     leaves = [leaf for t in parts for leaf in (leaves_of(t.expression) if t.expression else [t])]
-    program.emit(text, out, system, change, determinants, *leaves)
+    same = leaves if len(parts) == 1 and not batch else []
+    program.emit(text, out, system, change, determinants, *leaves, replaceable=same)
     one = (*([count] if batch else []), *[Size(1)] * 2)
     return [out, *(determinants.block(count * k, one) for k in range(errors))]
 
@@ -113,25 +111,30 @@ def _as_indices(tensor: Tensor) -> Tensor:
 def translate_gauss_newton_sums(program: Program, node: Node) -> list[Tensor]:
     """Sums over residuals of squares of their derivatives, and of their products with these.
 
-    Inputs: a system (m, k) and its monomials (k, n), the derivatives' (m, l) and (l, n); further
-    rows of both systems, if there are any.
+    Inputs: a system (m, k) and its monomials (k, n); a system (m, columns) and the derivatives'
+    monomials (l, n), whose coefficients are l columns of it times factors: their numbers, and the
+    factors; further rows of both systems, if there are any.
     """
-    system, basis, slope, slope_basis, *further = (program.stored(t) for t in node.given())
+    given = [program.stored(_as_indices(t)) for t in node.given()]
+    system, basis, other, slope_basis, picked, factors, *further = given
     k, n, few = *basis.shape, slope_basis.shape[0]
     squares, products = (program.new(basis.kind, (Size(1), n)) for _ in range(2))
+    slope = program.new(basis.kind, (few * 2,))
     kernel, zero = program.shared.kernel("gauss_newton_sums", basis.kind), number(0.0, basis.kind)
     lines = [
         f"    for (int i0 = 0; i0 < {n.c}; ++i0)",
         f"        {squares.name}[i0] = {products.name}[i0] = {zero};",
     ]
-    pairs = [(system, slope), *zip(further[::2], further[1::2], strict=True)]
+    pairs = [(system, other), *((rows, rows) for rows in further)]
     lines += [
         f"    {kernel}({own.shape[0].c}, {k.c}, {few.c}, {n.c}, {own.name}, {basis.name}, "
-        f"{derived.name}, {slope_basis.name}, {squares.name}, {products.name});"
-        for own, derived in pairs
+        f"{source.shape[1].c}, {source.name},\n        {picked.name}, {factors.name}, "
+        f"{slope_basis.name}, {slope.name}, {squares.name}, {products.name});"
+        for own, source in pairs
     ]
-    given = [tensor for pair in pairs for tensor in pair]
-    program.emit("\n".join(lines), squares, products, basis, slope_basis, *given)
+    read = [tensor for pair in pairs for tensor in pair]
+    constants = [basis, slope_basis, picked, factors]
+    program.emit("\n".join(lines), squares, products, slope, *constants, *read)
     return [squares, products]
 
 
@@ -194,10 +197,20 @@ def translate_errors_apart(program: Program, node: Node) -> list[Tensor]:
 
 
 def translate_factor(program: Program, node: Node) -> list[Tensor]:
-    """A system of fewer rows with the same sums of squares, of all rows but some first ones."""
+    """A system of fewer rows with the same sums of squares, of all rows but some first ones.
+
+    Outputs: that system; and the first rows, which need not be kept with the others.
+    """
     x = program.stored(node.input(0))
     n = x.shape[1]
     skipped = int(node.attributes["skipped"])
+    top = program.new(x.kind, (Size(skipped), n))
+    if skipped:
+        program.emit(
+            element_loops(top.name, top.shape, Expression("{0}", (x.block(Size(0), top.shape),))),
+            top,
+            x,
+        )
     x = x.block(n * skipped, (x.shape[0] + -skipped, n))
     m = x.shape[0]
     count = program.count_up_to(m.most(program.bounds))
@@ -211,14 +224,15 @@ def translate_factor(program: Program, node: Node) -> list[Tensor]:
         f"{kernel}({m.c}, {n.c}, {system.name}, {rest.name}, {change.name});"
     )
     program.emit(code, system, rest, change)
-    return [replace(system, shape=(Size.of(count), n))]
+    return [replace(system, shape=(Size.of(count), n)), top]
 
 
 def translate_squares(program: Program, node: Node) -> list[Tensor]:
     """Sums of squared residuals for each scale of the errors.
 
-    Inputs: a system (m, n) whose errors are in the first rows, the matrices (scales, e, e) by which
-    these are whitened, a system with the sums of squares of the others, and monomials (n, points).
+    Inputs: the first rows (e, n) of a system, which have the errors, the matrices (scales, e, e) by
+    which these are whitened, a system with the sums of squares of the others, and monomials
+    (n, points).
     """
     system, matrices, rest, basis = (program.stored(node.input(k)) for k in range(4))
     scales, e, _ = matrices.shape
