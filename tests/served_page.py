@@ -13,7 +13,11 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from soilml import Operating, soil
+from soilml.io.text_tables import csv_text
 
 ROOT = Path(__file__).parents[1]
 #: Longest wait for an analysis, s; a machine with other work to do takes its time.
@@ -93,3 +97,14 @@ def page():
     finally:
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=60)
+
+
+def runs_file(tmp_path, model, loads=(40.0, 90.0)):
+    """Twelve rows in two runs of a wheel on dry sand."""
+    slip, load = np.tile(np.linspace(0.1, 0.6, 6), len(loads)), np.repeat(loads, 6)
+    force = model(soil("wong1989/dry_sand"), Operating(slip=slip, load=load))
+    names = np.repeat([f"run_{i}" for i in range(len(loads))], 6)
+    columns = {"run": names, "slip": slip, "load_N": load, "torque_Nm": force.torque}
+    columns["sinkage_m"] = force.sinkage
+    (tmp_path / "RUNS.csv").write_text(csv_text(columns))
+    return tmp_path / "RUNS.csv"

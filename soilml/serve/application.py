@@ -179,7 +179,7 @@ class StartJob(GuardedHandler):
         if not known or not isinstance(keys, list) or not (keys or kind in WITHOUT_FILES):
             raise RefusedError(400, f"needed is a kind ({', '.join(KINDS)}) and a list of files")
         files = [self._file(key) for key in keys]
-        if kind in ("estimate", "gap"):
+        if kind in ("estimate", "gap") or (kind == "design" and files):
             chosen = request.get("model") or {}
             check_parts(chosen)
             # in the other thread: a model file takes long to read, and others must not wait

@@ -16,10 +16,11 @@ from soilml.physics.soils import soil_catalogue
 from soilml.report.page import Provenance, report_texts
 from soilml.rover_design.presentation import design_page, verdict
 from soilml.rover_design.report import design_report
-from soilml.rover_design.study import LEAST, read_study
+from soilml.rover_design.study import LEAST, DesignStudy, read_study
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
 STUDY_FILE = "rover.toml"  # Name of the question in messages
+MODEL_FILE = "MODEL.toml"  # That of the page's model, beside a soil of measured rows
 #: Designs of the sweep and draws, by how thorough the answer is: the last is the command's default.
 EFFORTS = {"quick": (60, 300), "usual": (100, 500), "thorough": (250, 1000)}
 
@@ -68,7 +69,8 @@ def question(request: dict[str, Any]) -> dict[str, Any]:
     """The text of a question after a change of a figure, and its figures.
 
     Without a text it is the example's. `change` is {field, value}: the number of a field, and its
-    value in shown units: a number, two for a range, a text, or a list of texts.
+    value in shown units: a number, two for a range, a text, a list of texts, or for the soil
+    {rows: name of a table of runs}.
 
     Raises `InputError` for a text that is no TOML, and a value that the file cannot have.
     """
@@ -83,7 +85,7 @@ def question(request: dict[str, Any]) -> dict[str, Any]:
         {
             "label": f.label, "unit": f.unit, "kind": f.kind, "table": f.table,
             "choices": list(f.choices) or (sorted(soil_catalogue()) if f.kind == "names" else []),
-            "value": _shown(f, content),
+            "value": _shown(f, content), "rows": _rows(f, content),
         }
         for f in _FIELDS
     ]  # fmt: skip
@@ -97,12 +99,21 @@ def _parsed(text: str) -> dict[str, Any]:
         raise InputError(f"{STUDY_FILE} is no valid TOML: {error}") from None
 
 
+def _rows(field: _Field, content: Mapping[str, Any]) -> str | None:
+    """The table of runs whose soil the question asks about, at the field of the soils."""
+    table = content.get(field.table, {})
+    runs = table.get("runs") if field.kind == "names" and isinstance(table, dict) else None
+    return runs if isinstance(runs, str) else None
+
+
 def _shown(field: _Field, content: Mapping[str, Any]) -> Any:
     """The value of a figure in its shown unit; None where the text has it in another form."""
     table = content.get(field.table, {})
     value = table.get(field.key, _ABSENT.get(field.key)) if isinstance(table, dict) else None
     if field.place >= 0:
         value = value[field.place] if isinstance(value, list) and len(value) == 2 else None
+    if _rows(field, content) is not None:
+        return []
     if field.kind in ("choice", "names"):
         return value if isinstance(value, str | list) else None
     if isinstance(value, str) and (match := re.fullmatch(r"\s*([\d.]+)\s*deg\s*", value)):
@@ -122,8 +133,33 @@ def _changed(text: str, change: Mapping[str, Any]) -> str:
     ):  # fmt: skip
         raise InputError("field: needed is the number of a figure of the question")
     field, value = _FIELDS[int(number)], change.get("value")
+    if field.kind == "names" and (isinstance(value, dict) or _rows(field, _parsed(text))):
+        return _with_soil(text, value)
     written = toml_value(value) if field.kind == "choice" else _numbers(field, value, text)
     return _with_key(text, field.table, field.key, written)
+
+
+def _with_soil(text: str, value: Any) -> str:
+    """The text with another soil: that of a table of runs, or published ones instead of it.
+
+    What else [soil] and its tables had belongs to the soil before.
+    """
+    if isinstance(value, dict):
+        name = value.get("rows")
+        if not isinstance(name, str) or not name:
+            raise InputError("[soil] runs: needed is the name of a table of runs")
+        lines = [f"model = {toml_value(MODEL_FILE)}", f"runs = {toml_value(name)}"]
+    else:
+        lines = [f"names = {_numbers(_FIELDS[-1], value, text)}"]
+    kept, own = [], False
+    for line in text.splitlines():
+        if head := re.match(r"\s*\[+\s*([^\]]*?)\s*\]", line):
+            own = head[1] == "soil" or head[1].startswith("soil.")
+        if not own:
+            kept.append(line)
+    changed = "\n".join([*"\n".join(kept).rstrip().splitlines(), "", "[soil]", *lines]) + "\n"
+    _parsed(changed)
+    return changed
 
 
 def _numbers(field: _Field, value: Any, text: str) -> str:
@@ -170,15 +206,14 @@ def _with_key(text: str, table: str, key: str, value: str) -> str:
 def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     """The verdict, the picture and the tables of a design, and the names of the written files.
 
-    Raises `InputError` as `soilml design` does, and for a soil of measured rows, whose files stand
-    outside of the page.
+    The soil of measured rows is that of the page's table and model.
+
+    Raises `InputError` as `soilml design` does, and for other files than these.
     """
     study = read_study(setting_file(STUDY_FILE, request.get("question")))
+    settings = {STUDY_FILE: str(request["question"])}
     if study.soil.rows is not None:
-        raise InputError(
-            f"{STUDY_FILE} [soil]: the page takes published soils, or one that the question "
-            "states; for the soil of measured rows use `soilml design` on the command line"
-        )
+        settings[MODEL_FILE] = _model_of_rows(study, request)
     effort = request.get("effort", "usual")
     if not isinstance(effort, str) or effort not in EFFORTS:
         raise InputError(f"effort is {effort!r}; needed is one of {', '.join(EFFORTS)}")
@@ -202,8 +237,22 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "picture": {"image": page.pictures[0].image.image, "alt": page.pictures[0].image.alt},
         "tables": [_table(t.caption, t.header, t.rows) for t in page.tables],
         "remarks": [str(text) for text in page.warnings],
-        "files": write_files({**contents, STUDY_FILE: str(request["question"])}),
+        "files": write_files({**contents, **settings}),
     }
+
+
+def _model_of_rows(study: DesignStudy, request: Mapping[str, Any]) -> str:
+    """The text of the page's model, written to the file that a question about its rows names."""
+    assert study.soil.rows is not None
+    model, runs = (path.name for path in study.soil.rows)
+    names = request.get("names") or []
+    if model != MODEL_FILE or runs not in names:
+        raise InputError(
+            f"{STUDY_FILE} [soil]: model {model} and runs {runs}; the page has {MODEL_FILE} and "
+            f"{names[0] if names else 'no table of runs: drop it above'}"
+        )
+    setting_file(MODEL_FILE, request.get("model"))
+    return str(request["model"])
 
 
 def _table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, Any]:

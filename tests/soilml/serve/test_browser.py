@@ -4,13 +4,11 @@ import os
 import shutil
 import sys
 
-import numpy as np
 import pytest
-from served_page import ROOT
+from served_page import ROOT, runs_file
 from served_page import page as page
 
 from soilml import EFFECTS, Model, Operating, Wheel, soil
-from soilml.io.text_tables import csv_text
 
 pytestmark = pytest.mark.browser
 
@@ -90,16 +88,6 @@ def now(tab):
     cells = tab.locator("#now div").all_inner_texts()
     pairs = (cell.split("\n") for cell in cells)
     return {name: float(v.split("\u00a0")[0].replace("\u2212", "-")) for name, v in pairs}
-
-
-def runs_file(tmp_path, model, loads=(40.0, 90.0)):
-    slip, load = np.tile(np.linspace(0.1, 0.6, 6), len(loads)), np.repeat(loads, 6)
-    force = model(soil("wong1989/dry_sand"), Operating(slip=slip, load=load))
-    names = np.repeat([f"run_{i}" for i in range(len(loads))], 6)
-    columns = {"run": names, "slip": slip, "load_N": load, "torque_Nm": force.torque}
-    columns["sinkage_m"] = force.sinkage
-    (tmp_path / "RUNS.csv").write_text(csv_text(columns))
-    return tmp_path / "RUNS.csv"
 
 
 def confirm_the_wheel(tab):
@@ -336,6 +324,20 @@ def test_the_sheet_of_a_spreadsheet_is_asked_for(tab, tmp_path):
     tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
     assert "rows 12" in tab.locator("#table-panel").inner_text()
     assert tab.locator("#estimate-error").is_hidden()
+
+
+def test_wheels_are_compared_on_the_soil_of_measured_rows(tab, tmp_path):
+    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
+    confirm_the_wheel(tab)
+    tab.wait_for_selector("#pull-result summary", timeout=LONG)
+    tab.get_by_label("Soils, each as likely").select_option("that of RUNS.csv")
+    until(tab, "document.querySelector('#design-text').value.includes('runs = \"RUNS.csv\"')")
+    tab.get_by_label("Slope (deg)").fill("8")
+    tab.keyboard.press("Tab")
+    tab.select_option("#design-effort", "quick")
+    tab.get_by_role("button", name="Compare the wheels").click()
+    tab.wait_for_selector("#design-result .verdict, #design-error:not([hidden])", timeout=LONG)
+    assert tab.locator("#design-error").is_hidden()
 
 
 def test_wheels_are_compared_for_a_slope(tab):

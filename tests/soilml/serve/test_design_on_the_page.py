@@ -4,12 +4,15 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from served_page import ROOT
+from served_page import ROOT, runs_file
 
 from soilml.errors import InputError
 from soilml.optional_imports import tomllib
+from soilml.physics.gears import Wheel
+from soilml.physics.model import Model
 from soilml.rover_design.study import read_study
 from soilml.serve.answers import design
+from soilml.serve.answers.chosen_case import model_text
 
 
 def silent(*stage):
@@ -100,12 +103,45 @@ def test_the_answer_is_that_of_the_command(tmp_path, monkeypatch):
     assert (Path("out") / "rover.toml").read_text() == text
 
 
+def test_the_soil_is_that_of_measured_rows_and_of_published_ones_again():
+    before = design.question({})["question"]
+    text = changed("Soils, each as likely", {"rows": "tests.xlsx#second"}, before)
+    content = tomllib.loads(text)
+    assert content["soil"] == {"model": "MODEL.toml", "runs": "tests.xlsx#second"}
+    others = {k: v for k, v in tomllib.loads(before).items() if k != "soil"}
+    assert {k: v for k, v in content.items() if k != "soil"} == others
+    answer = field(design.question({"question": text}), "Soils, each as likely")[1]
+    assert answer["value"] == [] and answer["rows"] == "tests.xlsx#second"
+    again = changed("Soils, each as likely", ["wang2016/kls1"], text)
+    assert tomllib.loads(again) == others | {"soil": {"names": ["wang2016/kls1"]}}
+
+
+@pytest.mark.slow
+def test_the_soil_of_measured_rows_is_that_of_the_page(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(design.EFFORTS, "quick", (6, 60))
+    runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
+    case = model_text({})["text"]
+    question = changed("Soils, each as likely", {"rows": "RUNS.csv"}, changed("Slope", 8))
+    request = {"question": question, "effort": "quick", "names": ["RUNS.csv"], "model": case}
+    found = design.answer(request, silent)
+    assert set(found["files"]) == {"design_report.html", "design.json", "rover.toml", "MODEL.toml"}
+    assert (Path("out") / "MODEL.toml").read_text() == case
+    kinds = (Path("out") / "design.json").read_text()
+    assert "RUNS.csv" in kinds
+
+
 def test_questions_that_the_page_does_not_take(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = design.question({})["question"]
     rows = text[: text.index("[soil]")] + '[soil]\nmodel = "/etc/m.toml"\nruns = "r.csv"\n'
     rows += text[text.index("[goal]") :]
-    with pytest.raises(InputError, match="use `soilml design` on the command line"):
+    for names, said in ([], "no table of runs: drop it above"), (["r.csv"], "/etc/m.toml|m.toml"):
+        with pytest.raises(InputError, match=said):
+            design.answer({"question": rows, "names": names}, silent)
+        Path("rover.toml").unlink()
+    rows = rows.replace("/etc/m.toml", "MODEL.toml").replace("r.csv", "../r.csv")
+    with pytest.raises(InputError, match="no table of runs"):
         design.answer({"question": rows}, silent)
     Path("rover.toml").unlink()
     with pytest.raises(InputError, match="effort is 'endless'"):

@@ -2,15 +2,19 @@
 
 import { ask, jobFile } from "./api.js";
 import { byId, element, fold, jumpTo, options, saveText, showError, wordList } from "./dom.js";
+import { currentName, currentTable } from "./estimate.js";
 import { work } from "./jobs.js";
+import { modelOfEstimate } from "./model_box.js";
 
 const NAMES = { rover: "Rover", wheel: "Wheel", goal: "Goal", soil: "Soil" };
+const MEASURED = "measured";
 const text = () => byId("design-text");
 
 export async function startDesign() {
   byId("design-start").addEventListener("click", run);
   byId("design-save").addEventListener("click", () => saveText("rover.toml", text().value));
   text().addEventListener("change", () => change(null));
+  addEventListener("table", () => change(null));
   await change(null);
 }
 
@@ -65,10 +69,12 @@ function figure(field, i) {
   return row(inputs[0], inputs[1] ? element("span", {}, "to") : null, inputs[1] ?? null);
 }
 
-/** The published soils: those of the question as buttons that take them out, and a list to add one. */
+/** The published soils: those of the question as buttons that take them out, and a list to add one.
+ * A soil of measured rows stands alone, and so does the next published one after it. */
 function soils(field, id, label, set) {
-  const add = element("select", { id, onchange: () => add.value && set([...field.value, add.value]) });
-  options(add, [{ id: "", label: "add a soil" }, ...field.choices.filter((name) => !field.value.includes(name)).map((name) => ({ id: name, label: name }))], "");
+  const rows = currentName(), measured = rows && rows !== field.rows ? [{ id: MEASURED, label: `that of ${rows}` }] : [];
+  const add = element("select", { id, onchange: () => add.value && set(add.value === MEASURED ? { rows } : [...field.value, add.value]) });
+  options(add, [{ id: "", label: field.rows ? `that of ${field.rows}` : "add a soil" }, ...measured, ...field.choices.filter((name) => !field.value.includes(name)).map((name) => ({ id: name, label: name }))], "");
   return element("div", { class: "open" }, element("label", { for: id }, label), add,
     ...field.value.map((name) => element("button", { type: "button", "aria-label": `leave out ${name}`, onclick: () => set(field.value.filter((other) => other !== name)) }, `${name} ×`)));
 }
@@ -78,7 +84,9 @@ async function run() {
   const button = byId("design-start");
   button.disabled = true;
   try {
-    const done = await work("design-job", { kind: "design", files: [], question: text().value, effort: byId("design-effort").value });
+    const measured = /^\s*runs\s*=/m.test(text().value) && currentTable();
+    const of = measured ? { ...measured, model: modelOfEstimate() } : { files: [] };
+    const done = await work("design-job", { kind: "design", ...of, question: text().value, effort: byId("design-effort").value });
     if (done) answer(done);
   } catch (error) {
     fault(error.message);
@@ -97,7 +105,8 @@ function answer({ id, result }) {
     element("div", { class: "buttons" },
       element("a", { class: "button", href: jobFile(id, "design_report.html", true), target: "_blank", rel: "noopener" }, "Open the full report"),
       element("a", { class: "button", href: jobFile(id, "design.json") }, "Save design.json"),
-      element("a", { class: "button", href: jobFile(id, "rover.toml") }, "Save rover.toml")),
+      element("a", { class: "button", href: jobFile(id, "rover.toml") }, "Save rover.toml"),
+      result.files.includes("MODEL.toml") ? element("a", { class: "button", href: jobFile(id, "MODEL.toml") }, "Save MODEL.toml") : ""),
     ...result.tables.map(table),
     fold("Remarks", wordList(result.remarks, "remark")),
   ].filter(Boolean));

@@ -11,10 +11,13 @@ import { sweepPlots } from "./plots.js";
 import { askForWheel } from "./wheel_question.js";
 
 const ALL = "";
-const current = { file: null, sheet: "" };
+const current = { file: null, sheet: "", name: "" };
 
 /** The table that estimates and gaps are made from: its key, and the run that is chosen. */
 export const currentTable = () => (current.file ? { files: [current.file], sheet: current.sheet || null, run: byId("run").value } : null);
+
+/** The name of that table as the commands take it; empty without one. */
+export const currentName = () => (current.file ? current.name + (current.sheet ? `#${current.sheet}` : "") : "");
 
 export function startEstimate() {
   byId("estimate-start").addEventListener("click", estimate);
@@ -22,7 +25,8 @@ export function startEstimate() {
 
 /** Take a table: show it, then estimate. */
 export async function takeTable(file, sheet, table, links = null) {
-  Object.assign(current, { file, sheet });
+  Object.assign(current, { file, sheet, name: table.name.split("#")[0] });
+  dispatchEvent(new Event("table"));
   const wheel = modelIsOwn() ? "" : setRadius(table.radius);
   if (wheel) table = { ...table, remarks: [...table.remarks, wheel] };
   showTable(table, links);
