@@ -1,7 +1,8 @@
 """Shear parameters of loose lunar soil along a sweep of slip, learned by an LS-SVM.
 
 The system of Xue et al. 2016: (slip, torque, load) to (cohesion, friction angle, shear modulus),
-trained on the simplified wheel of their eqs. 2-8, and drawbar pull from the estimate.
+trained on the simplified wheel of their eqs. 2-8, and drawbar pull from the estimate. The bearing
+of the soil is unknown. A set posterior answers for all readings of a soil.
 """
 
 from __future__ import annotations
@@ -9,9 +10,12 @@ from __future__ import annotations
 import shlex
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
+from lunar.bearing import show_bearing, write_known
 from lunar.evaluation import show_evaluation
 from lunar.exact import posterior
 from lunar.figures import SHOWN, PosteriorPanel, Sweep, draw_posteriors, draw_sweep
@@ -49,9 +53,18 @@ def run() -> None:
     case, estimator = read_case(HERE / "model.toml"), Estimator.load(model)
     rng = np.random.default_rng(SEED)
     truth = np.asarray([case.prior[n].at(f) for n, f in zip(SHEAR, FRACTIONS, strict=True)])
+    truth = np.append(truth, case.soil.kphi)
     show_sweep(case, estimator, truth, rng)
-    show_information(case, estimator, truth, rng)
     show_evaluation(case, estimator, LOAD, SEED + 1)
+    with TemporaryDirectory() as folder:
+        recipe, spec = write_known(HERE / "recipe.toml", HERE / "spec.toml", Path(folder))
+        data, model = (str(Path(folder) / name) for name in ("known.parquet", "known.onnx"))
+        command("generate", recipe, data)
+        command("train", spec, data, model)
+        known = Estimator.load(model)
+        show_bearing(case, estimator, known, LOAD, SEED + 2)
+        of_known = replace(case, prior={name: case.prior[name] for name in SHEAR})
+        show_information(of_known, known, truth[:3], np.random.default_rng(SEED))
     print(
         f"\n{time.perf_counter() - started:.0f} s; {OUT}/lunar_lssvm.png, lunar_single_triple.png"
     )
@@ -71,7 +84,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
         "truth",
         "prior",
         "one, LS-SVM",
-        "all, LS-SVM",
+        "all, set posterior",
         "all, least squares",
         "all, exact",
     )
@@ -88,10 +101,10 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
         said = [f"{value * factor:.3g} +- {std * factor:.2g}" for value, std in cells]
         lines.append((f"{name.replace('_', ' ')} {unit}", f"{truth[k] * factor:.3g}", *said))
     print(f"\nA soil of the prior, slip swept from 0.2 to 0.6 at {LOAD:g} N in {SLIPS} readings;")
-    print("one of them, at slip 0.4, and all pooled:\n")
+    print("one of them, at slip 0.4, and all:\n")
     print(format_table(header, lines))
     width = ", ".join(f"{100 * w:.0f} %" for w in joint.std / joint.prior_std)
-    print("\nAll have one load: cohesion and friction angle are confounded. Pooled, the LS-SVM")
+    print("\nAll have one load: cohesion and friction angle are confounded. The set posterior")
     print(f"leaves {width} of the prior's widths, and")
     print(f"least squares reports: {'; '.join(map(str, least.warnings)) or 'no warning'}")
     found = {
@@ -113,7 +126,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
     for name, said in (
         ("prior", "prior"),
         ("one", "each reading alone, LS-SVM"),
-        ("all", "all readings, LS-SVM"),
+        ("all", "all readings, set posterior"),
         ("least", "all readings, least squares"),
         ("exact", "all readings, exact posterior"),
     ):
@@ -132,7 +145,7 @@ def show_sweep(case: Case, estimator: Estimator, truth: Floats, rng: np.random.G
 def show_information(
     case: Case, estimator: Estimator, truth: Floats, rng: np.random.Generator
 ) -> None:
-    """Posterior from one reading, eight at one load and eighteen at three loads."""
+    """Posterior from one reading, eight at one load and eighteen at three loads; bearing known."""
     drives = (
         ("one reading: a surface", np.asarray([0.4]), np.asarray([LOAD])),
         ("8 slips at one load: a ridge", np.linspace(0.2, 0.6, 8), np.full(8, LOAD)),
@@ -143,13 +156,13 @@ def show_information(
         torque = add_torque_noise(case, wheel_forces(case, truth, slip, load).torque, rng)
         draws = posterior(case, slip, torque, load, rng, 3000)
         found = estimator.run(slip=slip, torque=torque, load=load)
-        told.append(PosteriorPanel(title, draws, found.mean, found.covariance))
-        left = np.concatenate([draws.std(axis=0), found.std]) / np.tile(found.prior_std, 2)
+        told.append(PosteriorPanel(title, draws[:, :3], found.mean, found.covariance))
+        left = np.concatenate([draws[:, :3].std(axis=0), found.std]) / np.tile(found.prior_std, 2)
         lines.append((title.split(":")[0], *(f"{100 * share:.0f} %" for share in left)))
     print(
         "\nOne reading is one equation for three unknowns; other slips determine K, loads the rest."
     )
-    print("Remaining prior width, by the exact posterior and by the LS-SVM:\n")
+    print("Remaining prior width if the bearing is known, by the exact posterior and the LS-SVM:\n")
     print(format_table(("", "c exact", "phi exact", "K exact", "c", "phi", "K"), lines))
     draw_posteriors(told, truth, bounds(case), OUT / "lunar_single_triple.png")
 

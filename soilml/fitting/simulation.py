@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.io.table import Table
 from soilml.physics.contact import Force
+from soilml.physics.gears import Midstance
 from soilml.physics.operating_point import AFTER_CAMPAIGN, COVARIATES, Operating
+from soilml.physics.pull_efficiency import pull_efficiency, tractive_efficiency
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
@@ -32,6 +36,7 @@ def simulate(
     seed: int | None = None,
     on_rows: Callable[[int], None] | None = None,
     with_std: bool = False,
+    with_efficiency: bool = False,
 ) -> Table:
     """Rows that a case predicts: torque, drawbar pull, sinkage and entry angle.
 
@@ -54,6 +59,9 @@ def simulate(
     with_std
         Adds a column `<column>_std` for each channel that [remainder] has: the standard deviation
         of the model's error there. The mean of the remainder is in the readings anyway.
+    with_efficiency
+        Adds the columns `tractive_efficiency`, of the torque and the drawbar pull of the row, and
+        `pull_efficiency`; NaN where the gear does not drive.
 
     Returns
     -------
@@ -64,7 +72,8 @@ def simulate(
     Raises
     ------
     InputError
-        For a case of several gears, and for values that are not valid.
+        For a case of several gears, for values that are not valid, and for the efficiency of a leg
+        that does not roll.
 
     Examples
     --------
@@ -103,5 +112,26 @@ def simulate(
         if with_std and case.remainder is not None and case.remainder.of(name):
             columns[f"{column(name)}_std"] = case.remainder.mean_and_std(name, slips, loads)[1]
     columns["entry_angle_rad"] = np.asarray(force.entry_angle)
+    if with_efficiency:
+        columns |= _efficiencies(case, columns, known)
     status = np.asarray([Status(int(code)).reason for code in force.status])
     return Table(columns | {"status": status}, source="simulated rows")
+
+
+def _efficiencies(
+    case: Case, columns: Mapping[str, NDArray[Any]], known: Mapping[str, float | None]
+) -> dict[str, Floats]:
+    """Tractive and pull efficiency of rows (n,), NaN where the gear does not drive."""
+    gear, slip = case.model.gear, columns["slip"]
+    if gear.name == Midstance.name:
+        raise InputError(
+            f"a gear of type {gear.name!r} does not roll: it has no tractive efficiency; use a "
+            "wheel or a track"
+        )
+    radius = float(np.asarray(gear.radius))
+    tractive = tractive_efficiency(radius, slip, columns["torque_Nm"], columns["drawbar_pull_N"])
+    pull, drives = np.full(slip.shape, np.nan), slip > 0.0
+    if drives.any():
+        at = Operating(slip=slip[drives], load=columns["load_N"][drives], **known)
+        pull[drives] = np.asarray(pull_efficiency(case.model, case.soil, at))
+    return {"tractive_efficiency": np.asarray(tractive), "pull_efficiency": pull}

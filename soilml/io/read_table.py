@@ -22,6 +22,8 @@ from soilml.quantities import COLUMNS
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
 _OTHERS = {"drawbar_pull_N", "sinkage_m"}  # Measured quantities that need no torque beside them
 RUNS = ("run", "slip", "load_N", "torque_Nm")
+#: Columns of `soilml simulate --efficiency`, which follow from the others and are passed over.
+DERIVED = ("tractive_efficiency", "pull_efficiency")
 FILLED = ("run", "slip", "load_N")  # Columns in which every row must have a value
 Limits = tuple[float, float, str]  # Lower and upper bound, and what is needed in words
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
@@ -171,7 +173,7 @@ def known_columns(
 ) -> list[str]:
     """Columns of a header that are read; raises `TableError` for one that is not known."""
     kept: list[str] = []
-    strange = [name for name in header if name not in own and name not in COLUMNS]
+    strange = [name for name in header if name not in (*own, *DERIVED) and name not in COLUMNS]
     if len(strange) == len(header) > 2 and not ignore_extra:
         hints = [(name, _misnamed(name)) for name in strange]
         shown = ", ".join(f"{name!r} ({hint})" if hint else repr(name) for name, hint in hints)
@@ -183,6 +185,8 @@ def known_columns(
     for name in header:
         if header.count(name) > 1:
             raise TableError(f"{file}: column {name} occurs twice")
+        if name in DERIVED and name not in own:
+            continue
         base = name.removesuffix("_std")
         if name in own or (base in COLUMNS and (base == name or base not in TEXT)):
             kept.append(name)

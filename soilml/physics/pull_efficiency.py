@@ -1,4 +1,4 @@
-"""Pull efficiency of a wheel on a soil, and the traffic class of the ground."""
+"""Pull efficiency and tractive efficiency of a gear on a soil, and the traffic class of ground."""
 
 from __future__ import annotations
 
@@ -42,6 +42,25 @@ def pull_efficiency(model: Model, soil: Soil, at: Operating) -> Array:
         _, stresses = stresses_at_sinkage(apply_input_effects(load_case), force.sinkage)
     thrust = xp.sum(stresses.shear * stresses.contact.horizontal_area, axis=0)
     return xp.reshape(force.drawbar_pull / thrust, shape)
+
+
+def tractive_efficiency(radius: Real, slip: Real, torque: Real, drawbar_pull: Real) -> Array:
+    r"""Power at the drawbar over the power of the drive; arrays broadcast.
+
+    .. math:: \eta = \frac{DP \, v}{T \, \omega} = \frac{(1 - s) \, r \, DP}{T}
+
+    radius (m) is that of which the slip is; torque (N m) and drawbar pull (N) are of one gear.
+    Negative where the gear cannot propel itself; NaN where it does not drive: slip or torque not
+    above 0.
+
+    References: Wong 2008, Theory of Ground Vehicles, 4th ed., section 4.2; named by Xue et al.
+    2016, section 1.
+    """
+    xp = namespace(torque)
+    slip, torque = xp.asarray(slip), xp.asarray(torque)
+    with np.errstate(all="ignore"):
+        ratio = (1.0 - slip) * radius * drawbar_pull / torque
+    return xp.where((slip > 0.0) & (torque > 0.0), ratio, xp.nan)
 
 
 def traffic_class(efficiency: Real) -> NDArray[np.str_]:

@@ -44,7 +44,7 @@ def show_evaluation(case: Case, estimator: Estimator, load: float, seed: int) ->
         rng = np.random.default_rng(seed)
         data = simulate_readings(truth, SLIPS, load, SOILS, rng)
         found = estimator(slip=SLIPS, torque=data.torque, load=load)
-        valid, values = found.in_range, data.soils[:, None, :]
+        valid, values = found.in_range, data.soils[:, None, :3]
         inside = (found.low <= values) & (values <= found.high)
         cells = _errors((found.mean - values)[valid], inside[valid], found.prior_std)
         estimates.append((name, f"{100 * valid.mean():.1f} %", *cells))
@@ -58,7 +58,7 @@ def show_evaluation(case: Case, estimator: Estimator, load: float, seed: int) ->
     print(format_table((DRIVEN, "in range", *PARAMETERS), estimates))
     print("\nDrawbar pull, RMS error in N (coverage of the 90 % interval); torque / r estimates no")
     print("soil, and subtracts the mean loss over the prior's soils:\n")
-    header = (DRIVEN, "predicted at", "prior", "torque / r", "LS-SVM", f"LS-SVM, all {len(SLIPS)}")
+    header = (DRIVEN, "predicted at", "prior", "torque / r", "LS-SVM", f"all {len(SLIPS)}")
     print(format_table(header, pulls, text_columns=2))
     print(f"\nLeast squares of the simplified model, 6 slips x 3 loads, {FITTED} soils:\n")
     print(format_table((DRIVEN, *PARAMETERS, "pull N"), fits))
@@ -76,8 +76,8 @@ def show_bayes_limit(case: Case, estimator: Estimator, load: float, seed: int) -
         ("LS-SVM", own, from_own),
         ("exact posterior mean", mean, best),
     ):
-        off = np.mean((found - data.soils[:, None, :]) ** 2, axis=(0, 1))
-        share = 1.0 - off / np.var(data.soils, axis=0)
+        off = np.mean((found - data.soils[:, None, :3]) ** 2, axis=(0, 1))
+        share = 1.0 - off / np.var(data.soils[:, :3], axis=0)
         lines.append((name, *_each(share, "{:.2f}"), f"{pull.error(data.pull):.2f}"))
     print("\nVariance of the soils that one reading explains (R2), and RMS error of the pull:\n")
     print(format_table(("", "c", "phi", "K", "pull N"), lines))
@@ -116,7 +116,7 @@ def _fits(case: Case, truth: Case, load: float, rng: np.random.Generator) -> lis
     fits = [identify(case, table(slip, row, loads), method="nonlinear") for row in torque]
     mean = np.stack([fit.values for fit in fits])
     covariance = np.stack([fit.covariance for fit in fits])
-    off, std = mean - values, np.stack([fit.std for fit in fits])
+    off, std = (mean - values)[:, :3], np.stack([fit.std for fit in fits])[:, :3]
     spread = np.asarray([case.prior[name].std for name in SHEAR])
     pull = wheel_forces(truth, values[:, None, :], SLIPS, load).drawbar_pull
     found = PullPredictions(

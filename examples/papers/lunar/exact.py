@@ -14,7 +14,7 @@ from soilml.identification.posterior import sample_posterior
 def posterior(
     case: Case, slip: Floats, torque: Floats, load: Floats, rng: np.random.Generator, count: int
 ) -> Floats:
-    """`count` posterior samples (count, 3) of the soil, given readings (r,) on it.
+    """`count` posterior samples (count, p) of the soil's p parameters, given readings (r,) on it.
 
     Drawn from the weighted samples of `soilml identify --method posterior`.
     """

@@ -28,8 +28,8 @@ class Sweep:
     slip: Floats
     single: Estimate
     joint: Estimate
-    least: tuple[Floats, Floats]  # value and std, (3,)
-    exact: Floats  # draws of the exact posterior, (n, 3)
+    least: tuple[Floats, Floats]  # value and std, (p,)
+    exact: Floats  # draws of the exact posterior, (n, p)
     truth: Floats  # (3,)
     prior: tuple[Floats, Floats]  # ends, (3,)
     pull: Floats  # N, true, (m,)
@@ -81,7 +81,7 @@ def _parameter(axis: Any, sweep: Sweep, k: int) -> None:
     bar = {"ms": 7, "lw": 2.2, "capsize": 3, "zorder": 5}
     axis.errorbar(
         [0.62], [joint.mean[k] * factor], np.asarray(ends) * factor,
-        fmt="D", color=ALL, label="all, LS-SVM", **bar,
+        fmt="D", color=ALL, label="all, set posterior", **bar,
     )  # fmt: skip
     reach = Z_90 * std[k]
     inside = np.clip([value[k] - reach, value[k] + reach], *(end[k] for end in sweep.prior))
@@ -158,7 +158,7 @@ def draw_posteriors(
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=11)
     figure.suptitle(
-        "Information of slip, torque and load on lunar soil; the frame is the prior",
+        "Slip, torque and load on lunar soil of known bearing; the frame is the prior",
         fontsize=13,
     )
     with atomic_output(out) as part:

@@ -19,7 +19,7 @@ DRAWS = 100
 
 @dataclass(frozen=True)
 class SimulatedReadings:
-    """Soils (m, 3), and their measured torque and true pull (m, k) at slips (k,) under one load."""
+    """Soils (m, p), and their measured torque and true pull (m, k) at slips (k,) under one load."""
 
     soils: Floats
     slip: Floats
@@ -127,7 +127,7 @@ def predict_from_posterior(
         here = wheel_forces(case, values, slip, run.load).torque
         there = wheel_forces(case, values, at[i], run.load).drawbar_pull
         weight = _weights(case, run.torque[:, i, None], here)
-        pull[:, i], mean[:, i] = weight @ there, weight @ values
+        pull[:, i], mean[:, i] = weight @ there, weight @ values[:, :3]
     nothing = np.full_like(pull, np.nan)
     return PullPredictions(pull, nothing, nothing), mean
 

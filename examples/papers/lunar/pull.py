@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from lunar.sweep import Floats, bounds, wheel_forces
+from lunar.sweep import NAMES, Floats, bounds, wheel_forces
 
 from soilml import Case
 
@@ -14,11 +14,12 @@ SPARE = 6
 def sample_soils(
     case: Case, mean: Floats, covariance: Floats, rng: np.random.Generator, count: int
 ) -> Floats:
-    """Samples (count, ..., 3) of Gaussians (..., 3) and (..., 3, 3), truncated to the prior.
+    """Samples (count, ..., p) of Gaussians (..., p) and (..., p, p), truncated to the prior.
 
-    If fewer than `count` samples lie inside, they are repeated.
+    If fewer than `count` samples lie inside, they are repeated. Where p is 3 and the prior has a
+    bearing too, that is drawn from its prior: (count, ..., 4).
     """
-    lower, upper = bounds(case)
+    lower, upper = bounds(case, mean.shape[-1])
     scale = upper - lower
     factor = np.linalg.cholesky(covariance / np.outer(scale, scale)) * scale[:, None]
     normal = rng.standard_normal((SPARE * count, *mean.shape))
@@ -27,7 +28,10 @@ def sample_soils(
     order = np.argsort(outside, axis=0, kind="stable")
     turn = np.arange(count).reshape(-1, *[1] * (mean.ndim - 1))
     place = np.take_along_axis(order, turn % np.maximum((~outside).sum(axis=0), 1), axis=0)
-    return np.clip(np.take_along_axis(values, place[..., None], axis=0), lower, upper)
+    found = np.clip(np.take_along_axis(values, place[..., None], axis=0), lower, upper)
+    unknown = [case.prior[name] for name in NAMES[mean.shape[-1] :] if name in case.prior]
+    rest = [prior.at(rng.random(found.shape[:-1])) for prior in unknown]
+    return np.concatenate([found, *(values[..., None] for values in rest)], axis=-1)
 
 
 def pull_interval(
@@ -39,10 +43,9 @@ def pull_interval(
     rng: np.random.Generator,
     count: int = 800,
 ) -> tuple[Floats, Floats, Floats]:
-    """Drawbar pull (N) predicted from estimates (..., 3) at slips (...): mean and 90 % interval.
+    """Drawbar pull (N) predicted from estimates (..., p) at slips (...): mean and 90 % interval.
 
-    The bearing parameters are those of the case; the uncertainty of the shear parameters is
-    propagated by sampling.
+    What the estimates do not contain is drawn from its prior, or known.
     """
     pull = wheel_forces(
         case, sample_soils(case, mean, covariance, rng, count), slip, load
@@ -57,7 +60,7 @@ def mean_and_interval(draws: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def repeat_over_slips(mean: Floats, covariance: Floats, slips: int) -> tuple[Floats, Floats]:
-    """Estimates (..., 3) repeated for each slip: (..., slips, 3)."""
-    shape = (*mean.shape[:-1], slips, 3)
-    wide = np.broadcast_to(covariance[..., None, :, :], (*shape, 3))
+    """Estimates (..., p) repeated for each slip: (..., slips, p)."""
+    shape = (*mean.shape[:-1], slips, mean.shape[-1])
+    wide = np.broadcast_to(covariance[..., None, :, :], (*shape, mean.shape[-1]))
     return np.broadcast_to(mean[..., None, :], shape), wide

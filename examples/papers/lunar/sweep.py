@@ -9,16 +9,19 @@ from soilml import Case, Force, Operating, Table
 from soilml.quantities import SHEAR
 
 Floats = NDArray[np.float64]
+#: Parameters of a soil, in order: of three values the last is missing, and is that of the case.
+NAMES = (*SHEAR, "kphi")
 
 
 def soils(case: Case, count: int, rng: np.random.Generator) -> Floats:
-    """Cohesion (Pa), friction angle (rad), shear modulus (m) sampled from the prior, (count, 3)."""
-    return np.stack([case.prior[name].at(rng.random(count)) for name in SHEAR], axis=1)
+    """Soils sampled from the prior, (count, 4): `NAMES` in SI; (count, 3) where kphi is known."""
+    return np.stack([case.prior[n].at(rng.random(count)) for n in NAMES if n in case.prior], axis=1)
 
 
 def wheel_forces(case: Case, values: Floats, slip: Floats, load: Floats | float) -> Force:
-    """Forces of a case's model on soils (..., 3) at slips and loads that broadcast with (...)."""
-    changed = case.with_values({name: values[..., k] for k, name in enumerate(SHEAR)})
+    """Forces of a case's model on soils (..., 3 or 4) at slips and loads of shape (...)."""
+    names = NAMES[: values.shape[-1]]
+    changed = case.with_values({name: values[..., k] for k, name in enumerate(names)})
     return changed.model(changed.soil, Operating(slip=slip, load=load))
 
 
@@ -27,9 +30,9 @@ def add_torque_noise(case: Case, torque: Floats, rng: np.random.Generator) -> Fl
     return torque + case.noise["torque_Nm"].std(torque) * rng.standard_normal(torque.shape)
 
 
-def bounds(case: Case) -> tuple[Floats, Floats]:
-    """Lower and upper end of the prior, (3,) each."""
-    ends = [(case.prior[name].lower, case.prior[name].upper) for name in SHEAR]
+def bounds(case: Case, count: int = 3) -> tuple[Floats, Floats]:
+    """Lower and upper end of the prior of the first `count` parameters, (count,) each."""
+    ends = [(case.prior[name].lower, case.prior[name].upper) for name in NAMES[:count]]
     lower, upper = np.asarray(ends).T
     return lower, upper
 

@@ -20,6 +20,8 @@ Ranges are start:stop:count, or values with commas. With --run, `soilml
 identify` can read the table. A row without equilibrium has blank values and
 the reason in the column `status`; it is an error if no row has an equilibrium.
 The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
+--efficiency adds the power at the drawbar over that of the drive, (1 - s) r DP/T,
+and the share of the thrust that is left as pull (Comin and Saaj 2017, eq. 32).
 Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
@@ -54,6 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--std", action="store_true", help="add the std of the model's error from [remainder]"
     )
+    parser.add_argument(
+        "--efficiency", action="store_true", help="add tractive efficiency and pull efficiency"
+    )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
 
 
@@ -85,7 +90,16 @@ def run(args: argparse.Namespace) -> int:
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        rows = simulate(case, slip, load, **known, run=args.label, on_rows=done, with_std=args.std)
+        rows = simulate(
+            case,
+            slip,
+            load,
+            **known,
+            run=args.label,
+            on_rows=done,
+            with_std=args.std,
+            with_efficiency=args.efficiency,
+        )
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))

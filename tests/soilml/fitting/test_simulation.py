@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import Noise, Prior, gap, identify, read_case, simulate
+from soilml import Midstance, Noise, Prior, gap, identify, read_case, simulate
+from soilml.cli.output import save_columns
 from soilml.errors import InputError
 from soilml.fitting import simulation
+from soilml.io.read_table import read_table
 
 
 @pytest.fixture
@@ -26,6 +28,25 @@ def test_rows_are_those_of_the_model_in_blocks_and_say_where_there_is_none(case,
     assert rows.answered.tolist() == [True, False, True] and np.isnan(rows["torque_Nm"][1])
     for name in ("torque_Nm", "drawbar_pull_N", "sinkage_m", "entry_angle_rad"):
         np.testing.assert_allclose(rows[name], whole[name], rtol=1e-9)
+
+
+def test_efficiencies_are_of_driving_rows_and_are_passed_over_by_readers(case, tmp_path):
+    rows = simulate(case, [-0.2, 0.3], 60.0, with_efficiency=True)
+    radius = case.model.gear.radius
+    expected = 0.7 * radius * rows["drawbar_pull_N"][1] / rows["torque_Nm"][1]
+    assert np.isnan(rows["tractive_efficiency"][0])
+    assert rows["tractive_efficiency"][1] == pytest.approx(expected)
+    assert np.isnan(rows["pull_efficiency"][0]) and rows["pull_efficiency"][1] < 1.0
+    file = tmp_path / "rows.csv"
+    save_columns({"run": ["a", "a"], **rows.columns}, file)
+    assert "pull_efficiency" not in read_table(file)
+
+
+def test_a_leg_that_does_not_roll_has_no_efficiency(case):
+    foot = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
+    leg = replace(case, model=replace(case.model, gear=foot))
+    with pytest.raises(InputError, match="does not roll"):
+        simulate(leg, 0.3, 12.0, with_efficiency=True)
 
 
 def test_noise_is_that_of_the_case_and_its_seed(case):

@@ -7,7 +7,12 @@ from scipy.integrate import quad
 
 from soilml import BearingFriction, Bulldozing, Model, Operating, Wheel, soil
 from soilml.errors import InputError
-from soilml.physics.pull_efficiency import CLASSES, pull_efficiency, traffic_class
+from soilml.physics.pull_efficiency import (
+    CLASSES,
+    pull_efficiency,
+    tractive_efficiency,
+    traffic_class,
+)
 
 WHEEL = Model(Wheel(radius=0.15, width=0.18))
 AT = Operating(slip=0.2, load=490.5)
@@ -76,3 +81,9 @@ def test_friction_in_the_bearing_is_no_resistance_of_the_soil():
     ground = soil("comin2017/es-3")
     with_bearing = pull_efficiency(WHEEL + BearingFriction(coefficient=0.1), ground, AT)
     assert with_bearing == pytest.approx(float(pull_efficiency(WHEEL, ground, AT)))
+
+
+def test_tractive_efficiency_is_power_at_the_drawbar_over_that_of_the_drive():
+    # v = 0.8 * 0.15 m * 2 rad/s = 0.24 m/s: 30 N * 0.24 m/s over 9 N m * 2 rad/s
+    assert tractive_efficiency(0.15, 0.2, 9.0, 30.0) == pytest.approx(30.0 * 0.24 / 18.0)
+    assert np.isnan(tractive_efficiency(0.15, np.asarray([0.0, -0.2, 0.2]), [9, 9, -1], 30.0)).all()

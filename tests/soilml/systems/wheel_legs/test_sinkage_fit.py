@@ -6,6 +6,7 @@ import pytest
 from soilml.errors import FitError, InputError
 from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.sinkage_fit import (
+    PRINTED_SINKAGE,
     SinkageFit,
     fit_simulated_sinkage,
     fit_sinkage,
@@ -92,3 +93,10 @@ def test_too_few_soils_are_refused():
     with pytest.raises(FitError, match="different sinkages"):
         fit_sinkage([0.02] * 3, [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], list("abc"))
     assert SinkageFit.__doc__
+
+
+def test_the_printed_relations_can_be_called():
+    found = PRINTED_SINKAGE([0.01, 0.05])
+    assert found.normal_stiffness == pytest.approx([33900.0, 6780.0])  # 3.39 N/cm over 1 and 5 cm
+    assert found.friction_angle == pytest.approx([0.69, 0.41])
+    assert found.in_range.tolist() == [True, False]
