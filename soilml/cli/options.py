@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from soilml.physics.effects import Effect
 
+FILE_SUFFIXES = (".html", ".json", ".csv", ".toml", ".pdf")  # Of no folder that is made
 REPORT_FILES = ("report.html", "report.json")  # Files of the folder of --report
 MAX_ROWS = 10_000_000  # Rows beyond which a table would not fit into the memory of a small machine
 _MAX_SHOWN = 80  # A longer option value is cut in an error message
@@ -132,6 +133,9 @@ def folder_outputs(option: str, path: str | None, names: Sequence[str]) -> list[
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{option} {path} is a file; needed is a folder")
+    if folder.suffix in FILE_SUFFIXES and not folder.exists():
+        raise InputError(f"{option} {path} is the name of a file; needed is a folder, for "
+                         f"{' and '.join(names[:2])}: {option} {folder.with_suffix('')}")  # fmt: skip
     return [folder / name for name in names] if folder.is_dir() else []
 
 

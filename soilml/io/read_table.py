@@ -194,7 +194,8 @@ def known_columns(
             raise TableError(f"{file}: column {name!r}: {hint}")
         elif not ignore_extra:
             raise TableError(
-                f"{file}: column {name!r} is not known; remove it, or pass --ignore-extra"
+                f"{file}: column {name!r} is not known; remove it, pass --ignore-extra, or let "
+                "`soilml import --init` guess what it is"
             )
     return kept
 

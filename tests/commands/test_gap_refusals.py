@@ -71,7 +71,7 @@ ROWS = {
     ),
     "unknown column": (
         RUNS.replace("torque_Nm", "torque_Nm,mood").replace("1.5", "1,9").replace("3.0", "3,9"),
-        "pass --ignore-extra",
+        "pass --ignore-extra, or let `soilml import --init` guess what it is",
     ),
     "no row": ("run,slip,load_N,torque_Nm\n", "no row"),
     "another wheel": (

@@ -125,7 +125,11 @@ def test_no_file_is_written_where_the_page_fails(folder, monkeypatch, capsys):
 
 
 def test_bad_folders_are_one_line(folder, capsys):
-    for path, said in (("runs.csv", "is a file; needed is a folder"), ("", "--report is empty")):
+    for path, said in (
+        ("runs.csv", "is a file; needed is a folder"),
+        ("x.html", "is the name of a file; needed is a folder, for report.html and report.json"),
+        ("", "--report is empty"),
+    ):
         assert main([*COMMANDS["identify"], "--report", path]) == 2
         error = capsys.readouterr().err
         assert error.count("\n") == 1 and said in error
