@@ -134,8 +134,11 @@ def folder_outputs(option: str, path: str | None, names: Sequence[str]) -> list[
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{option} {path} is a file; needed is a folder")
     if folder.suffix in FILE_SUFFIXES and not folder.exists():
-        raise InputError(f"{option} {path} is the name of a file; needed is a folder, for "
-                         f"{' and '.join(names[:2])}: {option} {folder.with_suffix('')}")  # fmt: skip
+        files = " and ".join(names[:2])
+        raise InputError(
+            f"{option} {path} is the name of a file; needed is a folder, for {files}: "
+            f"{option} {folder.with_suffix('')}"
+        )
     return [folder / name for name in names] if folder.is_dir() else []
 
 

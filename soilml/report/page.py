@@ -6,6 +6,7 @@ import hashlib
 import json
 import math
 import os
+import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -183,9 +184,18 @@ def _environment(package: str) -> Environment:
 Content = str | Callable[[Path], object]
 
 
+#: A list of numbers over several lines, up to its end; texts have no line ends of their own.
+_NUMBER = r"(?:-?\d[\d.eE+-]*|null)"
+_NUMBERS = re.compile(rf"\[\n\s*{_NUMBER}(?:,\n\s*{_NUMBER})*\n\s*(?=\])")
+
+
 def json_text(content: Any) -> str:
-    """The content as indented JSON; numbers that are not finite become null, as JSON has none."""
-    return json.dumps(finite_or_null(content), indent=2, allow_nan=False) + "\n"
+    """The content as indented JSON; numbers that are not finite become null, as JSON has none.
+
+    A list of numbers is one line.
+    """
+    text = json.dumps(finite_or_null(content), indent=2, allow_nan=False)
+    return _NUMBERS.sub(lambda found: " ".join(found[0].split()).replace("[ ", "["), text) + "\n"
 
 
 def finite_or_null(value: Any) -> Any:
