@@ -38,6 +38,7 @@ friction angle and shear modulus, each with its uncertainty.
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
+                               soilml wheel-leg (torque, vibration, sinkage)
   from soil to a simulator     soilml export-soil
   comparison of methods        soilml compare
   slopes that can be climbed   soilml pull (from measured rows)
@@ -75,6 +76,7 @@ COMMANDS = {
     "design": "soilml.cli.commands.design",
     "compare": "training.commands.compare",
     "climb": "soilml.cli.commands.climb",
+    "wheel-leg": "soilml.cli.commands.wheel_leg",
     "papers": "soilml.cli.commands.papers",
 }
 #: Options whose value may begin with a minus sign.

@@ -62,6 +62,7 @@ ELSEWHERE = {
     "adapt",
     "compare",
     "climb",
+    "wheel-leg",
     "serve",
 }
 
