@@ -22,6 +22,7 @@ from training.export.model_file import export_model
 from training.export_c.c_file import write_c
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.recipe_family import RecipeFamily
+from training.set_posterior.response_surface import check_equilibria
 from training.spec import Spec, read_spec
 from training.train import train
 
@@ -85,7 +86,8 @@ def make_file(
     save_text(folder / names.recipe, recipe)
     found = read_recipe(folder / names.recipe)
     spec = _spec(found, seed, scales)
-    RecipeFamily.of(found, spec.targets)  # raises before anything is simulated
+    # both raise before rows are simulated and the training begins
+    check_equilibria(RecipeFamily.of(found, spec.targets), seed)
     rows, model = folder / names.rows, folder / names.model[0]
     stage = f"{names.name}: simulating"
     steps.run(

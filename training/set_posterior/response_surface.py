@@ -121,6 +121,9 @@ CHANNEL_WEIGHTS = np.asarray([1.0, 0.4, 1.0])
 CONTACT_SHARE, LEAST_CONTACT_DESIGNS, CONTACT_HIDDEN = 8, 512, 32
 #: Designs on which terms are chosen, and points of the unknowns.
 SELECTION_DESIGNS, SELECTION_POINTS = 256, 512
+#: Designs that are simulated to see whether soils of the prior carry the loads, and the share of
+#: them below which they plainly do not.
+CHECKED_DESIGNS, CLEARLY_TOO_FEW = 64, 0.35
 
 
 @dataclass(frozen=True)
@@ -221,6 +224,27 @@ def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Prog
     return replace(response, contact=_fit(family, family.contact_changes, terms, smaller, progress))
 
 
+def check_equilibria(family: WheelFamily, seed: int) -> None:
+    """Raise what `fit_response` would for loads that soils of the prior do not carry, in seconds.
+
+    A few designs tell; where their share is near the limit, the fit itself decides.
+    """
+    x = _points(family, SELECTION_POINTS, seed)
+    y = family.responses(family.designs(CHECKED_DESIGNS, seed), x[None])
+    feasible = np.asarray(np.isfinite(y).all(axis=(1, 2)))
+    if feasible.mean() < CLEARLY_TOO_FEW:
+        _check_share(feasible)
+
+
+def _check_share(feasible: NDArray[np.bool_]) -> None:
+    if feasible.mean() < 0.5:
+        raise InputError(
+            f"only {feasible.mean():.0%} of the operating conditions have an equilibrium on all "
+            "soils of the prior; needed is half of them: lower the loads, or raise the bearing "
+            "values or the lower ends of their priors"
+        )
+
+
 def family_terms(family: WheelFamily) -> Terms:
     """All monomials of the degrees of a family."""
     return monomial_terms(len(family.axes), family.degree[0], family.targets, family.degree[1])
@@ -250,12 +274,7 @@ def _fit(
     basis = monomials(x, terms)
     designs = family.designs(settings.designs, settings.seed)
     coefficients, squared_error, feasible = _fit_polynomials(respond, designs, x, basis, progress)
-    if feasible.mean() < 0.5:
-        raise InputError(
-            f"only {feasible.mean():.0%} of the operating conditions have an equilibrium on all "
-            "soils of the prior; needed is half of them: lower the loads, or raise the bearing "
-            "values"
-        )
+    _check_share(feasible)
     features = family.features(designs[feasible])
     # the error of a coefficient counts by the rms of its monomial
     error_weights = np.sqrt(np.mean(basis**2, axis=0))[:, None] * CHANNEL_WEIGHTS
