@@ -62,10 +62,10 @@ def with_errors_integrated_out(
         while (step := _step(split, users, known)) is not None:
             steps.append(step)
             name, between = step.result, []
-            while uses[name] == 1 and users[name][0].op_type == "Identity":
+            while uses[name] == 1 and name in users and users[name][0].op_type == "Identity":
                 between.append(users[name][0])
                 name = between[-1].output[0]
-            if uses[name] != 1 or users[name][0].op_type != "Split":
+            if uses[name] != 1 or name not in users or users[name][0].op_type != "Split":
                 break
             following = users[name][0]
             if _step(following, users, known) is None:

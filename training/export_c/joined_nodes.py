@@ -298,10 +298,12 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
     """The nodes, with systems of which only sums of squares are needed replaced by fewer rows."""
     from onnx import helper
 
-    users = users_of(nodes)
+    users, makers = users_of(nodes), makers_of(nodes)
     changed: dict[int, tuple[int, ...]] = {}  # inputs of nodes that are replaced
     wanted: set[str] = set()  # systems with fewer rows
     for node in nodes:
+        if not node.input or node.input[0] not in makers:
+            continue
         if node.op_type == SUMS and len(node.input) == 6 and node.input[0] == node.input[2]:
             changed[id(node)] = (0, 2)
         elif node.op_type == "MatMul" and node.input[0] not in known:
