@@ -168,6 +168,8 @@ def parse_recipe(text: str, where: str) -> Recipe:
 
 
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
+    if "simulator" in settings:
+        settings.fail("a recipe takes equations, and no [simulator]; remove it")
     case = take_case(settings, effects)
     if case.soil_tests:
         settings.fail(

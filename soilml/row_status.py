@@ -13,6 +13,7 @@ class Status(IntEnum):
     NO_PEAK = 2
     NO_BEARING = 3
     NOT_CONVERGED = 4
+    NOT_SIMULATED = 5
 
     @property
     def reason(self) -> str:
@@ -28,4 +29,5 @@ _REASONS: dict[Status, str] = {
     "a0 + a1 slip must lie between 0 and 1",
     Status.NO_BEARING: "no bearing: kc / width + kphi is not positive",
     Status.NOT_CONVERGED: "no equilibrium found: the search for the sinkage did not converge",
+    Status.NOT_SIMULATED: "not simulated: slip or load lies outside the runs of the simulator",
 }

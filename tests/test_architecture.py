@@ -21,6 +21,8 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/io/spreadsheet.py": {"openpyxl"},
     "soilml/io/table.py": {"pyarrow"},
     "soilml/fitting/scipy_descents.py": {"scipy"},
+    "soilml/experiment_design/simulator_runs.py": {"scipy"},
+    "soilml/numerics/gaussian_emulator.py": {"scipy"},
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},
     "soilml/gap/workflow.py": {"threadpoolctl"},

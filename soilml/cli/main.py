@@ -40,6 +40,7 @@ friction angle and shear modulus, each with its uncertainty.
                                soilml bevameter (plate and shear tests)
                                soilml wheel-leg (torque, vibration, sinkage)
   from soil to a simulator     soilml export-soil
+  runs of your own simulator   soilml design-runs
   comparison of methods        soilml compare
   slopes that can be climbed   soilml pull (from measured rows)
                                soilml climb (from stress on the rims)
@@ -72,6 +73,7 @@ COMMANDS = {
     "export-step": "training.commands.export_step",
     "estimate": "soilml.cli.commands.estimate",
     "advise": "soilml.cli.commands.advise",
+    "design-runs": "soilml.cli.commands.design_runs",
     "pull": "soilml.cli.commands.pull",
     "design": "soilml.cli.commands.design",
     "compare": "training.commands.compare",

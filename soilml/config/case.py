@@ -23,6 +23,12 @@ from soilml.config.model_settings import (
     take_soil,
 )
 from soilml.config.remainder import Remainder, take_remainder
+from soilml.config.simulator import (
+    Simulator,
+    emulated,
+    take_simulator,
+    with_emulator_error,
+)
 from soilml.config.wheeled_rover import WheeledRover, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
@@ -64,6 +70,9 @@ class Case:
     remainder
         What a gap analysis learned of the readings that soil and effects do not explain; its mean
         is a part of every prediction.
+    simulator
+        Another program whose runs stand in for the equations; the error of their emulator is a part
+        of `discrepancy`.
     """
 
     model: Model
@@ -76,6 +85,13 @@ class Case:
     rover: WheeledRover | None = None
     soil_tests: tuple[SoilTest, ...] = ()
     remainder: Remainder | None = None
+    simulator: Simulator | None = None
+
+    @property
+    def states_model_error(self) -> bool:
+        """Whether the file states the error of its model, beyond that of an emulator."""
+        of_emulator = self.simulator is not None and not self.simulator.states_discrepancy
+        return self.remainder is not None or bool(self.discrepancy and not of_emulator)
 
     def parameters(self) -> dict[str, tuple[Parameter, Any]]:
         """Every parameter by path, with its declaration and its value.
@@ -158,6 +174,7 @@ def read_case(
     path: str | os.PathLike[str],
     effects: Mapping[str, type[Effect]] = EFFECTS,
     with_bias: bool = False,
+    with_simulator: bool = True,
 ) -> Case:
     """Read a case from a TOML model file.
 
@@ -165,12 +182,15 @@ def read_case(
     ----------
     path
         The file: tables [gear] or several [gears.NAME], [soil] with [soil.prior], [[effect]],
-        [noise], [discrepancy], [remainder] and [rover].
+        [noise], [discrepancy], [remainder], [simulator] and [rover].
     effects
         Effects that [[effect]] may name; those of the catalogue by default.
     with_bias
         Whether [bias] is read; otherwise it is refused, so that nobody takes it as used where it is
         not.
+    with_simulator
+        Whether the runs of [simulator] take the place of the equations; otherwise they are not
+        read.
 
     Returns
     -------
@@ -205,7 +225,7 @@ def read_case(
     wheel Prior(lower=0.4, upper=0.8, log=False) 0.02
     """
     settings = read_settings(path, f"soilml init {path}")
-    case = take_case(settings, effects)
+    case = take_case(settings, effects, with_simulator)
     if with_bias:
         case = replace(case, bias=take_bias(settings.table("bias")))
     elif "bias" in settings:
@@ -250,7 +270,9 @@ def case_of_one_gear(case: Case, path: str | os.PathLike[str], gear: str | None)
     return case.of_gear(gear)
 
 
-def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS) -> Case:
+def take_case(
+    settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS, with_simulator: bool = True
+) -> Case:
     """The case in the tables that `read_case` reads; others are left unread."""
     gears: dict[str, Model] = {}
     gear_priors: dict[str, Prior] = {}
@@ -262,6 +284,15 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
     else:
         model = Model(take_gear(settings.table("gear")))
     own_soil, prior, soil_tests = take_soil(settings.table("soil"))
+    simulator = None
+    if "simulator" in settings:
+        own = settings.table("simulator")
+        if gears:
+            own.fail("a simulator has one wheel, in [gear]; remove [gears]")
+        simulator = take_simulator(own, model.gear)
+        if with_simulator:
+            gear, simulator = emulated(simulator, own_soil, prior)
+            model = Model(gear)
     model, effect_priors = take_effects(settings.tables("effect"), effects, model)
     for name, other in gears.items():
         for effect in model.effects:
@@ -279,6 +310,9 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
             noise[key] = take_noise(noise_settings, key)
     noise_settings.finish()
     discrepancy = take_discrepancy(settings.table("discrepancy"))
+    if simulator is not None:
+        simulator = replace(simulator, states_discrepancy=bool(discrepancy))
+        discrepancy = with_emulator_error(discrepancy, simulator.error)
     rover = (
         take_rover(settings.table("rover"), gears or {"": model}) if "rover" in settings else None
     )
@@ -295,4 +329,5 @@ def take_case(settings: Settings, effects: Mapping[str, type[Effect]] = EFFECTS)
         rover=rover,
         soil_tests=soil_tests,
         remainder=remainder,
+        simulator=simulator,
     )

@@ -29,7 +29,10 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
     """
     lines = [f"# {line}" for line in comments]
     if not case.gears:
-        lines += ["[gear]", *_gear_lines(case.model.gear), ""]
+        gear = case.model.gear if case.simulator is None else case.simulator.gear
+        lines += ["[gear]", *_gear_lines(gear), ""]
+        if case.simulator is not None:
+            lines += [*case.simulator.lines(), ""]
     for name, model in case.gears.items():
         key = name if name == UNNAMED_GEAR else f"gears.{name}"
         lines += [f"[{key}]", *_gear_lines(model.gear), ""]

@@ -18,6 +18,7 @@ from soilml.parameters import Parameter
 from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.effects.exit_angle import ExitAngle
 from soilml.physics.gears.base import Gear
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.gears.rigid_wheel import WheelArc, entry_angle
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
@@ -104,6 +105,8 @@ def without_errors(
         nil |= {"bearing_by_slip"}
     if ExitAngle.name in effects or not all(ExitAngle.applies_to(gear) for gear in gears):
         nil |= {"contact"}
+    if any(isinstance(gear, EmulatedGear) and "kphi" not in gear.inputs for gear in gears):
+        nil |= {"bearing", "bearing_by_slip", "bearing_by_load"}  # the runs do not vary it
     return nil
 
 
@@ -146,6 +149,11 @@ class ModelledErrors(Effect):
     bearing_by_load: Annotated[Real, Parameter("1", LEAST, MOST, "its growth with log load")] = 0.0
     contact: Annotated[Real, Parameter("1", LEAST, MOST, "angle at exit over the usual one")] = 0.0
     typical_load: Annotated[Real, Parameter("N", 0.0, float("inf"), "W0")] = 1.0
+
+    @classmethod
+    def applies_to(cls, gear: Gear) -> bool:
+        """Any gear: errors that it does not have are left out."""
+        return True
 
     def on_operating(self, at: Operating, load_case: LoadCase) -> Operating:
         xp = namespace(at.slip)

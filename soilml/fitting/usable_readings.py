@@ -8,7 +8,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
-from soilml.errors import FitError, InputError
+from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.operating_points import operating_points, with_rover_columns
 from soilml.fitting.readings import (
     LEAST_RELATIVE_STD,
@@ -18,6 +18,7 @@ from soilml.fitting.readings import (
 )
 from soilml.fitting.row_order import with_order_columns
 from soilml.io.table import Table
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.remarks import Remark
 
@@ -38,6 +39,8 @@ def usable_readings(case: Case, table: Table) -> Readings:
         table = with_order_columns(case, table)
     table, excluded = answered_rows(with_rover_columns(case, table))
     check_wheel_size(case, table)
+    if isinstance(case.model.gear, EmulatedGear):
+        check_design(case.model.gear, table)
     notes = [*_remarks_on(case, table), *excluded]
     found = stack_readings(case, table)
     if not found.channels:
@@ -48,6 +51,30 @@ def usable_readings(case: Case, table: Table) -> Readings:
     if not kept or not unknown:
         return found
     return replace(found.of_channels(kept), excluded_channels=unknown)
+
+
+def check_design(gear: EmulatedGear, table: Table) -> None:
+    """Raise `TableError` for a row beyond the runs of a simulator, or a channel that these lack."""
+    for name, low, high in zip(gear.inputs, gear.lower, gear.upper, strict=True):
+        if name not in ("slip", "load"):
+            continue
+        values = table[column(name)]
+        outside = gear.beyond(name, values)
+        if outside.any():
+            row = int(np.argmax(outside))
+            count = int(outside.sum())
+            raise TableError(
+                f"{table.place(row)}, column {column(name)}: {values[row]:g} is outside the runs "
+                f"of the simulator, {low:g} to {high:g} ({count} such rows): simulate there, or "
+                "leave the rows out"
+            )
+    for name in CHANNELS:
+        key = column(name)
+        if name not in gear.channels and key in table and np.isfinite(table[key]).any():
+            raise TableError(
+                f"{table.source}: {key} was measured, and the runs of the simulator lack it: add "
+                "it to them, or remove the column"
+            )
 
 
 def answered_rows(table: Table) -> tuple[Table, list[Remark]]:

@@ -49,7 +49,7 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         Where no parameters in the prior carry the measured loads.
     """
     exact = _exact(case, readings, free)
-    if case.discrepancy or case.remainder is not None:
+    if case.states_model_error:
         return exact
     try:
         found = averaged_samples(case, readings, free)
@@ -87,7 +87,7 @@ def soil_samples(
     posterior. Raises `FitError` as `averaged`, and where noise is not declared.
     """
     check_declared(readings)
-    if exact_model or case.discrepancy or case.remainder is not None:
+    if exact_model or case.states_model_error:
         return posterior_samples(case, readings, free)
     return averaged_samples(case, readings, free)
 

@@ -62,7 +62,12 @@ class ErrorHypothesis:
             case = with_effect(case, effects[self.effect])
         if not self.scale:
             return case
-        smooth = {column(name): Discrepancy(share=self.scale * SMOOTH) for name in CHANNELS}
+        smooth = {
+            column(name): replace(
+                case.discrepancy.get(column(name), Discrepancy()), share=self.scale * SMOOTH
+            )
+            for name in CHANNELS
+        }
         return replace(case, discrepancy=smooth)
 
     def errors_of(

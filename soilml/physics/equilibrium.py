@@ -12,6 +12,7 @@ from soilml.parameters import values
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.load_case import LoadCase
 from soilml.physics.sinkage_estimate import SinkageEstimate
 from soilml.physics.sinkage_search import equilibrium_near, first_equilibrium
@@ -34,6 +35,9 @@ def equilibrium_forces(load_case: LoadCase, estimate: SinkageEstimate | None = N
     From an estimate of the sinkage the search is shorter; see `equilibrium_near`.
     """
     load_case = apply_input_effects(load_case)
+    if isinstance(load_case.gear, EmulatedGear):
+        force = load_case.gear.forces(load_case.soil, load_case.at)
+        return apply_stage(load_case.effects, "on_force", force, load_case)
     plain = isinstance(load_case.at.load, np.ndarray)  # then no parameter has a gradient
     parameters = [] if plain else list(values(load_case).values())
     with no_gradient(parameters):

@@ -10,8 +10,9 @@ import numpy as np
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import Force
 from soilml.physics.effects.base import apply_stage
-from soilml.physics.equilibrium import equilibrium_forces, without_unsolved
+from soilml.physics.equilibrium import equilibrium_forces, sensor_readings, without_unsolved
 from soilml.physics.forces import apply_input_effects, forces_at_sinkage
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.load_case import LoadCase, rows
 from soilml.physics.model import in_chunks, in_chunks_near
 from soilml.physics.sinkage_estimate import SinkageEstimate
@@ -54,6 +55,10 @@ def linear_response(
     section 15.1.
     """
     xp = namespace(load_case.at.slip)
+    if isinstance(load_case.gear, EmulatedGear):
+        force = in_chunks(load_case, sensor_readings)  # no search, so that each row is answered
+        nothing = xp.full_like(force.load, math.nan)
+        return LinearResponse(force, SinkageEstimate(nothing, nothing))
     base_rows = xp.sort(xp.unique_values(base))
     position = xp.searchsorted(base_rows, base)
     everything = xp.arange(base.shape[0], device=base.device)

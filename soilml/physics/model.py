@@ -66,9 +66,9 @@ class Model:
                 meant = [
                     gear.name for gear in GEARS.values() if issubclass(gear, effect.gear_types)
                 ]
+                to = f"it applies to: {', '.join(meant)}" if meant else "it acts at the contact"
                 raise InputError(
-                    f"the effect {effect.name} does not apply to the gear {self.gear.name!r}; "
-                    f"it applies to: {', '.join(meant)}"
+                    f"the effect {effect.name} does not apply to the gear {self.gear.name!r}; {to}"
                 )
 
     def __add__(self, effect: Effect) -> Model:

@@ -56,6 +56,7 @@ ELSEWHERE = {
     "import",
     "generate",
     "train",
+    "design-runs",
     "export-c",
     "export-fusion",
     "export-step",

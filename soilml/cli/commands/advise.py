@@ -151,7 +151,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *readings.notes]
-    if case.discrepancy or case.remainder is not None:
+    if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
         text = f"the {which} of a next row counts as independent of that of other rows: "
         remarks.append(Remark("independent-discrepancy", f"{text}repetitions are overrated"))

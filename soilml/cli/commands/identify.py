@@ -138,6 +138,6 @@ def run(args: argparse.Namespace) -> int:
         heads = {name: f"{args.by} {name}: " if name else "" for name in found}
         show("\n\n".join(heads[name] + result.text() for name, result in found.items()))
     else:
-        write_stdout(text)
+        write_stdout(json_text({key: content[key] for key in content if key != "draws"}))
     tell_failures(args.by, failed)
     return 0

@@ -13,6 +13,7 @@ from soilml.errors import InputError
 from soilml.parameters import Parameter
 from soilml.physics.contact import Force, Stress
 from soilml.physics.gears.base import Gear
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.physics.soils import Soil
@@ -130,6 +131,8 @@ class Effect:
     @classmethod
     def applies_to(cls, gear: Gear) -> bool:
         """Whether the effect has a meaning for this gear."""
+        if isinstance(gear, EmulatedGear):  # without a contact to act at
+            return not (cls.gear_types or cls.overrides("on_contact") or cls.overrides("on_stress"))
         return not cls.gear_types or isinstance(gear, cls.gear_types)
 
     @classmethod

@@ -1,0 +1,253 @@
+"""Another program in place of the equations of a gear: [simulator], its runs and their emulator."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.config.measurement_noise import Discrepancy
+from soilml.errors import InputError
+from soilml.io.read_table import read_table
+from soilml.io.table import Table
+from soilml.io.toml_settings import Settings
+from soilml.numerics.gaussian_emulator import GaussianEmulator, fit_emulator
+from soilml.numerics.prior import Prior
+from soilml.optional_imports import need
+from soilml.parameters import declared
+from soilml.physics.gears.base import Gear
+from soilml.physics.gears.emulated import EmulatedGear
+from soilml.physics.soils import Soil
+from soilml.quantities import CHANNELS, QUANTITIES, column
+
+#: Fewest runs for each input, and how many are advised (Loeppky, Sacks and Welch, Technometrics
+#: 51(4), 2009).
+FEWEST, ADVISED = 5, 10
+#: Relative difference of the outputs of two runs with equal inputs that is taken for rounding.
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """The table [simulator] of a model file, and the error of the emulator of its runs.
+
+    Attributes
+    ----------
+    table
+        File of the runs, beside the model file.
+    python, command
+        How a run is made: FILE.py:FUNCTION, or a command with {design} and {runs}; "" for neither.
+    slip, load
+        Ranges of the design, load in N.
+    folder
+        Folder of the model file.
+    gear
+        The gear of the model file.
+    error
+        Standard deviation of the emulator by column, in its unit; empty where no runs were read.
+    states_discrepancy
+        Whether the model file states a [discrepancy] of its own.
+    """
+
+    table: str
+    python: str
+    command: str
+    slip: tuple[float, float]
+    load: tuple[float, float]
+    folder: Path
+    gear: Gear
+    error: dict[str, float] = field(default_factory=dict)
+    states_discrepancy: bool = False
+
+    @property
+    def runs(self) -> Path:
+        """The file of the runs."""
+        return self.folder / self.table
+
+    def lines(self) -> list[str]:
+        """The table as lines of TOML, with the full path of the runs."""
+        own = {"python": self.python, "command": self.command}
+        return [
+            "[simulator]",
+            f"table = '{self.runs.resolve()}'",
+            *(f"{key} = '''{text}'''" for key, text in own.items() if text),
+            f"slip = [{self.slip[0]!r}, {self.slip[1]!r}]",
+            f"load_N = [{self.load[0]!r}, {self.load[1]!r}]",
+        ]
+
+
+def take_simulator(settings: Settings, gear: Gear) -> Simulator:
+    """Read the table [simulator]; raises `InputError` for what is missing, unknown or wrong."""
+    table = settings.text("table")
+    python, command = settings.text("python", ""), settings.text("command", "")
+    if python and command:
+        settings.fail("python and command are both given; needed is one of them")
+    if python and python.rpartition(":")[0] == "":
+        settings.fail(f"python is {python!r}; needed is FILE.py:FUNCTION")
+    if command and not ("{design}" in command and "{runs}" in command):
+        settings.fail(
+            f"command is {command!r}; it must contain {{design}}, the table that it reads, and "
+            "{runs}, the table that it writes"
+        )
+    slip, load = (_take_range(settings, key) for key in ("slip", "load_N"))
+    if not -1.0 < slip[0] < slip[1] < 1.0:
+        settings.fail("slip must lie between -1 and 1")
+    if load[0] <= 0.0:
+        settings.fail("load_N must be above zero")
+    settings.finish()
+    return Simulator(table, python, command, slip, load, settings.folder, gear)
+
+
+def _take_range(settings: Settings, key: str) -> tuple[float, float]:
+    value = settings.take(key, list, "[lowest, highest]")
+    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    if len(value) != 2 or not numbers or not value[0] < value[1]:
+        settings.fail(f"{key} is {value!r}; needed is [lowest, highest]")
+    return float(value[0]), float(value[1])
+
+
+def emulated(
+    simulator: Simulator, soil: Soil, prior: Mapping[str, Prior]
+) -> tuple[EmulatedGear, Simulator]:
+    """The gear that answers by the runs of a simulator, and the simulator with its error.
+
+    Raises `InputError` where there are no runs, or too few, where a run has no output, where two
+    runs of one input differ, and where the soil or a prior reaches beyond the design.
+    """
+    need("scipy", "a model file with [simulator]")
+    if not simulator.runs.is_file():
+        raise InputError(
+            f"{simulator.runs}: there is no such file; `soilml design-runs` proposes the runs of "
+            "[simulator], and makes them where it has python or command"
+        )
+    table = read_runs(simulator.runs)
+    gear, emulator = emulator_of(table, simulator.gear, prior)
+    _check_soil(gear, soil, prior, str(simulator.runs))
+    error = {column(name): float(e) for name, e in zip(gear.channels, emulator.error, strict=True)}
+    return gear, replace(simulator, error=error)
+
+
+def read_runs(path: Path) -> Table:
+    """The runs of a simulator that have an answer; raises `InputError` as `read_table` does."""
+    table = read_table(path, ("slip", "load_N"), filled=("slip", "load_N"))
+    if not table.answered.any():
+        raise InputError(f"{path}: no run has the status ok")
+    return table.rows(table.answered)
+
+
+def emulator_of(
+    table: Table, gear: Gear, prior: Mapping[str, Prior]
+) -> tuple[EmulatedGear, GaussianEmulator]:
+    """The gear of a table of runs, and its emulator; raises `InputError` as `design_of` does."""
+    found, outputs = design_of(table, gear, prior)
+    emulator = fit_emulator(found.fractions(_inputs(table, found)), outputs)
+    return replace(found, emulate=emulator.__call__), emulator
+
+
+def design_of(table: Table, gear: Gear, prior: Mapping[str, Prior]) -> tuple[EmulatedGear, Floats]:
+    """The inputs that a table of runs varies, as a gear without emulator; its outputs (n, k).
+
+    Raises `InputError` where the runs are too few, lack an output, or contradict each other.
+    """
+    source = table.source
+    channels = tuple(name for name in CHANNELS if _measured(table, name))
+    if not channels:
+        raise InputError(f"{source}: no run has {', '.join(map(column, CHANNELS))}: simulate them")
+    names = ["slip", "load", *declared(Soil)]
+    present = [name for name in names if column(name) in table]
+    inputs = tuple(n for n in present if np.ptp(table[column(n)]) > 0.0)
+    if not {"slip", "load"} <= {*inputs}:
+        raise InputError(f"{source}: slip and load_N must vary between the runs of a simulator")
+    outputs = np.stack([table[column(name)] for name in channels], axis=1)
+    known = np.asarray(np.isfinite(_columns(table, inputs)).all(axis=1))
+    bad = np.asarray(~(np.isfinite(outputs) & known[:, None]))
+    if bad.any():
+        row, which = (int(i) for i in np.argwhere(bad)[0])
+        raise InputError(
+            f"{table.place(row)}: the run has no {column(channels[which])}; write its reason into "
+            "the column status, or remove the row"
+        )
+    if len(table) < FEWEST * len(inputs):
+        raise InputError(
+            f"{source}: {len(table)} runs for {len(inputs)} inputs ({', '.join(inputs)}); needed "
+            f"are {FEWEST * len(inputs)}, better {ADVISED * len(inputs)}: soilml design-runs "
+            "proposes more"
+        )
+    x = _columns(table, inputs)
+    _check_repeats(table, x, outputs)
+    low, high = x.min(axis=0), x.max(axis=0)
+    log = tuple(n == "load" or (n in prior and prior[n].log) for n in inputs)
+    return EmulatedGear(
+        radius=gear.radius,
+        width=gear.width,
+        inputs=inputs,
+        lower=tuple(low.tolist()),
+        upper=tuple(high.tolist()),
+        logarithmic=log,
+        channels=channels,
+        emulate=_no_emulator,
+    ), outputs
+
+
+def _no_emulator(u: Floats) -> Floats:
+    raise NotImplementedError("the runs have not been emulated")
+
+
+def _measured(table: Table, name: str) -> bool:
+    return column(name) in table and bool(np.isfinite(table[column(name)]).any())
+
+
+def _columns(table: Table, names: Sequence[str]) -> Floats:
+    return np.stack([table[column(name)] for name in names], axis=1)
+
+
+def _inputs(table: Table, gear: EmulatedGear) -> Floats:
+    return _columns(table, gear.inputs)
+
+
+def _check_repeats(table: Table, x: Floats, outputs: Floats) -> None:
+    """Raise `InputError` for two runs of the same inputs whose outputs differ."""
+    _, first, place = np.unique(x, axis=0, return_index=True, return_inverse=True)
+    base = outputs[first[place.reshape(-1)]]
+    apart = np.abs(outputs - base) > SAME * np.ptp(outputs, axis=0)
+    if apart.any():
+        row = int(np.argwhere(apart)[0][0])
+        raise InputError(
+            f"{table.place(row)}: the run differs from an earlier one with the same inputs; the "
+            "simulator must give the same answer twice: fix its seed, or average its runs"
+        )
+
+
+def _check_soil(gear: EmulatedGear, soil: Soil, prior: Mapping[str, Prior], source: str) -> None:
+    """Raise `InputError` where soil or priors are not those of the design."""
+    for path in prior:
+        if path in declared(Soil) and path not in gear.inputs:
+            raise InputError(
+                f"{source} does not vary {path}, which has a prior: vary it in the runs, or fix it"
+            )
+    for name, low, high in zip(gear.inputs, gear.lower, gear.upper, strict=True):
+        if name in ("slip", "load"):
+            continue
+        own = prior.get(name)
+        ends = (own.lower, own.upper) if own else (getattr(soil, name),) * 2
+        if gear.beyond(name, np.asarray(ends, dtype=np.float64)).any():
+            what = f"the prior of {name}" if own else f"{name} of [soil]"
+            shown = f"{ends[0]:g} to {ends[1]:g}" if own else f"{ends[0]:g}"
+            raise InputError(
+                f"{what}, {shown}, reaches beyond the runs of {source}, {low:g} to {high:g} "
+                f"{QUANTITIES[name].unit}: simulate more, or narrow it"
+            )
+
+
+def with_emulator_error(
+    discrepancy: Mapping[str, Discrepancy], error: Mapping[str, float]
+) -> dict[str, Discrepancy]:
+    """The discrepancy of a model with the error of an emulator, by column, in quadrature."""
+    found = dict(discrepancy)
+    for key, std in error.items():
+        own = found.get(key, Discrepancy())
+        found[key] = replace(own, constant=float(np.hypot(own.constant, std)))
+    return found

@@ -1,0 +1,278 @@
+"""Another program in place of the equations: here soilml's own wheel, as a table of its runs."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import WHEEL_ON_SAND
+
+from soilml import Model, Operating, Wheel, identify, read_case, soil
+from soilml.cli import main
+from soilml.errors import InputError
+from soilml.experiment_design.simulator_runs import further_runs, space_filling_runs
+from soilml.io.read_table import read_table
+from soilml.io.text_tables import csv_text
+from soilml.numerics.gaussian_emulator import fit_emulator
+
+MODEL = (
+    WHEEL_ON_SAND
+    + """\
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.4, 0.8]
+shear_modulus = { range = [0.005, 0.04], scale = "log" }
+[noise]
+torque_Nm = "2 %"
+drawbar_pull_N = "2 % + 0.2"
+sinkage_m = "2 %"
+"""
+)
+SIMULATOR = '[simulator]\ntable = "simulated.csv"\nslip = [0.05, 0.6]\nload_N = [30.0, 110.0]\n'
+TRUTH = {"cohesion": 1300.0, "friction_angle": 0.55, "shear_modulus": 0.016}
+#: A simulator as users write one: columns in, columns out.
+RIG = """\
+from soilml import Model, Operating, Wheel, soil
+
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+
+
+def forces(design):
+    ground = soil(
+        "wong1989/dry_sand",
+        cohesion=design["cohesion_Pa"],
+        friction_angle=design["friction_angle_rad"],
+        shear_modulus=design["shear_modulus_m"],
+    )
+    force = WHEEL(ground, Operating(slip=design["slip"], load=design["load_N"]))
+    return {
+        "torque_Nm": force.torque,
+        "drawbar_pull_N": force.drawbar_pull,
+        "sinkage_m": force.sinkage,
+    }
+"""
+BY_COMMAND = """
+if __name__ == "__main__":
+    import sys
+
+    from soilml.io.read_table import read_table
+    from soilml.io.text_tables import csv_text
+
+    design = read_table(sys.argv[1], ("slip", "load_N")).columns
+    open(sys.argv[2], "w").write(csv_text({**design, **forces(design)}))
+"""
+
+
+def simulate(design):
+    """The wheel's channels for columns of a design."""
+    own: dict = {}
+    exec(RIG, own)
+    return own["forces"](design)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The front door, the same wheel as 160 runs of a simulator, and 15 noisy rows of a soil."""
+    work = tmp_path_factory.mktemp("simulator")
+    (work / "front.toml").write_text(MODEL)
+    (work / "black_box.toml").write_text(MODEL + SIMULATOR)
+    (work / "rig.py").write_text(RIG + BY_COMMAND)
+    case = read_case(work / "black_box.toml", with_simulator=False)
+    design = space_filling_runs(case, 160)
+    (work / "simulated.csv").write_text(csv_text(design | simulate(design)))
+    slip, load = np.tile([0.08, 0.15, 0.25, 0.38, 0.52], 3), np.repeat([40.0, 65.0, 100.0], 5)
+    force = Model(Wheel(radius=0.15, width=0.12))(
+        soil("wong1989/dry_sand", **TRUTH), Operating(slip=slip, load=load)
+    )
+    noise = 1 + 0.02 * np.random.default_rng(4).standard_normal((3, 15))
+    channels = (force.torque, force.drawbar_pull, force.sinkage)
+    names = ("torque_Nm", "drawbar_pull_N", "sinkage_m")
+    rows = {"run": np.full(15, "a"), "slip": slip, "load_N": load}
+    rows |= dict(zip(names, noise * channels, strict=True))
+    (work / "runs.csv").write_text(csv_text(rows))
+    return work
+
+
+def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen(folder):
+    case = read_case(folder / "black_box.toml")
+    rng = np.random.default_rng(5)
+    gear = case.model.gear
+    x = gear.values(rng.random((400, 5)))
+    known = dict(zip(("slip", "load_N", "cohesion_Pa", "friction_angle_rad", "shear_modulus_m"),
+                     x.T, strict=True))  # fmt: skip
+    assert gear.inputs == ("slip", "load", "cohesion", "friction_angle", "shear_modulus")
+    assert gear.logarithmic == (False, True, False, False, True)
+    truth, found = simulate(known), gear.emulate(gear.fractions(x))
+    for i, (name, stated) in enumerate(case.simulator.error.items()):
+        error = np.sqrt(np.mean((found[:, i] - truth[name]) ** 2))
+        assert 0.3 * stated < error < 1.3 * stated  # an upper estimate: of fewer runs
+        assert stated < 0.03 * np.std(truth[name])
+        assert case.discrepancy[name].constant == stated
+
+
+def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder):
+    rows = read_table(folder / "runs.csv")
+    front = identify(read_case(folder / "front.toml"), rows, method="posterior")
+    box = identify(read_case(folder / "black_box.toml"), rows, method="posterior")
+    assert box.names == front.names
+    # apart by no more than the emulator's error makes the intervals wider
+    apart = np.abs(box.values - front.values)
+    assert np.all(apart < 2.0 * np.sqrt(np.maximum(box.std**2 - front.std**2, 0.0)) + 0.1 * box.std)
+    assert np.all(box.std > front.std) and np.all(box.std < 3.0 * front.std)
+    for name, value in TRUTH.items():
+        assert abs(box[name] - value) < 3.0 * box.std[box.names.index(name)]
+    assert "discrepancy-included" in {remark.code for remark in box.warnings}
+    # a wrong error would be wrong intervals: without it they are those of an exact model
+    case = read_case(folder / "black_box.toml")
+    blind = identify(replace(case, discrepancy={}, simulator=None), rows, method="posterior")
+    assert np.all(blind.std < box.std)
+
+
+@pytest.mark.slow
+def test_the_averaged_soil_has_typical_errors_beside_the_emulator_s(folder):
+    rows = read_table(folder / "runs.csv")
+    fit = identify(read_case(folder / "black_box.toml"), rows)
+    exact = identify(read_case(folder / "black_box.toml"), rows, method="posterior")
+    assert {one.error_scale for one in fit.explanations} > {0.0}
+    assert np.all(fit.std >= exact.std)
+    # effects that act at a contact explain nothing of a simulator
+    assert not {"slip-sinkage", "exit-angle", "grousers"} & {e.effect for e in fit.explanations}
+
+
+def test_outside_the_runs_there_is_no_answer(folder):
+    case = read_case(folder / "black_box.toml")
+    at = Operating(slip=np.asarray([0.2, 0.2, 0.95]), load=np.asarray([60.0, 200.0, 60.0]))
+    force = case.model(case.soil, at)
+    assert force.status.tolist() == [0, 5, 5] and np.isnan(force.torque[1:]).all()
+    with pytest.raises(InputError, match="asks for the contact of its wheel"):
+        case.model.profile(case.soil, Operating(slip=0.2, load=60.0))
+
+
+@pytest.mark.parametrize("how", ["python", pytest.param("command", marks=pytest.mark.slow)])
+def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
+    folder, tmp_path, monkeypatch, capsys, how
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig.py").write_text(RIG + BY_COMMAND)
+    own = {"python": 'python = "rig.py:forces"', "command": 'command = "PY rig.py {design} {runs}"'}
+    text = MODEL + SIMULATOR + own[how].replace("PY", sys.executable) + "\n"
+    (tmp_path / "model.toml").write_text(text)
+    assert main(["design-runs", "model.toml", "--count", "40"]) == 0
+    captured = capsys.readouterr()
+    assert "40 runs in" in captured.err and "torque_Nm" in captured.out
+    first = read_table("simulated.csv")
+    assert len(first) == 40 and np.isfinite(first["torque_Nm"]).all()
+    assert main(["design-runs", "model.toml", "--count", "10"]) == 0
+    both = read_table("simulated.csv")
+    assert len(both) == 50 and both["slip"][:40].tolist() == first["slip"].tolist()
+    if how == "python":
+        # a design without the runs, and the case that uses them
+        assert main(["design-runs", "model.toml", "--count", "5", "--out", "more.csv"]) == 0
+        assert "torque_Nm" not in Path("more.csv").read_text()
+        assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
+
+
+def test_further_runs_lie_where_there_are_none(folder):
+    case = read_case(folder / "black_box.toml", with_simulator=False)
+    table = read_table(folder / "simulated.csv")
+    part = table.rows(table["slip"] < 0.35)
+    more = further_runs(case, part, 20)
+    # among the runs there is one near by; beyond them, and at the ends of the design, there is none
+    assert np.count_nonzero(more["slip"] > 0.5) >= 8
+    assert not np.any((more["slip"] > 0.15) & (more["slip"] < 0.33))
+    assert len({tuple(row) for row in np.stack(list(more.values()), axis=1)}) == 20
+
+
+def refused(tmp_path, text="", table=None, **files):
+    """The message of a model with a simulator."""
+    (tmp_path / "model.toml").write_text(MODEL + (text or SIMULATOR))
+    if table is not None:
+        (tmp_path / "simulated.csv").write_text(csv_text(table))
+    with pytest.raises(InputError) as found:
+        read_case(tmp_path / "model.toml")
+    assert "\n" not in str(found.value)
+    return str(found.value)
+
+
+def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
+    columns = dict(read_table(folder / "simulated.csv").columns)
+    assert "`soilml design-runs` proposes" in refused(tmp_path)
+    few = {name: values[:20] for name, values in columns.items()}
+    assert "20 runs for 5 inputs" in refused(tmp_path, table=few)
+    gone = {name: values.copy() for name, values in columns.items()}
+    gone["torque_Nm"][7] = np.nan
+    assert "line 9: the run has no torque_Nm" in refused(tmp_path, table=gone)
+    twice = {name: np.append(values, values[0]) for name, values in columns.items()}
+    twice["torque_Nm"][-1] += 0.1
+    assert "differs from an earlier one with the same inputs" in refused(tmp_path, table=twice)
+    narrow = {n: v[columns["cohesion_Pa"] < 1500.0] for n, v in columns.items()}
+    assert "the prior of cohesion, 0 to 3000, reaches beyond" in refused(tmp_path, table=narrow)
+    fixed = {name: v for name, v in columns.items() if name != "cohesion_Pa"}
+    assert "does not vary cohesion, which has a prior" in refused(tmp_path, table=fixed)
+    blind = {name: columns[name] for name in ("slip", "load_N", "cohesion_Pa")}
+    assert "no run has torque_Nm" in refused(tmp_path, table=blind)
+    both = SIMULATOR + 'python = "a.py:f"\ncommand = "x {design} {runs}"\n'
+    assert "needed is one of them" in refused(tmp_path, both)
+    assert "it must contain {design}" in refused(tmp_path, SIMULATOR + 'command = "x"\n')
+    assert "FILE.py:FUNCTION" in refused(tmp_path, SIMULATOR + 'python = "forces"\n')
+    assert "slip must lie between -1 and 1" in refused(tmp_path, SIMULATOR.replace("0.6]", "1.6]"))
+
+
+@pytest.mark.parametrize(
+    ("body", "said"),
+    [
+        ("raise RuntimeError('no licence')", "the simulator failed: RuntimeError: no licence"),
+        ("return {'torque_Nm': 0.0 * design['slip'] + float('nan')}", "gave no number for torque"),
+        ("return {'force': design['slip']}", "gave force; needed is torque_Nm"),
+        ("return {'torque_Nm': [1.0]}", "gave 1 values of torque_Nm for 40 runs"),
+        ("return 3.0", "forces gave a float; needed is a dict"),
+        ("import random; return {'torque_Nm': [random.random() for _ in design['slip']]}",
+         "for the same run; fix its seed"),
+    ],
+)  # fmt: skip
+def test_simulators_that_fail_are_one_line(tmp_path, monkeypatch, capsys, body, said):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig.py").write_text(f"def forces(design):\n    {body}\n")
+    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
+    assert main(["design-runs", "model.toml", "--count", "40"]) == 2
+    captured = capsys.readouterr()
+    assert said in captured.err and captured.err.count("\n") == 1
+    assert not (tmp_path / "simulated.csv").exists()
+
+
+def test_rows_outside_the_runs_are_refused(folder, tmp_path, capsys):
+    text = (folder / "runs.csv").read_text().replace("a,0.52,100,", "a,0.52,180,")
+    (tmp_path / "runs.csv").write_text(text)
+    assert main(["identify", str(folder / "black_box.toml"), str(tmp_path / "runs.csv")]) == 2
+    said = capsys.readouterr().err
+    assert "load_N: 180 is outside the runs of the simulator" in said
+
+
+@pytest.mark.slow
+def test_gap_works_on_a_black_box_and_writes_a_model_that_has_it(folder, tmp_path):
+    """A torque sensor that reads 12 % too much, of which no soil is the cause."""
+    table = dict(read_table(folder / "runs.csv").columns)
+    table["torque_Nm"] = 1.12 * table["torque_Nm"]
+    (tmp_path / "runs.csv").write_text(csv_text(table))
+    model = str(folder / "black_box.toml")
+    assert main(["gap", model, str(tmp_path / "runs.csv"), "--out", str(tmp_path / "gap")]) == 0
+    report = json.loads((tmp_path / "gap/gap.json").read_text())
+    assert report["status"] != "no-gap"
+    again = read_case(tmp_path / "gap/model.toml")
+    assert again.simulator is not None and again.model.gear.name == "simulator"
+
+
+def test_an_emulator_goes_through_smooth_runs_and_knows_where_it_does_not_know():
+    rng = np.random.default_rng(0)
+    u = rng.random((80, 2))
+
+    def law(u):
+        return np.stack([np.sin(4 * u[:, 0]) + u[:, 1], 1e-4 * u[:, 0] ** 2], axis=1)
+
+    emulator = fit_emulator(u, law(u))
+    at = rng.random((50, 2))
+    assert emulator(at) == pytest.approx(law(at), abs=2e-2)
+    assert np.all(emulator.std(u) < 0.1 * emulator.std(np.asarray([[3.0, 3.0]])))
+    assert np.all(emulator.error < 0.02 * law(u).std(axis=0))
