@@ -39,6 +39,7 @@ friction angle and shear modulus, each with its uncertainty.
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
                                soilml wheel-leg (torque, vibration, sinkage)
+                               soilml sensor-wheel (stress on a rim)
   from soil to a simulator     soilml export-soil
   runs of your own simulator   soilml design-runs
   comparison of methods        soilml compare
@@ -78,6 +79,7 @@ COMMANDS = {
     "design": "soilml.cli.commands.design",
     "compare": "training.commands.compare",
     "climb": "soilml.cli.commands.climb",
+    "sensor-wheel": "soilml.cli.commands.sensor_wheel",
     "wheel-leg": "soilml.cli.commands.wheel_leg",
     "papers": "soilml.cli.commands.papers",
 }

@@ -64,6 +64,7 @@ ELSEWHERE = {
     "compare",
     "climb",
     "wheel-leg",
+    "sensor-wheel",
     "serve",
 }
 

@@ -1,0 +1,97 @@
+"""`soilml sensor-wheel`: the shear modulus that was put into stresses, and the pull by it."""
+
+import csv
+import io
+import math
+
+import numpy as np
+import pytest
+
+from soilml import soil
+from soilml.cli import main
+from soilml.systems.force_sensor_wheel import MohrCoulomb, SensingWheel, SteadyRun, balanced_arc
+
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.055
+width = 0.064
+[soil]
+name = "nagatani2009/toyoura_sand"
+"""
+SLOPES = {"flat": (0.11, 0.0), "up4": (0.29, math.radians(4.0)), "up6": (0.39, math.radians(6.0))}
+
+
+@pytest.fixture
+def files(tmp_path, monkeypatch):
+    """A wheel of k_x 7.2 mm on three slopes, its stress half of the true one."""
+    sand = soil("nagatani2009/toyoura_sand")
+    strength = MohrCoulomb(friction_angle=sand.friction_angle, cohesion=sand.cohesion)
+    runs, stress = "run,slip,slip_std,load_N,slope_rad\n", "run,angle_rad,normal_Pa\n"
+    for name, (slip, slope) in SLOPES.items():
+        at = SteadyRun(slip=slip, weight=28.92, slope=slope)
+        true = balanced_arc(math.radians(30.0), at, SensingWheel(), strength, 0.0072)
+        runs += f"{name},{slip},0.01,28.92,{slope}\n"
+        for angle, normal in zip(true.angle, 0.5 * true.normal, strict=True):
+            stress += f"{name},{angle:.12g},{normal:.12g}\n"
+    for name, text in (("m.toml", MODEL), ("runs.csv", runs), ("stress.csv", stress)):
+        (tmp_path / name).write_text(text)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+COMMAND = ["sensor-wheel", "m.toml", "runs.csv", "--stress", "stress.csv"]
+
+
+def test_the_modulus_is_found_and_predicts_the_pull_of_the_slopes(files, capsys):
+    assert main(COMMAND) == 0
+    said = capsys.readouterr()
+    rows = list(csv.DictReader(io.StringIO(said.out)))
+    assert [row["run"] for row in rows] == list(SLOPES)
+    for row in rows:
+        assert float(row["shear_modulus_m"]) == pytest.approx(0.0072, rel=1e-3)
+        assert float(row["magnification"]) == pytest.approx(2.0, rel=1e-3)
+        required = 28.92 * np.sin(SLOPES[row["run"]][1])
+        assert float(row["pull_on_slope_N"]) == pytest.approx(required, abs=1e-6)
+        assert float(row["drawbar_pull_N"]) == pytest.approx(required, abs=0.01)
+        assert 0.0 < float(row["shear_modulus_m_std"]) < 0.0072
+    assert "k_x of run flat" in said.err
+
+
+def test_a_run_without_balance_is_named_and_the_others_answer(files, capsys):
+    text = (
+        (files / "runs.csv")
+        .read_text()
+        .replace("up6,0.39,0.01,28.92,0.1", "up6,0.39,0.01,28.92,0.9")
+    )
+    (files / "runs.csv").write_text(text)
+    assert main(COMMAND) == 0
+    said = capsys.readouterr()
+    last = list(csv.DictReader(io.StringIO(said.out)))[-1]
+    assert last["shear_modulus_m"] == ""
+    assert "run up6 has no k_x: even with fully mobilised shear" in said.err
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "options", "expected"),
+    [
+        ("m.toml", '"wheel"', '"linear-wheel"', [], "needed is 'wheel'"),
+        (
+            "m.toml",
+            "[soil]",
+            '[[effect]]\nname = "slip-sinkage"\nn1 = 0.3\n[soil]',
+            [],
+            "remove [[",
+        ),
+        ("stress.csv", "up4,", "up5,", [], "run up4 has no stress"),
+        ("runs.csv", "up4,", "flat,", [], "run flat has 2 rows"),
+        ("runs.csv", "", "", ["--reference", "x"], "no run 'x'; there are: flat, up4, up6"),
+        ("runs.csv", "slip,", "slide,", [], "slide"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line(files, file, old, new, options, expected, capsys):
+    path = files / file
+    path.write_text(path.read_text().replace(old, new) if old else path.read_text())
+    assert main([*COMMAND, *options, "--out", "out.csv"]) == 2
+    assert expected in capsys.readouterr().err.strip().splitlines()[-1]
+    assert not (files / "out.csv").exists()
