@@ -1,4 +1,4 @@
-"""Exported C files beside onnxruntime: memory, latency, differences of the answers."""
+"""Exported C files beside onnxruntime: latency, differences of the answers."""
 
 from __future__ import annotations
 
@@ -30,15 +30,13 @@ NAMES = ("mean", "std", "low", "high")
 
 
 def c_export(folder: Path) -> str:
-    """Tables of memory, latency and differences; one line where there is no C compiler."""
+    """Tables of latency and differences; one line where there is no C compiler."""
     if not COMPILERS:
         return "No C compiler on this machine."
     models = {name: exported(name, folder) for name in FILES}
     version = subprocess.run([COMPILERS[0], "--version"], capture_output=True, text=True).stdout
     head = f"Compiled by {version.splitlines()[0]}, `{' '.join(FLAGS)}`."
-    return "\n\n".join(
-        [head, memory_table(models), latency_table(models), differences_table(models)]
-    )
+    return "\n\n".join([head, latency_table(models), differences_table(models)])
 
 
 def exported(name: str, folder: Path) -> CompiledModel:
@@ -48,20 +46,6 @@ def exported(name: str, folder: Path) -> CompiledModel:
         sys.exit(f"{name}.onnx cannot be exported")
     library = compile_library(source, folder / f"{name}.so", COMPILERS[0], *FLAGS)
     return CompiledModel(folder / f"{name}.h", library)
-
-
-def memory_table(models: dict[str, CompiledModel]) -> str:
-    """Bytes that a program needs, as the headers state them."""
-    lines = [
-        "| file | constants, kB | state of a set, kB | working memory of a call, kB |",
-        "|---|---:|---:|---:|",
-    ]
-    for name, model in models.items():
-        parts = (model.numbers.get(f"{name.upper()}_{part}_BYTES") for part in
-                 ("CONSTANT", "MEMORY", "WORK"))  # fmt: skip
-        cells = ("" if part is None else f"{part / 1e3:.1f}" for part in parts)
-        lines.append(f"| {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
 
 
 def latency_table(models: dict[str, CompiledModel]) -> str:

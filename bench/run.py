@@ -228,8 +228,9 @@ PARTS = (
         "c",
         "board",
         "Exported C files",
-        "`soilml export-c` (docs/c-export.md) beside onnxruntime, one thread. Goals: half of the "
-        "latency of onnxruntime, differences as small as those of rounding.",
+        "`soilml export-c` beside onnxruntime, one thread; memory: [docs/c-export.md]"
+        "(../c-export.md#memory). Goals: half of the latency of onnxruntime, differences as small "
+        "as those of rounding.",
         c_export.c_export,
     ),
     Part(
