@@ -74,13 +74,13 @@ def simulate(design):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """The front door, the same wheel as 160 runs of a simulator, and 15 noisy rows of a soil."""
+    """The front door, the same wheel as 120 runs of a simulator, and 15 noisy rows of a soil."""
     work = tmp_path_factory.mktemp("simulator")
     (work / "front.toml").write_text(MODEL)
     (work / "black_box.toml").write_text(MODEL + SIMULATOR)
     (work / "rig.py").write_text(RIG + BY_COMMAND)
     case = read_case(work / "black_box.toml", with_simulator=False)
-    design = space_filling_runs(case, 160)
+    design = space_filling_runs(case, 120)
     (work / "simulated.csv").write_text(csv_text(design | simulate(design)))
     slip, load = np.tile([0.08, 0.15, 0.25, 0.38, 0.52], 3), np.repeat([40.0, 65.0, 100.0], 5)
     force = Model(Wheel(radius=0.15, width=0.12))(
@@ -95,8 +95,14 @@ def folder(tmp_path_factory):
     return work
 
 
-def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen(folder):
-    case = read_case(folder / "black_box.toml")
+@pytest.fixture(scope="module")
+def box(folder):
+    """The case of the simulator; its emulator is fitted once."""
+    return read_case(folder / "black_box.toml")
+
+
+def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen(box):
+    case = box
     rng = np.random.default_rng(5)
     gear = case.model.gear
     x = gear.values(rng.random((400, 5)))
@@ -108,41 +114,42 @@ def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen
     for i, (name, stated) in enumerate(case.simulator.error.items()):
         error = np.sqrt(np.mean((found[:, i] - truth[name]) ** 2))
         assert 0.3 * stated < error < 1.3 * stated  # an upper estimate: of fewer runs
-        assert stated < 0.03 * np.std(truth[name])
+        assert stated < 0.06 * np.std(truth[name])
         assert case.discrepancy[name].constant == stated
 
 
-def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder):
+def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder, box):
     rows = read_table(folder / "runs.csv")
     front = identify(read_case(folder / "front.toml"), rows, method="posterior")
-    box = identify(read_case(folder / "black_box.toml"), rows, method="posterior")
-    assert box.names == front.names
+    found = identify(box, rows, method="posterior")
+    assert found.names == front.names
     # apart by no more than the emulator's error makes the intervals wider
-    apart = np.abs(box.values - front.values)
-    assert np.all(apart < 2.0 * np.sqrt(np.maximum(box.std**2 - front.std**2, 0.0)) + 0.1 * box.std)
-    assert np.all(box.std > front.std) and np.all(box.std < 3.0 * front.std)
+    apart = np.abs(found.values - front.values)
+    assert np.all(
+        apart < 2.0 * np.sqrt(np.maximum(found.std**2 - front.std**2, 0.0)) + 0.1 * found.std
+    )
+    assert np.all(found.std > front.std) and np.all(found.std < 3.0 * front.std)
     for name, value in TRUTH.items():
-        assert abs(box[name] - value) < 3.0 * box.std[box.names.index(name)]
-    assert "discrepancy-included" in {remark.code for remark in box.warnings}
+        assert abs(found[name] - value) < 3.0 * found.std[found.names.index(name)]
+    assert "discrepancy-included" in {remark.code for remark in found.warnings}
     # a wrong error would be wrong intervals: without it they are those of an exact model
-    case = read_case(folder / "black_box.toml")
-    blind = identify(replace(case, discrepancy={}, simulator=None), rows, method="posterior")
-    assert np.all(blind.std < box.std)
+    blind = identify(replace(box, discrepancy={}, simulator=None), rows, method="posterior")
+    assert np.all(blind.std < found.std)
 
 
 @pytest.mark.slow
-def test_the_averaged_soil_has_typical_errors_beside_the_emulator_s(folder):
+def test_the_averaged_soil_has_typical_errors_beside_the_emulator_s(folder, box):
     rows = read_table(folder / "runs.csv")
-    fit = identify(read_case(folder / "black_box.toml"), rows)
-    exact = identify(read_case(folder / "black_box.toml"), rows, method="posterior")
+    fit = identify(box, rows)
+    exact = identify(box, rows, method="posterior")
     assert {one.error_scale for one in fit.explanations} > {0.0}
     assert np.all(fit.std >= exact.std)
     # effects that act at a contact explain nothing of a simulator
     assert not {"slip-sinkage", "exit-angle", "grousers"} & {e.effect for e in fit.explanations}
 
 
-def test_outside_the_runs_there_is_no_answer(folder):
-    case = read_case(folder / "black_box.toml")
+def test_outside_the_runs_there_is_no_answer(box):
+    case = box
     at = Operating(slip=np.asarray([0.2, 0.2, 0.95]), load=np.asarray([60.0, 200.0, 60.0]))
     force = case.model(case.soil, at)
     assert force.status.tolist() == [0, 5, 5] and np.isnan(force.torque[1:]).all()
