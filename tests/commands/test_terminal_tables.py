@@ -40,7 +40,6 @@ WORDS = {
     "simulate": ["m.toml", "--slip", "0.1,0.5", "--load", "60,1e6", "--speed", "0.1"],
     "identify": ["m.toml", "runs.csv", "--by", "run"],
     "bevameter": ["plates.csv"],
-    "export-soil": ["m.toml", "--to", "csv", "--out", "soil"],
     "audit": ["m.toml", "runs.csv", "--ignore-extra"],
     "gap": ["m.toml", "runs.csv", "--out", "gap"],
     "estimate": [LINEAR, "runs.csv"],
@@ -59,6 +58,7 @@ ELSEWHERE = {
     "design-runs",
     "export-c",
     "export-fusion",
+    "export-soil",  # in the units of the program that it writes for
     "export-step",
     "adapt",
     "compare",
