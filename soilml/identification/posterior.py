@@ -15,7 +15,12 @@ from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.fitting.misfit import declared_misfit, misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit, with_warnings
-from soilml.identification.posterior_density import PosteriorDensity, joint_sample, most_probable
+from soilml.identification.posterior_density import (
+    PosteriorDensity,
+    joint_sample,
+    most_probable,
+    narrow_sample,
+)
 from soilml.numerics.importance_sampling import (
     LEAST_EFFECTIVE_SIZE,
     ImportanceSample,
@@ -34,6 +39,8 @@ LEAST_USABLE_SIZE = 50.0
 #: Readings from which on polynomials take the place of the model: few readings may leave a region
 #: with edges, and need few evaluations.
 FEWEST_READINGS = 8
+#: Readings from which on the posterior may be so narrow that the search begins at its optimum.
+MANY_READINGS = 48
 #: Rows from which on a part of them, of the second number, is sampled first.
 MANY_ROWS, FIRST_ROWS = 512, 256
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
@@ -81,7 +88,8 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     From eight readings on, polynomials of the parameters take the place of the model in the region
     of the posterior. They are used if they change the log density there by at most 0.1 (one
     standard deviation), at points that they were not fitted to; otherwise the model itself is
-    sampled, which takes tens of times longer.
+    sampled, which takes tens of times longer. It is sampled, too, where the posterior fills a small
+    part of the priors; see `narrow_sample`.
 
     Where the residuals exceed the declared noise significantly (one data set in a thousand does by
     chance), noise and discrepancy are multiplied by the root of the misfit and the posterior is
@@ -158,8 +166,8 @@ def posterior_samples(
     Raises `FitError` as `posterior` does.
     """
     density, start = PosteriorDensity(case, readings, free), None
-    optimum = most_probable(case, readings, free) if density.errors else None
-    # no sample of so many parameters fits much better than the optimum
+    optimum = _optimum(density, case, free)
+    # no sample of so many parameters, or of so narrow a part, fits much better than the optimum
     misfit = 0.0 if optimum is None else _misfit(density, optimum.x, len(free))
     limit = misfit_limit(readings.reading_count - len(free))
     if misfit <= limit:
@@ -188,8 +196,14 @@ def sample_posterior(
     Those of shared errors stand behind. Raises `FitError` as `posterior` does.
     """
     density = PosteriorDensity(case, readings, free)
-    optimum = most_probable(case, readings, free) if density.errors else None
-    return _with_misfit(density, optimum, len(free))
+    return _with_misfit(density, _optimum(density, case, free), len(free))
+
+
+def _optimum(density: PosteriorDensity, case: Case, free: Sequence[Coordinate]) -> Solution | None:
+    """The most probable parameters, where a search from there is quicker than one of the priors."""
+    if not density.errors and density.readings.reading_count < MANY_READINGS:
+        return None
+    return most_probable(case, density.readings, free)
 
 
 def _with_misfit(
@@ -221,12 +235,14 @@ def _sampled(
 ) -> ImportanceSample:
     """Weighted fractions of the priors, with those of shared errors behind.
 
-    Samples of a similar posterior, `start`, show the region; with shared errors, the optimum does.
+    Samples of a similar posterior, `start`, show the region; with shared errors, and where the
+    posterior is narrow, the optimum does.
     Raises `FitError` as `posterior` does.
     """
+    sample: ImportanceSample | None = None
     if optimum is not None:
-        sample: ImportanceSample | None = joint_sample(density, optimum)
-    else:
+        sample = (joint_sample if density.errors else narrow_sample)(density, optimum)
+    if sample is None:
         sample = _from_surface(density, start)
     if sample is None:
         sample = importance_sample(density, len(density.free))

@@ -33,6 +33,10 @@ from soilml.numerics.surrogate_density import SamplingBox
 MOST_EVALUATIONS = 200_000  # Most model evaluations in one call, which bounds memory
 #: Samples of the normal distribution, and their spread over that of the linearised posterior.
 SAMPLES, WIDER = 2048, 1.2
+#: Largest standard deviation, in fractions of the priors, of a posterior that is narrow.
+NARROW = 0.15
+#: Its first samples spread so much more than the linearised one; samples of each round.
+MUCH_WIDER, SMALL_ROUND = 1.6, 1024
 #: Rows from which on polynomials are tried in the place of the model, which take longer with fewer,
 #: and rounds after which they must be accurate enough for the density itself.
 FEWEST_ROWS, TEMPERED_ROUNDS = 32, 2
@@ -228,13 +232,34 @@ def most_probable(case: Case, readings: Readings, free: Sequence[Coordinate]) ->
     return descend(weighted.with_noise_at(optimum).problem, optimum.x, with_prior=True)
 
 
-def normal_start(density: PosteriorDensity, optimum: Solution) -> ImportanceSample:
-    """Samples of the linearised posterior about the most probable parameters, of equal weights."""
+def normal_root(density: PosteriorDensity, optimum: Solution) -> Floats:
+    """A root (p, p) of the covariance of the linearised posterior, in fractions of the priors."""
     precision = optimum.jacobian.T @ optimum.jacobian / density.noise_scale**2
     prior = np.diag([f.fraction_precision for f in density.free])
     of_tests = optimum.soil_tests.rates(optimum.x)
     prior += of_tests.T @ of_tests
-    root = np.linalg.cholesky(np.linalg.inv(precision + prior))
+    return np.linalg.cholesky(np.linalg.inv(precision + prior))
+
+
+def narrow_sample(density: PosteriorDensity, optimum: Solution) -> ImportanceSample | None:
+    """Weighted fractions (n, p) of priors of which the posterior is a small part, or None.
+
+    The model itself is sampled, from the linearised posterior on: in ratios of a soil's bearing
+    and its exponent the posterior is bent, which a box about its middle would cut off.
+    """
+    root = normal_root(density, optimum)
+    if float(np.sqrt((root**2).sum(axis=1)).max()) > NARROW:
+        return None
+    if len(density.readings.row_slip) > MOST_SAMPLED_ROWS:
+        return None
+    density.linearise_at_mean(normal_start(density, optimum))
+    around = optimum.x, MUCH_WIDER * root
+    return importance_sample(density, len(root), around=around, later=SMALL_ROUND)
+
+
+def normal_start(density: PosteriorDensity, optimum: Solution) -> ImportanceSample:
+    """Samples of the linearised posterior about the most probable parameters, of equal weights."""
+    root = normal_root(density, optimum)
     normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.x)))
     u = optimum.x + WIDER * normal @ root.T
     u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
@@ -259,7 +284,7 @@ def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceS
         log_density,
         p,
         least_effective_size=ENOUGH,
-        middle_std=0.5 / region.half_width,
+        around=region.middle,
         most_samples=most,
     )
     kept = found.weights > 0.0

@@ -58,8 +58,9 @@ def importance_sample(
     p: int,
     seed: int = 0,
     least_effective_size: float = LEAST_EFFECTIVE_SIZE,
-    middle_std: float | None = None,
+    around: tuple[Floats, Floats] | None = None,
     most_samples: float = math.inf,
+    later: int = LATER_ROUND,
 ) -> ImportanceSample:
     r"""Weighted samples of a density over the unit cube that is known up to a factor.
 
@@ -77,35 +78,36 @@ def importance_sample(
     p: Dimension.
     seed: Of the random numbers.
     least_effective_size: Effective sample size at which sampling ends.
-    middle_std: Standard deviation of a density about the middle of the cube that is similar to this
-        one. The first round is then drawn from it: in many dimensions hardly any point of a Latin
-        hypercube is where the density is.
+    around: Middle (p,) of a density that is similar to this one, and a root (p, p) of its
+        covariance. The first round is then drawn from it: of many dimensions, or a narrow density,
+        hardly any point of a Latin hypercube is where the density is.
     most_samples: Number of samples at which sampling ends anyway.
+    later: Samples of each round after the first; fewer suit a density that costs much.
 
     References: Cornuet, Marin, Mira and Robert, Scandinavian J. Statistics 39(4), 2012 (adaptive
     multiple importance sampling).
     """
     rng = np.random.default_rng(seed)
     mixtures: list[_Mixture] = []
-    if middle_std is None:
+    if around is None:
         u, uniform = latin_hypercube(FIRST_ROUND, p, rng), float(FIRST_ROUND)
     else:
-        factor = middle_std * np.eye(p)
-        mixtures.append(_Mixture(np.full((1, p), 0.5), factor[None], np.ones(1)))
-        u, uniform = _inside(mixtures[0].draw(LATER_ROUND, rng)), 0.0
+        middle, root = around
+        mixtures.append(_Mixture(middle[None], root[None], np.ones(1)))
+        u, uniform = _inside(mixtures[0].draw(later, rng)), 0.0
     logs = log_density(u)
     # proposals: sum over rounds of n_k q_k at each sample
-    proposals = uniform + sum((LATER_ROUND * m.density(u) for m in mixtures), np.zeros(len(u)))
+    proposals = uniform + sum((later * m.density(u) for m in mixtures), np.zeros(len(u)))
     sample = _weighted(u, logs, proposals)
     for _ in range(MOST_ROUNDS):
         enough = sample.effective_size >= least_effective_size or len(u) >= most_samples
         if enough or not np.isfinite(logs).any():
             break
         mixture = _fit_mixture(u, _tempered_weights(logs, proposals), rng)
-        new = _inside(mixture.draw(LATER_ROUND, rng))
-        earlier = sum((LATER_ROUND * m.density(new) for m in mixtures), np.zeros(len(new)))
-        at_new = uniform + earlier + LATER_ROUND * mixture.density(new)
-        proposals = np.append(proposals + LATER_ROUND * mixture.density(u), at_new)
+        new = _inside(mixture.draw(later, rng))
+        earlier = sum((later * m.density(new) for m in mixtures), np.zeros(len(new)))
+        at_new = uniform + earlier + later * mixture.density(new)
+        proposals = np.append(proposals + later * mixture.density(u), at_new)
         u = np.vstack([u, new])
         logs = np.append(logs, log_density(new))
         mixtures.append(mixture)

@@ -156,6 +156,12 @@ class SamplingBox:
         return float(samples.weights[outmost].sum())
 
     @property
+    def middle(self) -> tuple[Floats, Floats]:
+        """The middle (p,) of fractions of the box, and a root (p, p): one standard deviation."""
+        p = len(self.scaling.centre)
+        return np.full(p, 0.5), 0.5 / self.half_width * np.eye(p)
+
+    @property
     def log_volume(self) -> float:
         """Logarithm of the volume of the box."""
         p = len(self.scaling.centre)
@@ -197,7 +203,7 @@ class SurrogateDensity:
             log_density,
             p,
             least_effective_size=least_effective_size,
-            middle_std=0.5 / self.region.half_width if many else None,
+            around=self.region.middle if many else None,
         )
         kept = found.weights > 0.0
         return ImportanceSample(

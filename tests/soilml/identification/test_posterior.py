@@ -5,11 +5,19 @@ from importlib import import_module
 
 import numpy as np
 import pytest
+from gap_sets import MODEL, case_of, driven
 from remarked import remarked
 
 from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError
+from soilml.fitting.coordinates import select_free
+from soilml.fitting.readings import stack_readings
+from soilml.identification.posterior_density import (
+    PosteriorDensity,
+    most_probable,
+    narrow_sample,
+)
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.remarks import texts
@@ -185,3 +193,23 @@ def test_dead_corners_of_the_prior_are_passed_over_in_silence(recwarn):
 
     assert importance_sample(cornered, 3).effective_size > 1000
     assert not recwarn.list
+
+
+@pytest.mark.slow
+def test_a_narrow_and_bent_posterior_keeps_its_tails():
+    """Bearing and exponent follow a bent valley: a box about its middle would cut off its ends."""
+    text = MODEL.replace("[noise]", "kphi = [2e5, 5e6]\nn = [0.5, 1.6]\n[noise]")
+    case = case_of(text)
+    rows = driven(case, loads=(60.0, 120.0), slips=10)
+    free = select_free(case, None)
+    readings = stack_readings(case, rows)
+    density = PosteriorDensity(case, readings, free)
+    optimum = most_probable(case, readings, free)
+    found = narrow_sample(density, optimum)
+    whole = importance_sample(density, len(free), seed=1)
+    assert len(found.u) < len(whole.u) / 2
+    ends = np.asarray([0.02, 0.5, 0.98])
+    std = np.sqrt(whole.mean((whole.u - whole.mean(whole.u)) ** 2))
+    off = (found.quantiles(found.u, ends) - whole.quantiles(whole.u, ends)) / std
+    assert np.abs(off).max() < 0.3
+    assert found.evidence == pytest.approx(whole.evidence, abs=0.1)

@@ -6,6 +6,11 @@ import pytest
 from soilml.numerics.importance_sampling import importance_sample
 
 
+def middle(p, std):
+    """A normal density about the middle of the cube."""
+    return np.full(p, 0.5), std * np.eye(p)
+
+
 def test_samples_drawn_about_the_middle_have_the_moments_of_a_density_of_many_dimensions():
     """Nine dimensions, in which a Latin hypercube has hardly a point where the density is."""
     p, std = 9, 0.03
@@ -14,7 +19,7 @@ def test_samples_drawn_about_the_middle_have_the_moments_of_a_density_of_many_di
     def log_density(u):
         return -0.5 * (((u - mean) / std) ** 2).sum(axis=1)
 
-    found = importance_sample(log_density, p, least_effective_size=1500.0, middle_std=0.045)
+    found = importance_sample(log_density, p, least_effective_size=1500.0, around=middle(p, 0.045))
     assert found.effective_size >= 1500.0
     assert len(found.u) <= 5 * 2048  # a few rounds
     assert (found.mean(found.u) - mean) / std == pytest.approx(0.0, abs=0.15)
@@ -36,7 +41,7 @@ def test_few_samples_for_each_component_do_not_cost_the_tails():
     ratios = []
     for seed in range(10):
         found = importance_sample(
-            log_density, p, seed, least_effective_size=1250.0, middle_std=width
+            log_density, p, seed, least_effective_size=1250.0, around=middle(p, width)
         )
         spread = np.sqrt(found.mean((found.u - found.mean(found.u)) ** 2))
         ratios.append(spread / width / expected)
