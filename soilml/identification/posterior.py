@@ -16,6 +16,7 @@ from soilml.fitting.misfit import declared_misfit, misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.posterior_density import (
+    MOST_SAMPLED_ROWS,
     PosteriorDensity,
     joint_sample,
     most_probable,
@@ -201,9 +202,11 @@ def sample_posterior(
 
 def _optimum(density: PosteriorDensity, case: Case, free: Sequence[Coordinate]) -> Solution | None:
     """The most probable parameters, where a search from there is quicker than one of the priors."""
-    if not density.errors and density.readings.reading_count < MANY_READINGS:
+    readings = density.readings
+    few, many = readings.reading_count < MANY_READINGS, len(readings.row_slip) > MOST_SAMPLED_ROWS
+    if not density.errors and (few or many):
         return None
-    return most_probable(case, density.readings, free)
+    return most_probable(case, readings, free)
 
 
 def _with_misfit(

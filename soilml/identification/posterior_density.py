@@ -250,8 +250,6 @@ def narrow_sample(density: PosteriorDensity, optimum: Solution) -> ImportanceSam
     root = normal_root(density, optimum)
     if float(np.sqrt((root**2).sum(axis=1)).max()) > NARROW:
         return None
-    if len(density.readings.row_slip) > MOST_SAMPLED_ROWS:
-        return None
     density.linearise_at_mean(normal_start(density, optimum))
     around = optimum.x, MUCH_WIDER * root
     return importance_sample(density, len(root), around=around, later=SMALL_ROUND)

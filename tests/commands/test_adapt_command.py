@@ -117,7 +117,7 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monke
     assert (out / "adapted.h").is_file()
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys, monkeypatch):
     spec = tmp_path / "small.toml"
     spec.write_text(SMALL_SPEC)

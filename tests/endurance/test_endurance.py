@@ -51,7 +51,7 @@ def growth(kind):
     return float(done.stdout)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_estimates_do_not_drift():
     result = run_day(steps=4000, per_soil=2000, seed=3)
     columns = Estimator.load(ROOT / "exported" / "wheel.onnx").sets.columns
@@ -67,6 +67,6 @@ def test_resident_memory_is_flat():
     assert growth("sound") < 2e6
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_memories_that_are_kept_would_be_noticed():
     assert growth("leaking") > 6e6

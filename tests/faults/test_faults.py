@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import fault_run
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_rerun_after_a_kill_is_as_if_nothing_had_happened(capsys):
     counts = fault_run.Counts()
     fault_run.run(2, 3, counts, commands=("simulate", "generate"))

@@ -110,6 +110,7 @@ def test_the_soil_comes_closer_to_the_truth(kind):
     assert abs(after.value - soil["friction_angle"]) < max(4.0 * after.std, 0.01)
 
 
+@pytest.mark.long
 def test_a_cause_that_no_catalogue_has_is_not_named_alone():
     report = analysed("stick-slip")
     assert report.status in ("unknown", "class")

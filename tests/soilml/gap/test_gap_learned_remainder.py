@@ -82,7 +82,7 @@ def test_a_further_analysis_counts_it_once(fitted):
     assert len(again.parts) == 4
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_returned_model_predicts_rows_kept_back_and_leaves_little_to_find():
     case = case_of()
     table = with_wave(driven(case, slips=12))

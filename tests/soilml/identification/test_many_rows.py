@@ -154,7 +154,7 @@ def test_cells_are_divided_where_rows_scatter_and_groups_stay_apart():
     assert len(np.unique(equal)) == 2
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_advice_and_pull_rest_on_condensed_rows(case, condensing, monkeypatch):
     """Samples of soil of the same mean and spread as those of all rows."""
     data = usable_readings(case, measured(case, np.random.default_rng(4), ROWS))

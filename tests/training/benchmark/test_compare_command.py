@@ -17,7 +17,7 @@ from training.benchmark.suite import (
 )
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsys):
     out = tmp_path / "results"
     assert main(["compare", str(small_model), "--sets", "1", "--out", str(out)]) == 0

@@ -68,7 +68,7 @@ def test_methods_that_need_several_rows_fail_on_one(scores):
     assert np.isnan(score(scores, 12, "analytic linear").rmse[2])  # K is fixed, not estimated
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_command_writes_table_picture_and_page(test_data, small_model, capsys):
     out = test_data / "comparison"
     command = ["compare", str(test_data / "model.toml"), str(test_data / "test.parquet")]

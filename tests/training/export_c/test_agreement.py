@@ -31,6 +31,11 @@ SINGLE = 1e-5
 #: the graph; a remaining share of the prior that is closer to the limit may be judged either way.
 PRIOR_EDGE = 1e-3
 NAMES = ("mean", "std", "low", "high")
+#: The second compiler takes as long again: `make test-long` runs it.
+ONE_FIRST = [
+    pytest.param(name, marks=[pytest.mark.long] if number else [])
+    for number, name in enumerate(COMPILERS)
+]
 SETS = ["wheel", "any_wheel", "wheel_small", "any_wheel_small"]
 
 
@@ -101,14 +106,14 @@ def test_one_reading_by_the_linear_file(compiled):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("compiler", ONE_FIRST)
 @pytest.mark.parametrize("name", ["wheel", "wheel_lssvm", "wheel_mlp", "kls1_wheel"])
 def test_one_reading(name, compiler, compiled):
     compare_singles(compiled(name, compiler), estimator_of(name, None), 1500, 1)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("compiler", COMPILERS)
+@pytest.mark.parametrize("compiler", ONE_FIRST)
 @pytest.mark.parametrize("name", SETS)
 def test_sets(name, compiler, compiled):
     compare_sets(compiled(name, compiler), name, 120 if name.startswith("wheel") else 60, 2)

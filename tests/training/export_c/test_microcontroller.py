@@ -52,7 +52,13 @@ def test_sizes_and_precision(name, tmp_path):
 @pytest.mark.slow
 @pytest.mark.skipif(bool(MISSING), reason=f"not installed: {', '.join(MISSING)}")
 @pytest.mark.skipif(not COMPILERS, reason="no C compiler")
-@pytest.mark.parametrize("channels", [(), ("sinkage", "drawbar_pull")], ids=["torque", "all"])
+@pytest.mark.parametrize(
+    "channels",
+    [
+        pytest.param((), id="torque", marks=pytest.mark.long),
+        pytest.param(("sinkage", "drawbar_pull"), id="all"),
+    ],
+)
 @pytest.mark.parametrize("name", SMALL)
 def test_an_emulated_cortex_m4_gives_the_same_numbers(name, channels, tmp_path):
     source = exported_for_one_row(name, tmp_path)

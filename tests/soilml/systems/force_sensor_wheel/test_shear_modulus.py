@@ -119,7 +119,7 @@ def test_a_saturated_peak_is_inferred_from_the_flanks_with_a_warning():
     ).warnings
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_have_the_nominal_coverage():
     rng, runs = np.random.default_rng(7), 50
     held = pulled = 0
