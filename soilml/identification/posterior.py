@@ -9,41 +9,22 @@ import numpy as np
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
-from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.fitting.misfit import declared_misfit, misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import Fit, with_warnings
-from soilml.identification.posterior_density import (
-    MOST_SAMPLED_ROWS,
-    PosteriorDensity,
-    joint_sample,
-    most_probable,
-    narrow_sample,
-)
-from soilml.numerics.importance_sampling import (
-    LEAST_EFFECTIVE_SIZE,
-    ImportanceSample,
-    importance_sample,
-)
+from soilml.identification.posterior_density import PosteriorDensity, most_probable
+from soilml.identification.posterior_sampling import MOST_SAMPLED_ROWS, sampled
+from soilml.numerics.importance_sampling import LEAST_EFFECTIVE_SIZE, ImportanceSample
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
-from soilml.numerics.surface_sampling import surface_sample
 from soilml.quantities import column
 from soilml.remarks import Remark
 
 #: Fractions of the posterior below the ends of the 90 % interval.
 INTERVAL = np.asarray([0.05, 0.95])
-#: Effective sample size below which mean and spread of the samples are not reported: their errors
-#: then exceed 1 / sqrt(50) = 14 % of the standard deviation.
-LEAST_USABLE_SIZE = 50.0
-#: Readings from which on polynomials take the place of the model: few readings may leave a region
-#: with edges, and need few evaluations.
-FEWEST_READINGS = 8
 #: Readings from which on the posterior may be so narrow that the search begins at its optimum.
 MANY_READINGS = 48
-#: Rows from which on a part of them, of the second number, is sampled first.
-MANY_ROWS, FIRST_ROWS = 512, 256
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
 SIMILAR_NOISE = 2.0
 CANDIDATES = 64  # Draws of the priors from which one is chosen by the tests of the soil
@@ -89,8 +70,8 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     From eight readings on, polynomials of the parameters take the place of the model in the region
     of the posterior. They are used if they change the log density there by at most 0.1 (one
     standard deviation), at points that they were not fitted to; otherwise the model itself is
-    sampled, which takes tens of times longer. It is sampled, too, where the posterior fills a small
-    part of the priors; see `narrow_sample`.
+    sampled, which takes tens of times longer. Parameters that are uniform over several times their
+    least value are sampled in their logarithm.
 
     Where the residuals exceed the declared noise significantly (one data set in a thousand does by
     chance), noise and discrepancy are multiplied by the root of the misfit and the posterior is
@@ -180,7 +161,7 @@ def posterior_samples(
     if (at_optimum := declared_misfit(case, readings, free)) and at_optimum.exceeds_noise:
         misfit = min(misfit, at_optimum.per_freedom)
     noise_scale = float(np.sqrt(misfit))
-    sample = _sampled(PosteriorDensity(case, readings, free, noise_scale), start, optimum)
+    sample = sampled(PosteriorDensity(case, readings, free, noise_scale), start, optimum)
     return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
 
 
@@ -217,7 +198,7 @@ def _with_misfit(
     The noise is as declared. The misfit is that at the sample of largest weight, or with shared
     errors at the optimum if it is less there.
     """
-    sample = _sampled(density, None, optimum)
+    sample = sampled(density, None, optimum)
     misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
     if optimum is not None:  # samples have nearly one more squared residual for each error
         misfit = min(misfit, _misfit(density, optimum.x, parameters))
@@ -231,56 +212,6 @@ def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:
     """
     cost = density.squared_residuals(u[None, :]) + density.readings.squares_within
     return cost / max(density.readings.reading_count - parameters, 1)
-
-
-def _sampled(
-    density: PosteriorDensity, start: ImportanceSample | None, optimum: Solution | None
-) -> ImportanceSample:
-    """Weighted fractions of the priors, with those of shared errors behind.
-
-    Samples of a similar posterior, `start`, show the region; with shared errors, and where the
-    posterior is narrow, the optimum does.
-    Raises `FitError` as `posterior` does.
-    """
-    sample: ImportanceSample | None = None
-    if optimum is not None:
-        sample = (joint_sample if density.errors else narrow_sample)(density, optimum)
-    if sample is None:
-        sample = _from_surface(density, start)
-    if sample is None:
-        sample = importance_sample(density, len(density.free))
-    if not np.isfinite(sample.evidence):
-        raise FitError(
-            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
-        )
-    if sample.effective_size < LEAST_USABLE_SIZE:
-        raise FitError(
-            f"the effective sample size is {sample.effective_size:.0f}, too small for a mean and a "
-            f"spread ({LEAST_USABLE_SIZE:.0f} needed): the posterior is too narrow a part of the "
-            "prior; use --method nonlinear, or narrow [soil.prior]"
-        )
-    return sample
-
-
-def _from_surface(
-    density: PosteriorDensity, start: ImportanceSample | None = None
-) -> ImportanceSample | None:
-    """Weighted samples with polynomials in place of the model, or None where these do not serve.
-
-    Of many rows, a part shows the region in which all are evaluated.
-    """
-    readings, p = density.readings, len(density.free)
-    if readings.reading_count < FEWEST_READINGS:
-        return None
-    if start is None and len(readings.row_slip) > MANY_ROWS:
-        part = np.random.default_rng(0).permutation(len(readings.row_slip))[:FIRST_ROWS]
-        start = _from_surface(density.of_rows(np.sort(part)))
-    sample = surface_sample(density, p, start)
-    if sample is None and start is not None:  # it may have shown the wrong region
-        sample = surface_sample(density, p)
-    if sample is not None and density.linearise_at_mean(sample):
-        sample = surface_sample(density, p, sample)
-    return sample
 
 
 def _sampling_warnings(sample: ImportanceSample) -> tuple[Remark, ...]:

@@ -1,4 +1,4 @@
-"""Log density of the posterior of soil and shared errors, and samples of both together."""
+"""Log density of the posterior of soil and shared errors, and its optimum."""
 
 from __future__ import annotations
 
@@ -25,30 +25,10 @@ from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
 from soilml.fitting.shared_errors import errors_at, with_modelled_errors
-from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
-from soilml.numerics.surface_sampling import MOST_ROUNDS, surface_sample
-from soilml.numerics.surrogate_density import SamplingBox
 
 MOST_EVALUATIONS = 200_000  # Most model evaluations in one call, which bounds memory
-#: Samples of the normal distribution, and their spread over that of the linearised posterior.
-SAMPLES, WIDER = 2048, 1.2
-#: Largest standard deviation, in fractions of the priors, of a posterior that is narrow.
-NARROW = 0.15
-#: Its first samples spread so much more than the linearised one; samples of each round.
-MUCH_WIDER, SMALL_ROUND = 1.6, 1024
-#: Rows from which on polynomials are tried in the place of the model, which take longer with fewer,
-#: and rounds after which they must be accurate enough for the density itself.
-FEWEST_ROWS, TEMPERED_ROUNDS = 32, 2
-#: Factor on the noise from which on rows are explained by neither soil nor errors, and most rounds
-#: then: an answer that nobody should believe takes little time.
-UNEXPLAINED, FEW_ROUNDS = 2.0, 4
-#: Standard deviations from the middle at which the region ends in which the model is sampled.
-REACH = 6.0
-MOST_SAMPLED_ROWS = 128  # Most rows where the model is sampled, which bounds the time
-#: Effective sample size at which sampling of the model ends, and the numbers of solutions and of
-#: samples at which it ends anyway where nothing explains the rows.
-ENOUGH, MOST_SOLUTIONS, FEWEST_SAMPLES = 1250.0, 500_000, 4096
 
 
 class PosteriorDensity:
@@ -198,30 +178,6 @@ def _stacked(parts: Sequence[Floats]) -> Floats:
     return stacked
 
 
-def joint_sample(density: PosteriorDensity, optimum: Solution) -> ImportanceSample:
-    """Weighted fractions (n, p) of the priors of soil and errors.
-
-    The region is that of the linearised posterior at the most probable parameters. Polynomials take
-    the place of the model where they soon turn out to be accurate there; otherwise the model is
-    sampled, of many rows at some that are chosen at random; where nothing explains the rows, for a
-    bounded number of solutions.
-    """
-    start = normal_start(density, optimum)
-    density.linearise_at_mean(start)
-    rows, p = len(density.readings.row_slip), len(density.free)
-    if rows >= FEWEST_ROWS:
-        most = FEW_ROUNDS if density.noise_scale > UNEXPLAINED else MOST_ROUNDS
-        found = surface_sample(density, p, start, tempered_rounds=TEMPERED_ROUNDS, most_rounds=most)
-        if found is not None and density.linearise_at_mean(found):
-            found = surface_sample(density, p, found)
-        if found is not None:
-            return found
-    if rows > MOST_SAMPLED_ROWS:
-        chosen = np.random.default_rng(0).permutation(rows)[:MOST_SAMPLED_ROWS]
-        density = density.of_rows(np.sort(chosen))
-    return _of_model(density, start)
-
-
 def most_probable(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Solution:
     """The most probable parameters and errors, with normal priors of the same variances.
 
@@ -230,61 +186,3 @@ def most_probable(case: Case, readings: Readings, free: Sequence[Coordinate]) ->
     weighted = WeightedRows.of(case, readings, free)
     optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
     return descend(weighted.with_noise_at(optimum).problem, optimum.x, with_prior=True)
-
-
-def normal_root(density: PosteriorDensity, optimum: Solution) -> Floats:
-    """A root (p, p) of the covariance of the linearised posterior, in fractions of the priors."""
-    precision = optimum.jacobian.T @ optimum.jacobian / density.noise_scale**2
-    prior = np.diag([f.fraction_precision for f in density.free])
-    of_tests = optimum.soil_tests.rates(optimum.x)
-    prior += of_tests.T @ of_tests
-    return np.linalg.cholesky(np.linalg.inv(precision + prior))
-
-
-def narrow_sample(density: PosteriorDensity, optimum: Solution) -> ImportanceSample | None:
-    """Weighted fractions (n, p) of priors of which the posterior is a small part, or None.
-
-    The model itself is sampled, from the linearised posterior on: in ratios of a soil's bearing
-    and its exponent the posterior is bent, which a box about its middle would cut off.
-    """
-    root = normal_root(density, optimum)
-    if float(np.sqrt((root**2).sum(axis=1)).max()) > NARROW:
-        return None
-    density.linearise_at_mean(normal_start(density, optimum))
-    around = optimum.x, MUCH_WIDER * root
-    return importance_sample(density, len(root), around=around, later=SMALL_ROUND)
-
-
-def normal_start(density: PosteriorDensity, optimum: Solution) -> ImportanceSample:
-    """Samples of the linearised posterior about the most probable parameters, of equal weights."""
-    root = normal_root(density, optimum)
-    normal = np.random.default_rng(0).standard_normal((SAMPLES, len(optimum.x)))
-    u = optimum.x + WIDER * normal @ root.T
-    u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
-    return ImportanceSample(u, np.full(SAMPLES, 1.0 / SAMPLES), 0.0)
-
-
-def _of_model(density: PosteriorDensity, start: ImportanceSample) -> ImportanceSample:
-    """Samples of the density itself, in a box about those of a similar one."""
-    region = SamplingBox.of(start, REACH)
-
-    def log_density(fractions: Floats) -> Floats:
-        u = region.points(fractions)
-        inside = np.all((u > 0.0) & (u < 1.0), axis=1)
-        logs = np.full(len(u), -np.inf)
-        logs[inside] = density(u[inside])
-        return logs
-
-    p, most = len(density.free), float("inf")
-    if density.noise_scale > UNEXPLAINED:
-        most = max(MOST_SOLUTIONS // len(density.readings.row_slip), FEWEST_SAMPLES)
-    found = importance_sample(
-        log_density,
-        p,
-        least_effective_size=ENOUGH,
-        around=region.middle,
-        most_samples=most,
-    )
-    kept = found.weights > 0.0
-    u, weights = region.points(found.u[kept]), found.weights[kept]
-    return ImportanceSample(u, weights, found.evidence + region.log_volume)

@@ -9,15 +9,14 @@ from math import erfc, log, sqrt
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.fitting.coordinates import Coordinate, rates_at
+from soilml.fitting.coordinates import Coordinate, log_ratios, rates_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.logarithmic_density import LogarithmicDensity
 from soilml.numerics.prior import UNIFORM_PRECISION
-from soilml.numerics.surface_sampling import surface_sample
+from soilml.numerics.surface_sampling import normal_sample, surface_sample
 
-#: Samples that show the region of a density, and their spread over that of the linearised one.
-SAMPLES, WIDER = 2048, 1.2
 MOST_ROUNDS = 5  # Rounds in which polynomials are fitted to the model
 TINY = 1e-300  # Smallest share of a normal density whose logarithm is taken
 #: Effective sample size where the density is approximated by a normal one.
@@ -179,13 +178,11 @@ class SoilDensity:
 
     def sample(self) -> ImportanceSample:
         """Weighted samples, with polynomials in place of the model; else of the normal density."""
+        logs = LogarithmicDensity(self, log_ratios(self.free))
         root = np.linalg.cholesky(np.linalg.inv(self.precision))
-        normal = np.random.default_rng(0).standard_normal((SAMPLES, self.p))
-        u = self.optimum.x[: self.p] + WIDER * normal @ root.T
-        u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
-        start = ImportanceSample(u, np.full(SAMPLES, 1.0 / SAMPLES), 0.0)
-        found = surface_sample(self, self.p, start, most_rounds=MOST_ROUNDS)
-        return self._of_normal() if found is None else found
+        start = normal_sample(*logs.around(self.optimum.x[: self.p], root))
+        found = surface_sample(logs, self.p, start, most_rounds=MOST_ROUNDS)
+        return self._of_normal() if found is None else logs.back(found)
 
     def _of_normal(self) -> ImportanceSample:
         """Samples of the linearised density in the cube."""

@@ -36,6 +36,8 @@ INTERIM_SIZE = 300.0  # Effective size of samples from which the next points are
 #: New points are samples of the density, this much farther from its middle, and moved at random by
 #: this share of its standard deviations.
 SPREAD, JITTER = 1.5, 0.3
+#: Samples of a normal density that shows the region, and their spread over that of the density.
+NORMAL_SAMPLES, WIDER = 2048, 1.2
 FEWEST_POINTS = 8.0  # Effective number of points that the final error is judged by, at least
 #: Largest probability of the outermost twentieth of a region: more shows that the density goes on
 #: beyond. The next regions then reach farther by the second value: the tail of an exponential
@@ -111,6 +113,17 @@ def surface_sample(
         if turn >= tempered_rounds and surrogate.power < 1.0:
             return None
     return None
+
+
+def normal_sample(middle: Floats, root: Floats) -> ImportanceSample:
+    """Samples of a normal density, wider than the root (p, p) of its covariance; reflected.
+
+    They lie within the unit cube, with equal weights.
+    """
+    normal = np.random.default_rng(0).standard_normal((NORMAL_SAMPLES, len(middle)))
+    u = middle + WIDER * normal @ root.T
+    u = np.clip(1.0 - np.abs(1.0 - np.abs(u)), 1e-6, 1.0 - 1e-6)  # reflected at the faces
+    return ImportanceSample(u, np.full(NORMAL_SAMPLES, 1.0 / NORMAL_SAMPLES), 0.0)
 
 
 def _fitted(u: Floats, y: Floats, region: SamplingBox) -> tuple[PolynomialSurface, Floats]:

@@ -8,7 +8,7 @@ import pytest
 from channel_readings import channel_readings
 
 from soilml import Operating
-from soilml.identification import condensing, fit, posterior_density
+from soilml.identification import condensing, fit, posterior_sampling
 from soilml.identification.bevameter import soil_section
 from soilml.identification.bevameter.soil_section import pressure_test, strength_test
 from soilml.numerics.importance_sampling import ImportanceSample
@@ -99,8 +99,6 @@ def test_samples_lie_within_the_priors():
     """A density that is flat, and that rises without end towards one end of a prior."""
 
     class Density:
-        free = (None, None)
-        noise_scale = 1.0
         asked = np.zeros((0, 2))
 
         def __call__(self, u):
@@ -110,7 +108,7 @@ def test_samples_lie_within_the_priors():
     density, rng = Density(), np.random.default_rng(0)
     near = rng.uniform([0.0, 0.8], [0.3, 1.0], (512, 2))
     start = ImportanceSample(near, np.full(512, 1.0 / 512), 0.0)
-    found = posterior_density._of_model(density, start)
+    found = posterior_sampling.of_model(density, start, 1.0, 8)
     for points in (found.u, density.asked):
         assert len(points) > 1000 and (points > 0.0).all() and (points < 1.0).all()
     mean = found.weights @ found.u

@@ -14,7 +14,9 @@ from soilml.fitting import misfit, scipy_descents
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.identification import condensing
-from soilml.identification.posterior_density import PosteriorDensity, normal_start
+from soilml.identification.posterior_density import PosteriorDensity
+from soilml.identification.posterior_sampling import normal_root
+from soilml.numerics.surface_sampling import normal_sample
 from soilml.remarks import texts
 
 # the package has functions of these names
@@ -145,12 +147,13 @@ def test_samples_of_the_linearised_posterior_are_somewhat_wider(case):
     data = rows_of(case)
     density = PosteriorDensity(case, data, select_free(case, None), noise_scale=2.0)
     jacobian = np.asarray([[90.0, 0.0, 30.0], [0.0, 80.0, 0.0], [0.0, 0.0, 100.0]])
-    found = normal_start(density, optimum([0.5, 0.4, 0.6], jacobian, np.zeros(3)))
+    at = [0.5, 0.4, 0.6]
+    found = normal_sample(np.asarray(at), normal_root(density, optimum(at, jacobian, np.zeros(3))))
     covariance = 1.44 * np.linalg.inv(jacobian.T @ jacobian / 4.0 + 12.0 * np.eye(3))
     np.testing.assert_allclose(found.u.mean(axis=0), [0.5, 0.4, 0.6], atol=2e-3)
     np.testing.assert_allclose(np.cov(found.u.T), covariance, atol=0.1 * covariance.max())
     assert found.weights.sum() == pytest.approx(1.0) and (np.abs(found.u - 0.5) < 0.5).all()
-    edge = normal_start(density, optimum([0.0, 1.0, 0.5], np.eye(3), np.zeros(3)))
+    edge = normal_sample(np.asarray([0.0, 1.0, 0.5]), 0.5 * np.eye(3))
     assert (edge.u > 0.0).all() and (edge.u < 1.0).all()
     assert np.mean(edge.u[:, 0] < 0.1) > 0.1  # reflected, not cut off
 
