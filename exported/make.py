@@ -29,6 +29,8 @@ RELEASED = {
     "slip_vibration": ("wheel_leg", "slip_vibration"),
     "slip_torque_known": ("wheel_leg_known", "slip_torque"),
     "slip_vibration_known": ("wheel_leg_known", "slip_vibration"),
+    "slip_torque_paper": ("wheel_leg_paper", "slip_torque"),
+    "slip_vibration_paper": ("wheel_leg_paper", "slip_vibration"),
 }
 
 

@@ -15,16 +15,18 @@ from soilml.quantities import column
 ROOT = Path(__file__).parents[1]
 SENSORS = ("torque", "vibration")
 SOILS = {"unknown": ("wheel_leg", ""), "known": ("wheel_leg_known", "_known")}
+#: In the regime of the paper's tests torque tells hardly anything, which is tested on its own.
+FILES = SOILS | {"paper": ("wheel_leg_paper", "_paper")}
 
 
 def files(soil):
     folder = ROOT / "exported"
-    return [Estimator.load(folder / f"slip_{s}{SOILS[soil][1]}.onnx") for s in SENSORS]
+    return [Estimator.load(folder / f"slip_{s}{FILES[soil][1]}.onnx") for s in SENSORS]
 
 
 def rows(soil, count, block):
     """Columns of answered rows of a seed that no file was trained on."""
-    recipe = replace(read_recipe(SOILS[soil][0]), blocks=(block,)).sized(count, seed=60606)
+    recipe = replace(read_recipe(FILES[soil][0]), blocks=(block,)).sized(count, seed=60606)
     parts = list(simulate_pieces(recipe))
     names = ("slip", "load_N", *(column(s) for s in SENSORS), "status")
     columns = {k: np.concatenate([p[k] for p in parts]) for k in names}
@@ -85,6 +87,18 @@ def test_eight_readings_of_one_soil_are_not_taken_for_independent(soil):
     error, held = error_and_cover(both, slip)
     assert error < min(one)
     assert 0.88 <= held <= 0.92
+
+
+@pytest.mark.slow
+def test_in_the_regime_of_the_paper_vibration_alone_tells_slip_and_fusion_keeps_it():
+    columns = rows("paper", 8000, Block(1, 1.0))
+    each = estimates("paper", columns)
+    prior = each[0].prior.std[0]
+    torque, vibration = (error_and_cover(e, columns["slip"])[0] / prior for e in each)
+    error, held = error_and_cover(fuse_estimates(each).estimate, columns["slip"])
+    assert torque > 0.9 and vibration < 0.6
+    assert error < 1.01 * vibration * prior
+    assert 0.87 <= held <= 0.93
 
 
 def test_a_missing_sensor_leaves_the_other_ones_estimate():

@@ -128,6 +128,25 @@ def test_the_file_names_units_and_can_be_read(tmp_path):
     assert (table["vibration_m_s2"] - clean).std() == pytest.approx(0.2, rel=0.1)
 
 
+def test_friction_that_drops_over_some_sliding_shakes_the_hub_less(tmp_path):
+    slow = RECIPE.replace("turning = 3.0", "turning = 0.3")
+    sudden = simulate_rows(recipe(tmp_path, slow), 0, 0, 100)["vibration_m_s2"]
+    soft = recipe(tmp_path, slow.replace("turning = 0.3", "turning = 0.3\nsoftening = 0.03"))
+    assert simulate_rows(soft, 0, 0, 100)["vibration_m_s2"].mean() < 0.9 * sudden.mean()
+
+
+def test_the_recipe_of_the_paper_has_the_printed_lines(tmp_path):
+    """Comin and Saaj 2017: eq. 24 with table V on soils within table I, turning at 0.3 rad/s."""
+    made = simulate_rows(read_recipe("wheel_leg_paper"), 0, 0, 300)
+    assert (made["status"] == "ok").all()
+    a, drop = made["vibration_m_s2"] / GRAVITY, np.rad2deg(made["stick-slip.increment"])
+    line = (made["slip"] + 0.882 - 0.022 * drop) / (6.609 - 0.156 * drop)
+    felt = line > 0.0
+    noise = (a - line)[felt] * GRAVITY / 0.2
+    assert np.std(noise) == pytest.approx(1.0, abs=0.15) and abs(noise.mean()) < 0.2
+    assert felt.mean() > 0.8
+
+
 def test_speed_and_other_draws_of_a_run_do_not_follow_the_soil(tmp_path):
     text = RECIPE.replace("[stick_slip]", "speed_m_s = [0.01, 0.5]\n[stick_slip]")
     made = recipe(tmp_path, text, 2000)

@@ -7,6 +7,7 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.systems.wheel_legs import stances
+from soilml.systems.wheel_legs.slip_models import fit_lines
 from soilml.systems.wheel_legs.stances import (
     GRAVITY,
     SpringLeg,
@@ -87,6 +88,34 @@ def test_the_amplitude_does_not_depend_on_the_step(monkeypatch):
 
 def test_a_friction_that_does_not_drop_lets_the_foot_slide_more_smoothly():
     assert vibration_amplitude(LEG, 0.3, PHI, 0.0) < 0.3 * vibration_amplitude(LEG, 0.3, PHI, GAP)
+
+
+def test_a_drop_of_friction_over_a_hair_s_breadth_is_a_drop_at_once():
+    hair = replace(LEG, softening=1e-9)
+    found = vibration_amplitude(hair, SLIPS, PHI, GAP)
+    np.testing.assert_allclose(found, vibration_amplitude(LEG, SLIPS, PHI, GAP), rtol=0.02)
+
+
+def test_a_drop_of_friction_over_centimetres_makes_slip_linear_in_the_vibration():
+    """Comin and Saaj 2017, eq. 24, on their four angles of friction; without it a threshold."""
+    leg, angles = SpringLeg(stiffness=8000.0), np.deg2rad([42.3, 42.8, 29.1, 35.8])
+    slips = np.linspace(0.05, 0.5, 10)
+
+    def straight(each):
+        shaken = vibration_amplitude(each, slips[:, None], angles, 0.3 * angles)
+        return fit_lines(shaken, slips)[2]
+
+    assert straight(replace(leg, softening=0.03)).min() > 0.93
+    assert straight(leg).min() < 0.8
+
+
+def test_a_foot_that_does_not_heal_breaks_loose_again_with_less_energy():
+    once = replace(LEG, healing=0.0)
+    first = int(np.argmax(simulate_stance(LEG, 0.3, PHI, GAP).foot_displacement > 0))
+    found, full = (simulate_stance(each, 0.3, PHI, GAP) for each in (once, LEG))
+    np.testing.assert_array_equal(found.acceleration[:first], full.acceleration[:first])
+    late = slice(len(found.time) // 2, None)
+    assert np.ptp(found.acceleration[late]) < 0.9 * np.ptp(full.acceleration[late])
 
 
 def test_cases_are_independent():
