@@ -15,7 +15,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.covariance import sensor_columns
 from soilml.fitting.shared_errors import ModelledErrors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification import METHODS, posterior_density
+from soilml.identification import METHODS, posterior_sampling
 from soilml.identification.nonlinear import nonlinear
 from soilml.identification.posterior import posterior
 from soilml.identification.posterior_density import PosteriorDensity
@@ -255,7 +255,7 @@ def test_rows_that_nothing_explains_take_a_bounded_number_of_solutions(case, mon
         return predict(density, u)
 
     monkeypatch.setattr(PosteriorDensity, "predict", counted)
-    monkeypatch.setattr(posterior_density, "MOST_SOLUTIONS", 150_000)
+    monkeypatch.setattr(posterior_sampling, "MOST_SOLUTIONS", 150_000)
     rows = rows_of(case, Table(columns | {"torque_Nm": torque}), True)
     fit = METHODS["posterior"](case, *rows)
     assert fit.misfit > 20.0 and "excess-residuals" in {r.code for r in fit.warnings}
