@@ -34,6 +34,7 @@ demo-papers: $(VENV)/.ready ## every system of the source papers: pictures, and 
 
 demo-import: $(VENV)/.ready ## from the raw logs of a rig to the soil: map, import report, identification
 	@$(BIN)/python examples/import/run.py
+	@$(BIN)/python examples/import/wheel_leg.py
 
 test: $(VENV)/.ready ## all checks and tests
 	@$(MAKE) --no-print-directory check

@@ -26,6 +26,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/gap/evidence/marginal_likelihood.py": {"scipy"},
     "soilml/gap/verdict/estimates.py": {"scipy"},
     "soilml/gap/workflow.py": {"threadpoolctl"},
+    "soilml/log_import/windows/stances.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/evidence/repeats.py": {"scipy"},

@@ -34,9 +34,11 @@ _PANELS = (
     ("torque, N m", ("torque",), ("",)),
     ("load, drawbar pull, N", ("load", "drawbar_pull"), ("load", "pull")),
     ("sinkage, mm", ("sinkage",), ("",)),
+    ("vibration, m/s²", ("vibration",), ("",)),
 )
 _COLUMNS = {"slip": "slip", "torque": "torque_Nm", "load": "load_N",
-            "drawbar_pull": "drawbar_pull_N", "sinkage": "sinkage_m"}  # fmt: skip
+            "drawbar_pull": "drawbar_pull_N", "sinkage": "sinkage_m",
+            "vibration": "vibration_m_s2"}  # fmt: skip
 _LINES = (AFTER, "#cc7a00")
 #: Most points of a line; a longer one is drawn by the extremes of its parts.
 _MOST_POINTS = 700

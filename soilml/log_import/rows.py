@@ -233,18 +233,21 @@ def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, in
     return found
 
 
-def unusable(row: WindowRow, dead: Mapping[str, str]) -> Remark | None:
+def unusable(
+    row: WindowRow, dead: Mapping[str, str], needed: Sequence[str] = ("slip", "load")
+) -> Remark | None:
     """Why a window cannot be a row; None where it can. `dead` are the sensors, with the reason."""
-    for name in ("slip", "load"):
+    for name in needed:
         if not np.isfinite(row.values.get(name, np.nan)):
             why = f": {dead[name]}" if name in dead else ""
             return Remark("unknown-quantity", f"its {name} is not known{why}", (name,))
-    if not abs(row.values["slip"]) < _MOST_SLIP:
+    if "slip" in needed and not abs(row.values["slip"]) < _MOST_SLIP:
         text = f"its slip is {row.values['slip']:.3g}: the wheel spins on the spot, or locks"
         return Remark("slip-out-of-range", text, ("slip",))
     if row.values["load"] <= 0.0:
         return Remark("load-out-of-range", f"its load is {row.values['load']:.3g} N", ("load",))
     measured = [row.values.get(n, np.nan) for n in ("torque", "drawbar_pull", "sinkage")]
+    measured.append(row.values.get("vibration", np.nan))
     if not np.isfinite(measured).any() and dead:
         role, why = next(iter(dead.items()))
         return Remark("dead-sensor", f"the sensor of [{role}] is dead: {why}", (role,))
@@ -274,14 +277,14 @@ def rows_as_table(
                 line["wheel"] = wheel.name
             if gear := gear_of(wheel, run):
                 line["gear"] = gear
-            for name in ("slip", "load", "torque", "drawbar_pull", "sinkage"):
+            for name in ("slip", "load", "torque", "drawbar_pull", "sinkage", "vibration"):
                 if name in row.values:
                     line[column(name)] = row.values[name]
                     line[f"{column(name)}_std"] = row.std.get(name, float("nan"))
             if "speed" in row.values:
                 line[column("speed")] = row.values["speed"]
             line[column("time")] = (row.window.start + row.window.stop) / 2.0
-            if wheel.radius is not None:
+            if wheel.radius is not None and wheel.leg is None:
                 # a model file of another wheel is refused, since slip is that of this radius
                 line[column("wheel_radius")] = wheel.radius.value
             line["source"] = run.recordings[0].file.name
@@ -294,11 +297,12 @@ def rows_as_table(
             columns[name] = np.asarray([line.get(name, "") for line in lines], dtype=np.str_)
         else:
             columns[name] = np.asarray([line.get(name, np.nan) for line in lines], dtype=float)
-    if lines and "torque_Nm" not in columns:
-        columns["torque_Nm"] = np.full(len(lines), np.nan)
+    always = ("slip", "torque_Nm")  # blank where not measured
+    for name in always if lines else ():
+        columns.setdefault(name, np.full(len(lines), np.nan))
     columns = {
         name: values
         for name, values in columns.items()
-        if name == "torque_Nm" or name in text or np.isfinite(values).any()
+        if name in (*always, *text) or np.isfinite(values).any()
     }
     return Table(columns, log_map.source)

@@ -48,6 +48,7 @@ from soilml.log_import.rows import (
     window_row,
     without_torque,
 )
+from soilml.log_import.stance_rows import stance_rows, without_rolling
 from soilml.log_import.windows.steady import Stretch, steady_windows
 from soilml.remarks import Remark
 
@@ -155,6 +156,8 @@ class _Wheel:
         self.log_map, self.wheel, self.runs = log_map, wheel, runs
         self.inputs = [wheel_inputs(run, wheel) for run in runs]
         self.dead = dead_sensors(self.inputs)
+        # the slip of stances may be what is asked for
+        self.needs_slip = wheel.leg is None
         self.quantities: list[dict[str, Floats]] = []
         self.stretches: list[list[Stretch]] = []
         self.rows: list[list[WindowRow]] = []
@@ -168,6 +171,7 @@ class _Wheel:
     def _analyse(self, run: Run, inputs: Inputs, dead: Mapping[str, str]) -> None:
         for role in dead:
             inputs.values[role] = np.full(inputs.time.size, np.nan)
+        angle = without_rolling(inputs, self.wheel) if self.wheel.leg is not None else None
         values: dict[str, float | Floats] = {**inputs.values, **inputs.constants}
         constants = plain_constants(self.log_map, self.wheel)
         quantities = quantities_of(values, self.log_map, self.wheel, constants)
@@ -175,6 +179,12 @@ class _Wheel:
             name: np.broadcast_to(values, inputs.time.shape) for name, values in quantities.items()
         }
         left_out = tuple(e for e in self.log_map.left_out if e.run in ("", run.name))
+        if angle is not None:
+            out, rows = stance_rows(inputs, angle, series, self.log_map, self.wheel, left_out)
+            self.quantities.append(series)
+            self.stretches.append(out)
+            self.rows.append(rows)
+            return
         stretches = steady_windows(inputs.time, series, self.log_map.windows, left_out)
         rows = [
             window_row(stretch, inputs, quantities, self.log_map, self.wheel)
@@ -197,7 +207,8 @@ class _Wheel:
         for i, rows in enumerate(self.rows):
             kept = []
             for k, row in enumerate(rows):
-                why = unusable(row, self.dead[i]) or odd.get((i, k))
+                needed = ("slip", "load") if self.needs_slip else ("load",)
+                why = unusable(row, self.dead[i], needed) or odd.get((i, k))
                 if why:
                     self.stretches[i].append(replace(row.window, why=why))
                 else:

@@ -23,12 +23,15 @@ from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error
+from soilml.log_import.windows.stances import without_spikes
 from soilml.remarks import Remark
 
 SMOOTH = 0.5  # Span of the derivative of places and angles, s
 #: Share of the usual rotation speed below which a wheel stands still; shortest rest, and what is
 #: left out before the start, s.
 _STANDS, _SHORTEST_REST, _BEFORE_START = 0.05, 0.4, 0.2
+#: Channels of a wheel-leg in which single wild samples are left out.
+_DESPIKED = ("torque", "motor_current", "load", "drawbar_pull", "sinkage", "clearance", "vibration")
 _PLACES = ("wheel_angle", "position")
 _EFFORT = 0.1  # Share of the usual torque or current that is more than noise and offset
 
@@ -92,12 +95,25 @@ def wheel_inputs(run: Run, wheel: WheelMap) -> Inputs:
         channel = wheel.channels[role]
         if channel.unwrap:
             several = [(t, unwrapped(v, channel.unwrap)) for t, v in several]
+        if wheel.leg is not None and role in _DESPIKED:
+            several = _despiked(inputs, role, several)
         if role in _PLACES:
             inputs.intervals[role] = max(sampling_interval(t, v) for t, v in several)
         sampled = [on_grid(grid, t, v, continuous=role in _PLACES) for t, v in several]
         _add(inputs, channel, sampled)
     _tare(inputs, wheel)
     return inputs
+
+
+def _despiked(
+    inputs: Inputs, role: str, several: list[tuple[Floats, Floats]]
+) -> list[tuple[Floats, Floats]]:
+    """Samples without single wild ones, which the largest acceleration of a stance would be."""
+    found = [(times, *without_spikes(values)) for times, values in several]
+    if count := sum(wild for *_, wild in found):
+        text = f"[{role}]: {count} single wild samples are left out"
+        inputs.notes.append(Remark("spikes", text, (role,), severity="note"))
+    return [(times, values) for times, values, _ in found]
 
 
 def _add(inputs: Inputs, channel: ChannelMap, sampled: list[Floats]) -> None:

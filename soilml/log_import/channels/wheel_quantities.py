@@ -35,6 +35,8 @@ def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertai
         if role == "motor_current":
             found[f"{role}.torque_constant"] = channel.torque_constant
             found[f"{role}.idle_current"] = channel.idle_current
+    if wheel.leg is not None:
+        found["wheel_leg.sensor_height"] = wheel.leg.sensor_height
     if vehicle is not None:
         for key in ("mass", "wheelbase", "behind_front", "height"):
             found[f"vehicle.{key}"] = getattr(vehicle, key)
@@ -66,7 +68,7 @@ def wheel_quantities(
         found["rim_speed"] = read("rim_speed")
     elif "wheel_speed" in values and "radius" in constants:
         source = "wheel_angle" if "wheel_angle" in wheel.channels else "wheel_speed"
-        rate = read("wheel_speed") / constants[f"{source}.gear_ratio"]
+        rate = read("wheel_speed") / constants.get(f"{source}.gear_ratio", 1.0)
         found["rim_speed"] = constants["radius"] * rate
     if "ground_speed" in values:
         found["speed"] = read("ground_speed")
@@ -93,6 +95,12 @@ def wheel_quantities(
         found["drawbar_pull"] = direction * read("drawbar_pull")
     if "sinkage" in values:
         found["sinkage"] = read("sinkage")
+    elif "clearance" in values:
+        # eq. 10 of Comin and Saaj 2017 with the leg vertical: at midstance
+        hub = read("clearance") - constants["wheel_leg.sensor_height"]
+        found["sinkage"] = constants["radius"] - hub
+    if "vibration" in values:
+        found["vibration"] = read("vibration")
     return found
 
 

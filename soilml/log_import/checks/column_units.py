@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.mapping.channel_map import ROLES, ChannelMap
+from soilml.log_import.mapping.channel_map import UNITS, ChannelMap
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.units import dimension, factor, is_raw_signal
 from soilml.remarks import Remark
@@ -24,7 +24,7 @@ def unit_hints(log_map: LogMap, wheel: WheelMap, run: Run) -> list[Remark]:
     for role, channel in wheel.channels.items():
         for column, stated in _stated(channel, run):
             kind = dimension(stated)
-            wanted = {ROLES[role][0], *_ALSO.get(role, ())}
+            wanted = {UNITS[role], *_ALSO.get(role, ())}
             if kind is None or kind in wanted or is_raw_signal(stated) or kind == "1":
                 continue
             text = (
@@ -40,7 +40,7 @@ def differing_units(wheel: WheelMap, run: Run) -> list[Remark]:
     found = []
     for role, channel in wheel.channels.items():
         for column, stated in _stated(channel, run):
-            ours = ROLES[role][0]
+            ours = UNITS[role]
             if not channel.unit or dimension(stated) != ours or dimension(channel.unit) != ours:
                 continue
             ratio = factor(channel.unit, ours, role) / factor(stated, ours, role)

@@ -65,7 +65,9 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
                 ("slip",),
             )
         return
-    if not {"rim_speed", "speed"} <= windows.keys():
+    roles = [r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in wheel.channels]
+    # without a sensor of the rotation stances have been counted by the height of the hub
+    if not {"rim_speed", "speed"} <= windows.keys() or not roles:
         return
     rim, ground = windows["rim_speed"], windows["speed"]
     good = np.isfinite(rim) & np.isfinite(ground) & (rim != 0.0)
@@ -73,7 +75,7 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
         return
     ratio = ground[good] / rim[good]
     middle, fastest = float(np.median(ratio)), float(np.max(ratio))
-    rotation = next(r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in wheel.channels)
+    rotation = roles[0]
     travel = "position" if "position" in wheel.channels else "ground_speed"
     if middle < -0.02:
         yield Remark(

@@ -27,6 +27,12 @@ ROLES: dict[str, tuple[str, str]] = {
     "sinkage": ("m", "sinkage of the wheel"),
     "slope": ("rad", "slope of the ground, positive uphill; or accelerations, or a quaternion"),
 }
+#: Channels that only a wheel-leg has: maps with the table [wheel_leg].
+LEG_ROLES: dict[str, tuple[str, str]] = {
+    "vibration": ("m/s^2", "vertical acceleration of the hub, positive upward"),
+    "clearance": ("m", "distance from a range-finder straight down to the ground"),
+}
+UNITS = {role: unit for role, (unit, _) in (ROLES | LEG_ROLES).items()}
 #: Channels that an encoder before the gearbox, or a motor, may give.
 GEARED = ("wheel_speed", "wheel_angle", "torque", "motor_current")
 #: What a log may call slip: ours; the ratio of travel to rim speed; (r omega - v) / v.
@@ -45,7 +51,7 @@ _NEEDED = "a number, '2 %' of the reading, or '2 % + 0.05'"
 class ChannelMap:
     """A channel of a map.
 
-    role: Key of `ROLES`.
+    role: Key of `UNITS`.
     columns: Columns of the log; empty for a constant and for a number in the name of the file.
     scale: What samples are multiplied by to be in the unit of soilml, with sign.
     has_scale: Whether the map states that scale, or counts of a turn, in place of a unit.
@@ -94,7 +100,7 @@ class ChannelMap:
 
 def take_channel(settings: Settings, role: str) -> ChannelMap:
     """Read the table of a channel; raises `InputError` for what is missing, unknown or wrong."""
-    ours = ROLES[role][0]
+    ours = UNITS[role]
     where = settings.where
     columns = _columns(settings, role)
     pattern = _pattern(settings, "file_name", columns)
@@ -181,7 +187,7 @@ def _std(settings: Settings, role: str, unit: str, scale: float) -> tuple[str, f
     """Column of the standard errors, their scale, and whether they are shares of the reading."""
     column = settings.text("std", "")
     own = settings.text("std_unit", unit)
-    ours = ROLES[role][0]
+    ours = UNITS[role]
     if dimension(own) == "1" != ours:
         return column, factor(own, "1", f"{settings.where} std_unit"), True
     if own == unit:

@@ -10,76 +10,19 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from soilml.io.toml_settings import Settings, read_settings
-from soilml.log_import.mapping.channel_map import ROLES, ChannelMap, take_channel
+from soilml.log_import.mapping.channel_map import LEG_ROLES, ROLES, ChannelMap, take_channel
 from soilml.log_import.mapping.uncertain_value import Uncertain, take_uncertain
+from soilml.log_import.mapping.wheel_leg import WheelLegMap, take_wheel_leg
+from soilml.log_import.mapping.window_settings import (
+    LeaveOut,
+    WindowSettings,
+    take_left_out,
+    take_windows,
+)
 
 #: Keys that say where samples come from, of which a table has one.
 _SOURCES = ("column", "value", "file_name", "head")
 _ZERO = Uncertain(0.0)
-
-
-@dataclass(frozen=True)
-class WindowSettings:
-    """How steady windows are found; times in s."""
-
-    shortest: float = 2.0
-    settle: float = 0.5
-    sensitivity: float = 1.0
-    largest_slip_change: float = 0.05
-    largest_torque_change: float = 0.15
-    within: tuple[float, float] = (-float("inf"), float("inf"))
-
-
-@dataclass(frozen=True)
-class LeaveOut:
-    """A stretch of a run that the user leaves out, in s after the start of the run."""
-
-    run: str
-    start: float
-    stop: float
-    why: str
-
-
-def take_windows(settings: Settings) -> WindowSettings:
-    """Read [windows]; raises `InputError` for what is wrong."""
-    usual = WindowSettings()
-    within = usual.within
-    if "within" in settings:
-        needed = "two times in s after the start of a run, such as [5, 20]"
-        given = settings.take("within", list, needed)
-        if len(given) != 2 or not all(isinstance(x, int | float) for x in given):
-            settings.fail(f"within is {given!r}; needed is {needed}")
-        within = (float(given[0]), float(given[1]))
-    found = WindowSettings(
-        shortest=take_uncertain(
-            settings, "shortest", "s", Uncertain(usual.shortest), lower=0.0
-        ).value,
-        settle=take_uncertain(settings, "settle", "s", Uncertain(usual.settle)).value,
-        sensitivity=settings.number("sensitivity", usual.sensitivity),
-        largest_slip_change=take_uncertain(
-            settings, "largest_slip_change", "1", Uncertain(usual.largest_slip_change)
-        ).value,
-        largest_torque_change=take_uncertain(
-            settings, "largest_torque_change", "1", Uncertain(usual.largest_torque_change)
-        ).value,
-        within=within,
-    )
-    if not found.sensitivity > 0.0:
-        settings.fail("sensitivity must be above zero; 1 is usual, 2 finds smaller changes")
-    settings.finish()
-    return found
-
-
-def take_left_out(settings: Settings) -> LeaveOut:
-    """Read an entry of [[leave_out]]; raises `InputError` for what is wrong."""
-    found = LeaveOut(
-        settings.text("run", ""),
-        settings.number("from", 0.0),
-        settings.number("until", float("inf")),
-        settings.text("why", "left out by the map"),
-    )
-    settings.finish()
-    return found
 
 
 def shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
@@ -156,6 +99,7 @@ class WheelMap:
     gear: str = ""
     axle: str = ""
     gear_pattern: re.Pattern[str] | None = None
+    leg: WheelLegMap | None = None  # Where the wheel has legs: each stance is a row
 
 
 @dataclass(frozen=True)
@@ -222,10 +166,15 @@ def _take_map(settings: Settings, source: str) -> LogMap:
     pattern = _take_gear_pattern(shared_wheel)
     gear = shared_wheel.text("gear", "")
     shared_wheel.finish()
+    leg = take_wheel_leg(settings.table("wheel_leg")) if "wheel_leg" in settings else None
+    if leg is not None:
+        if radius is not None or each_row:
+            settings.fail("has [wheel_leg] beside [wheel] radius or [runs] each_row; remove one")
+        radius = leg.length
     gears = _take_gears(settings)
     named = settings.table("wheels")
     defaults = shared_keys(settings, named.content)
-    shared = _take_channels(settings)
+    shared = _take_channels(settings, leg is not None)
     wheels = []
     for name in named.content:
         content = named.take(name, dict, f"a table [wheels.{name}]")
@@ -240,15 +189,16 @@ def _take_map(settings: Settings, source: str) -> LogMap:
             WheelMap(
                 name,
                 _take_radius(own) or gears.get(own_gear) or radius,
-                shared | _take_channels(own),
+                shared | _take_channels(own, leg is not None),
                 own_gear,
                 _take_axle(own),
                 own_pattern,
+                leg,
             )
         )
         own.finish()
     if not wheels:
-        wheels = [WheelMap("", gears.get(gear) or radius, shared, gear, gear_pattern=pattern)]
+        wheels = [WheelMap("", gears.get(gear) or radius, shared, gear, "", pattern, leg)]
     for wheel in wheels:
         _check_wheel(settings, wheel, vehicle, bool(gears))
     return LogMap(
@@ -289,9 +239,10 @@ def _take_gears(settings: Settings) -> dict[str, Uncertain]:
     return found
 
 
-def _take_channels(settings: Settings) -> dict[str, ChannelMap]:
-    settings.permit(ROLES)
-    return {role: take_channel(settings.table(role), role) for role in ROLES if role in settings}
+def _take_channels(settings: Settings, with_legs: bool) -> dict[str, ChannelMap]:
+    roles = (*ROLES, *LEG_ROLES) if with_legs else tuple(ROLES)
+    settings.permit(roles)
+    return {role: take_channel(settings.table(role), role) for role in roles if role in settings}
 
 
 def _take_radius(settings: Settings) -> Uncertain | None:
@@ -376,7 +327,7 @@ def _check_wheel(
         ("wheel_speed", "wheel_angle", "rim_speed"),
         ("ground_speed", "position"),
     )
-    if "slip" not in has:
+    if "slip" not in has and wheel.leg is None:
         for needed, words in ((wheel_side, "rotation"), (ground_side, "travel")):
             if not has & {*needed}:
                 settings.fail(

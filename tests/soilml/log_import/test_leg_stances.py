@@ -1,0 +1,156 @@
+"""Stances of a wheel-leg's log, of which every one is known: see examples/import/wheel_leg.py."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from soilml import Estimator
+from soilml.errors import InputError
+from soilml.log_import import import_log
+from soilml.log_import.windows.stances import (
+    amplitude,
+    midstances_of_height,
+    stances_of,
+    without_spikes,
+)
+from soilml.onboard.multi_sensor import fuse_estimates
+from soilml.quantities import Z_90, column
+
+ROOT = Path(__file__).parents[3]
+sys.path.insert(0, str(ROOT / "examples" / "import"))
+
+import wheel_leg as rig  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("leg")
+    files, truth = rig.write_logs(folder, seed=7)
+    return files, truth, (folder / "map.toml").read_text()
+
+
+def imported(logs, tmp_path, *edits, runs=1):
+    files, truth, text = logs
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    (tmp_path / "m.toml").write_text(text)
+    found = import_log(files[: 2 * runs], tmp_path / "m.toml")
+    return found, rig.of_stances(found.table, truth)
+
+
+def table_of(text, name):
+    """The table [name] of a map, to be taken out."""
+    start = text.index(f"[{name}]")
+    return text[start : text.find("\n[", start) + 1]
+
+
+NO_ZERO = [(line + "\n", "") for line in rig.MAP.splitlines() if line.startswith("zero")]
+NO_ENCODER = [
+    *NO_ZERO,
+    (table_of(rig.MAP, "wheel_angle"), ""),
+    ('tare = "rest"', "tare = [0.0, 2.5]"),
+]
+
+
+@pytest.mark.parametrize("edits", [[], NO_ZERO, NO_ENCODER], ids=["encoder", "no zero", "height"])
+def test_every_stance_is_read_with_errors_that_hold(logs, tmp_path, edits):
+    found, true = imported(logs, tmp_path, *edits, runs=3)
+    table = found.table
+    assert len(table) >= 30 and len(true) == 4
+    for name, values in true.items():
+        error, std = table[name] - values, table[f"{name}_std"]
+        assert np.mean(np.abs(error) <= Z_90 * std) >= 0.75, name
+        assert np.sqrt(np.mean(error**2)) < 0.05 * values.mean(), name
+
+
+def test_wild_samples_and_gaps_do_not_become_readings(logs, tmp_path):
+    found, true = imported(logs, tmp_path)
+    spikes = [n for s in found.series for n in s.notes if n.code == "spikes"]
+    assert {n.about[0] for n in spikes} == {"motor_current", "vibration"}
+    assert np.abs(found.table["vibration_m_s2"] - true["vibration_m_s2"]).max() < 1.0
+    assert "wheel_radius_m" not in found.table  # the foot of a model file has another radius
+
+
+def test_without_travel_the_rows_have_no_slip_and_files_tell_it(logs, tmp_path):
+    cut = (table_of(rig.MAP, "position"), "")
+    found, true = imported(logs, tmp_path, cut, runs=2)
+    assert np.isnan(found.table["slip"]).all() and len(found.table) >= 20
+    files = [
+        Estimator.load(ROOT / f"exported/slip_{s}_paper.onnx") for s in ("torque", "vibration")
+    ]
+    alone = [f(**{n: found.table[column(n)] for n in f.inputs}) for f in files]
+    fused = fuse_estimates(alone).estimate
+    error = [np.sqrt(np.mean((e.mean[:, 0] - true["slip"]) ** 2)) for e in (*alone, fused)]
+    assert error[2] < 0.9 * files[0].prior.std[0] and error[2] < error[0]
+
+
+def test_what_the_map_lacks_or_has_twice_is_named(logs, tmp_path):
+    blind = [(table_of(rig.MAP, "clearance"), "")]
+    for edits, said in (
+        ([*NO_ZERO, *blind], r"\[wheel_leg\] zero is missing"),
+        ([*NO_ENCODER, *blind], "no stance is seen"),
+        ([("legs = 5", "legs = 2")], "legs is 2; needed are 3 to 12"),
+        ([("legs = 5", "legs = 5\nhalf_width = 1.0")], "half_width is 1 rad"),
+        ([("[wheel_leg]", "[wheel]\nradius = 0.15\n[wheel_leg]")], "beside .wheel. radius"),
+        ([("legs = 5", "legs = 5\nlegnth = 1")], "unknown key 'legnth'"),
+    ):
+        with pytest.raises(InputError, match=said):
+            imported(logs, tmp_path, *edits)
+
+
+def test_the_page_has_the_map_of_the_example():
+    page = (ROOT / "docs/how-to/wheel-leg.md").read_text()
+    shown = page.partition("```toml\n")[2].partition("```")[0]
+    parts = [table_of(rig.MAP, name) for name in ("wheel_leg", "clearance")]
+    assert shown.startswith(parts[0]) and shown.endswith(parts[1])
+
+
+def test_without_the_table_its_channels_are_unknown(logs, tmp_path):
+    table = table_of(rig.MAP, "wheel_leg")
+    with pytest.raises(InputError, match="unknown key"):
+        imported(logs, tmp_path, (table, "[wheel]\nradius = 0.18\n"))
+
+
+def test_a_fast_oscillation_has_no_wild_samples_and_a_glitch_has():
+    time = np.arange(0.0, 5.0, 0.005)
+    noise = 0.02 * np.random.default_rng(1).standard_normal(time.size)
+    shaken = np.where(time > 2.5, 3.0 * np.sin(2 * np.pi * 20.0 * time), 0.0) + noise
+    assert without_spikes(shaken)[1] == 0
+    wild = shaken.copy()
+    wild[[100, 300, 301, 700]] += [5.0, -5.0, -4.0, 20.0]
+    cleaned, count = without_spikes(wild)
+    assert count == 4 and np.isnan(cleaned[[100, 300, 301, 700]]).all()
+
+
+def test_stances_end_halfway_between_legs_and_a_rest_is_left_out():
+    time = np.arange(0.0, 60.0, 0.01)
+    angle = 0.3 * np.where(time < 20.0, time, np.maximum(20.0, time - 15.0))
+    found = stances_of(time, angle, 2 * np.pi / 5)
+    ends = [np.interp([s.start, s.stop], time, angle) for s in found]
+    np.testing.assert_allclose(np.diff(ends, axis=1), 2 * np.pi / 5, rtol=0.01)
+    assert [s.why.code for s in found if s.why] == ["at-rest"]
+
+
+def test_midstances_are_where_the_hub_is_highest_and_a_flat_height_has_none():
+    time = np.arange(0.0, 40.0, 0.02)
+    since = 0.3 * time - 2 * np.pi / 5 * np.round(0.3 * time / (2 * np.pi / 5))
+    noise = 1e-3 * np.random.default_rng(2).standard_normal(time.size)
+    found = midstances_of_height(time, 0.18 * np.cos(since) + noise)
+    off = np.angle(np.exp(5j * 0.3 * found)) / 5
+    assert len(found) >= 7 and np.abs(off).max() < 0.05
+    assert midstances_of_height(time, np.ones(time.size)).size == 0
+
+
+def test_the_largest_acceleration_is_that_of_the_wave_and_not_of_the_noise():
+    time = np.arange(0.0, 2.0, 0.005)
+    draw = np.random.default_rng(3).standard_normal
+    errors = []
+    for _ in range(200):
+        wave = 2.0 * np.exp(-3.0 * time) * np.sin(2 * np.pi * 5.0 * time)
+        value, std = amplitude(wave + 0.1 * draw(time.size), 0.1)
+        errors.append((value - wave.max()) / std)
+    assert abs(np.mean(errors)) < 1.0 and 0.7 < np.std(errors) < 1.3
+    assert np.isnan(amplitude(np.full(400, np.nan), 0.1)[0])
