@@ -9,6 +9,7 @@ paragraph of its output. Further paragraphs follow where a number says so:
 
 python tools/pages.py                          write the blocks of all pages
 python tools/pages.py --check docs/papers/x.md   compare those of one; status 1 if one is stale
+python tools/pages.py --ages                   name those older than a change of their code
 """
 
 from __future__ import annotations
@@ -20,6 +21,10 @@ import subprocess
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from page_ages import changed_rooms, read_states, state_of, write_states
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("README.md", "docs/**/*.md", "examples/**/*.md")
@@ -104,6 +109,27 @@ def _near(a: str, b: str) -> bool:
     return far <= max(UNITS * 10.0**-decimals, FRACTION * abs(float(a)))
 
 
+def commands_of(page: Path) -> list[str]:
+    """Commands of the blocks of a page, each once."""
+    found = BLOCK.finditer(page.read_text(encoding="utf-8"))
+    return list(dict.fromkeys(match["command"] for match in found))
+
+
+def tell_ages(some: Sequence[Path]) -> None:
+    """Print each command whose code has changed since its blocks were written, or says nothing."""
+    states, old = read_states(), 0
+    for command in dict.fromkeys(c for page in some for c in commands_of(page)):
+        rooms = changed_rooms(states.get(command, {}), state_of(command))
+        if not rooms:
+            continue
+        old += 1
+        more = f" and {len(rooms) - 4} more" if len(rooms) > 4 else ""
+        since = ", ".join(rooms[:4]) + more if command in states else "unknown since when"
+        print(f"! older than a change of its code: {command} ({since})")
+    print(f"{old} commands may have other figures; run python tools/pages.py PAGE" if old
+          else "no code of a page has changed since its blocks were written")  # fmt: skip
+
+
 def run(arguments: Sequence[str] | None = None) -> int:
     """Write the blocks, or compare them; the exit status."""
     parser = argparse.ArgumentParser(
@@ -111,7 +137,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("pages", nargs="*", type=Path, help="default: all that have a block")
     parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--ages", action="store_true", help="run nothing, name those that are old")
     args = parser.parse_args(arguments)
+    if args.ages:
+        tell_ages(args.pages or pages())
+        return 0
     outputs: dict[str, str] = {}
 
     def output(command: str) -> str:
@@ -129,6 +159,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
         stale.append(page)
         if not args.check:
             page.write_text(now, encoding="utf-8")
+    # what was run just now is as the code is: written, or found in agreement
+    if not (args.check and stale):
+        own = [page for page in args.pages or pages() if page.resolve().is_relative_to(ROOT)]
+        ran = {c for page in own for c in commands_of(page) if c in outputs}
+        write_states(read_states() | {command: state_of(command) for command in sorted(ran)})
     said = "stale" if args.check else "written"
     print("\n".join(f"{said}: {page}" for page in stale) or "all pages agree with their commands")
     return int(args.check and bool(stale))
