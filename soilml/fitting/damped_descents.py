@@ -26,14 +26,17 @@ MAX_ITERATIONS = 25
 #: `ENOUGH` (far below the thresholds on differences of the objective, which start at 9) or by less
 #: than the fraction `SHARE` of its excess over the number of readings (while the model is far from
 #: the data); and where the best of several steps lowers it by less than `ENOUGH` or `STEP_SHARE`.
-ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
+ENOUGH, SHARE, STEP_SHARE = 0.02, 5e-4, 2e-3
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several.
 KEPT_PROMISE = 0.5
 #: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
 #: factor after an iteration without improvement, and the bounds.
-FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 1.0, 10.0), 1e2
+FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.3, 1.0, 10.0), 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
+#: Multiples of the last step that are tried beside damped ones: along a curved valley these are
+#: short, and each is like the last.
+REPETITIONS = (3.0, 9.0)
 #: Damping, and curvature of a coordinate that changes nothing, with which a step is defined.
 LEAST_DAMPING, LEAST_SCALE = 1e-9, 1e-9
 #: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
@@ -83,7 +86,8 @@ class DampedSteps:
 
         It is zero where the bounds hold every coordinate.
         """
-        descent, normal = self._descent(x, residual, jacobian), self._normal(x, jacobian)
+        descent = self._descent(x, residual, jacobian)
+        normal = self._normal(x, jacobian.T @ jacobian)
         damped = normal + LEAST_DAMPING * np.diag(np.diag(normal) + LEAST_SCALE)
         step = bounded_step(damped, descent, self._free(x, descent), *self._ends(x))
         return float(2.0 * descent @ step - step @ normal @ step)
@@ -102,20 +106,30 @@ class DampedSteps:
         jacobian (m, p): Whitened derivatives of the readings, the same for all points.
         damping (b,): Factor lambda of each step.
         """
-        moved = np.empty_like(x)
+        moved, gram = np.empty_like(x), jacobian.T @ jacobian
         for i, point in enumerate(x):
-            normal = self._normal(point, jacobian)
+            normal = self._normal(point, gram)
             descent = self._descent(point, residual[i], jacobian)
             free = self._free(point, descent)
             damped = normal + damping[i] * np.diag(np.diag(normal) + LEAST_SCALE)
             step = bounded_step(damped, descent, free, *self._ends(point))
-            moved[i] = self._moved(point, step)
+            moved[i] = self.moved(point, step)
         return self.within(moved)
 
-    def _normal(self, x: Floats, jacobian: Floats) -> Floats:
-        """Half the curvature of the linearised objective, (p, p)."""
-        of_tests = self.tests.rates(x)
-        return np.asarray(jacobian.T @ jacobian + np.diag(self.precision) + of_tests.T @ of_tests)
+    def between(self, x: Floats, to: Floats) -> Floats:
+        """The step (p,) from coordinates (p,) to others; see `moved`."""
+        multiple = x + self.offset
+        with np.errstate(invalid="ignore"):
+            growth = multiple * np.log1p((to - x) / multiple)
+        return np.where(np.isfinite(multiple), growth, to - x)
+
+    def _normal(self, x: Floats, gram: Floats) -> Floats:
+        """Half the curvature of the linearised objective, (p, p), from that of the readings."""
+        normal = gram + np.diag(self.precision)
+        if self.tests.case is not None and self.tests.case.soil_tests:
+            of_tests = self.tests.rates(x)
+            normal += of_tests.T @ of_tests
+        return np.asarray(normal)
 
     def _descent(self, x: Floats, residual: Floats, jacobian: Floats) -> Floats:
         """Half the negative gradient of the objective, (p,)."""
@@ -127,7 +141,7 @@ class DampedSteps:
         held = ((x <= self.lower) & (descent < 0)) | ((x >= self.upper) & (descent > 0))
         return np.asarray(~held)
 
-    def _moved(self, x: Floats, step: Floats) -> Floats:
+    def moved(self, x: Floats, step: Floats) -> Floats:
         """Coordinates (p,) after steps (p,): those that move by ratios follow an exponential."""
         multiple = x + self.offset
         with np.errstate(invalid="ignore"):
@@ -265,8 +279,9 @@ def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation |
     """One descent; see `descend_together`.
 
     As long as the linearised model keeps its promise, each iteration is one step, at the end of
-    which the model is linearised again. Else several dampings are tried first, each by a step and
-    by a second step with the same Jacobian, which follows a curved valley. Trials start at the
+    which the model is linearised again. Else several dampings and `REPETITIONS` of the last step
+    are tried first, each followed by a step with the same Jacobian, which leads back to the floor
+    of a curved valley. Trials start at the
     sinkage that the last iterate predicts. An iterate is solved by the full search; it is no
     improvement where that finds an equilibrium before the one of the trial.
     """
@@ -280,7 +295,7 @@ def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation |
         sinkage = replace(last.linearisation.sinkage_at(x - last.x), nearest=True)
         return _Question(problem.request(x, sinkage), linearise=False)
 
-    x = steps.within(start)
+    x, repeated = steps.within(start), np.zeros((0, len(start)))
     if known is None or not np.array_equal(known.x, x):
         known = yield _Question(problem.request(x[None, :]), linearise=True)
     last = problem.at(x, known)
@@ -299,14 +314,17 @@ def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation |
             improvement = last.objective - new.objective
             trusted = improvement > KEPT_PROMISE * promised
             if improvement > 0.0:
+                repeated = _repeated(steps, last.x, new.x)
                 last, damping = new, max(float(factor[0]), MIN_DAMPING)
                 continue
         dampings = damping * np.asarray(DAMPING_FACTORS)
         here = np.tile(last.x, (len(dampings), 1))
         residual = np.tile(last.residual, (len(dampings), 1))
         found, objectives = [], []
-        for _ in range(2):
+        for repetitions in (repeated, repeated[:0]):
             here = steps.from_points(here, residual, last.jacobian, dampings)
+            here = np.vstack([here, repetitions])
+            dampings = np.append(dampings, np.full(len(repetitions), damping))
             residual = problem.whitened((yield trials(last, here)))
             found.append(here)
             objectives.append(problem.objective(residual, here))
@@ -318,14 +336,21 @@ def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation |
             improvement = last.objective - new.objective
         if improvement <= 0.0:
             # if the most damped, shortest step is negligible this is an optimum; else damp more
-            converged = float(np.abs(found[0][-1] - last.x).max()) < 1e-3
+            converged = float(np.abs(found[0][len(DAMPING_FACTORS) - 1] - last.x).max()) < 1e-3
             damping *= DAMPING_INCREASE
             if converged or damping > MAX_DAMPING:
                 break
             continue
+        repeated = _repeated(steps, last.x, new.x)
         last, damping = new, max(float(dampings[best % len(dampings)]), MIN_DAMPING)
         trusted = improvement > KEPT_PROMISE * promised
         converged = improvement < max(ENOUGH, STEP_SHARE * excess)
         if converged:
             break
     return replace(last, converged=converged)
+
+
+def _repeated(steps: DampedSteps, before: Floats, after: Floats) -> Floats:
+    """Where multiples of the last step lead from its end, (repetitions, p)."""
+    step = steps.between(before, after)
+    return steps.within(np.stack([steps.moved(after, k * step) for k in REPETITIONS]))
