@@ -95,12 +95,15 @@ def mapped(tree: T, change: Callable[[Any], Real]) -> T:
     changed: dict[str | int, Any] = {}
     if _is_node(tree):
         for name in declared(type(tree)):
-            if (value := getattr(tree, name)) is not None:
-                changed[name] = change(value)
+            old = getattr(tree, name)
+            if old is not None and (new := change(old)) is not old:
+                changed[name] = new
     for _, key, part in _parts(tree):
-        if isinstance(part, tuple) or _is_node(part):
-            changed[key] = mapped(part, change)
-    whole: T = _with_fields(tree, changed)
+        if (isinstance(part, tuple) or _is_node(part)) and (
+            new := mapped(part, change)
+        ) is not part:
+            changed[key] = new
+    whole: T = _with_fields(tree, changed) if changed else tree
     return whole
 
 

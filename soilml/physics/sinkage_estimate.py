@@ -30,8 +30,10 @@ SLOPES, COARSE_MAX_STEP = (0.05, 20.0), 3.0
 MAX_EVALUATIONS = 6  # Evaluations after which a row is solved by the ordinary search instead
 #: A row is solved where the logarithm of the load carried over the load is below the first figure,
 #: and its product with that of the evaluation before below the second: the error of the
-#: interpolation between the two is of the order of the product.
+#: interpolation between the two is of the order of the product. The last two are those of trials,
+#: which are only compared with each other.
 MAX_LOG_RATIO, MAX_PRODUCT = 1e-5, 1e-11
+TRIAL_LOG_RATIO, TRIAL_PRODUCT = 1e-2, 1e-6
 MIN_CHANGE = 1e-9  # A change of that logarithm below this is mostly rounding and gives no slope
 #: The estimate may be off by this much in log sinkage at most; larger steps leave its vicinity.
 MAX_STEP = 2.0
@@ -88,8 +90,9 @@ def forces_near(load_case: LoadCase, estimate: SinkageEstimate) -> tuple[Force, 
     """
     xp = namespace(estimate.slope)
     first = forces_at_sinkage(load_case, xp.exp(estimate.log_sinkage))
+    limits = (TRIAL_LOG_RATIO, TRIAL_PRODUCT) if estimate.nearest else (MAX_LOG_RATIO, MAX_PRODUCT)
     force, slope = _secant_steps(
-        load_case, first, estimate.log_sinkage, estimate.slope, MAX_EVALUATIONS - 1
+        load_case, first, estimate.log_sinkage, estimate.slope, limits, MAX_EVALUATIONS - 1
     )
     within = force.sinkage <= load_case.gear.largest_sinkage()
     unsolved = xp.full_like(force.status, int(Status.NOT_CONVERGED))
@@ -97,7 +100,12 @@ def forces_near(load_case: LoadCase, estimate: SinkageEstimate) -> tuple[Force, 
 
 
 def _secant_steps(
-    load_case: LoadCase, last: Force, log_sinkage: Array, slope: Array, evaluations: int
+    load_case: LoadCase,
+    last: Force,
+    log_sinkage: Array,
+    slope: Array,
+    limits: tuple[float, float],
+    evaluations: int,
 ) -> tuple[Force, Array]:
     """Forces at the root, interpolated between its last two estimates, and the slope there.
 
@@ -114,8 +122,8 @@ def _secant_steps(
     secant = xp.where(resolved, change / step, slope)
     # from the last estimate to the root, in steps between the two
     fraction = xp.where(resolved, -log_ratio / change, xp.ones_like(change))
-    close = (xp.abs(new_log_ratio) < MAX_LOG_RATIO) & (secant > 0)
-    close = close & (xp.abs(log_ratio * new_log_ratio) < MAX_PRODUCT)
+    close = (xp.abs(new_log_ratio) < limits[0]) & (secant > 0)
+    close = close & (xp.abs(log_ratio * new_log_ratio) < limits[1])
     parts: dict[str, Array] = {
         name: getattr(last, name) + fraction * (getattr(new, name) - getattr(last, name))
         for name in ("torque", "drawbar_pull", "sinkage", "entry_angle")
@@ -133,6 +141,7 @@ def _secant_steps(
         Force(**{f.name: getattr(new, f.name)[others] for f in fields(Force)}),
         (log_sinkage + step)[others],
         secant[others],
+        limits,
         evaluations - 1,
     )
     slopes = xp.concat([secant, nearer_slope], axis=0)
