@@ -214,19 +214,19 @@ def gap(
             place=split.analysed.place,
             progress=progress or (lambda _: None),
         )
-    if analysis.error:
-        return _bad_data_report(case, (analysis.error,), checks.notes, seed)
-    held_out = None
-    if split.held_out is not None:
-        held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
-        held_out = held_out.subset(np.isfinite(held_out.std))
-    gains = predictive_gains(analysis.predictions)
-    analysis = replace(
-        analysis, result=with_refused_outside(analysis.problem, analysis.result, gains)
-    )
-    agreement = noise_agreement(case, readings, soil, analysis)
-    report = _build_report(case, analysis, checks, split, held_out, agreement, seed=seed)
-    report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
+        if analysis.error:
+            return _bad_data_report(case, (analysis.error,), checks.notes, seed)
+        held_out = None
+        if split.held_out is not None:
+            held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
+            held_out = held_out.subset(np.isfinite(held_out.std))
+        gains = predictive_gains(analysis.predictions)
+        analysis = replace(
+            analysis, result=with_refused_outside(analysis.problem, analysis.result, gains)
+        )
+        agreement = noise_agreement(case, readings, soil, analysis)
+        report = _build_report(case, analysis, checks, split, held_out, agreement, seed=seed)
+        report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
     lines = report_lines(report, effect_names(case))
     report = replace(report, sentence=headline(report), lines=lines)
     fixed = fixed_parameters(case, soil)
