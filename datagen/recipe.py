@@ -12,6 +12,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from datagen.gear_sensors import GEAR_SENSORS, GearSensor
 from datagen.worlds import Worlds, take_worlds
 from soilml.config.case import Case, take_case
@@ -21,8 +23,10 @@ from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS, Effect
+from soilml.physics.gears.base import Gear
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.operating_point import COVARIATES, MOST_SLIP
-from soilml.quantities import COLUMNS
+from soilml.quantities import COLUMNS, column
 
 #: Columns of [operating], in the order of their random numbers.
 OPERATING_COLUMNS = ("slip", "load_N")
@@ -168,8 +172,6 @@ def parse_recipe(text: str, where: str) -> Recipe:
 
 
 def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Recipe:
-    if "simulator" in settings:
-        settings.fail("a recipe takes equations, and no [simulator]; remove it")
     case = take_case(settings, effects)
     if case.soil_tests:
         settings.fail(
@@ -188,6 +190,8 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
         )
     if load.lower <= 0:
         operating.fail(f"load_N begins at {load.lower:g}; needed are loads above 0 N")
+    if case.simulator is not None:
+        _check_simulated(operating, case.model.gear, slip, load)
     operating.permit(COVARIATES.values())
     covariates = {f: take_prior(operating, k) for f, k in COVARIATES.items() if k in operating}
     for effect in case.model.effects:
@@ -228,9 +232,29 @@ def _take_recipe(settings: Settings, effects: Mapping[str, type[Effect]]) -> Rec
         blocks=_take_blocks(settings),
         rows=settings.count("rows"),
         seed=int(settings.take("seed", int, "a whole number, 0 or more")),
-        content=settings.content,
+        content=_self_contained(settings.content, case),
         worlds=worlds,
     )
+
+
+def _check_simulated(operating: Settings, gear: Gear, slip: Prior, load: Prior) -> None:
+    """Fail where slip or load reaches beyond the runs of a simulator."""
+    assert isinstance(gear, EmulatedGear)
+    for name, own in (("slip", slip), ("load", load)):
+        ends = np.asarray([own.lower, own.upper])
+        if gear.beyond(name, ends).any():
+            i = gear.inputs.index(name)
+            operating.fail(
+                f"{column(name)} is [{own.lower:g}, {own.upper:g}]; the runs of the simulator have "
+                f"{gear.lower[i]:g} to {gear.upper[i]:g}: narrow it, or simulate more"
+            )
+
+
+def _self_contained(content: dict[str, Any], case: Case) -> dict[str, Any]:
+    """The content of a recipe with the runs of its simulator, so that it needs no other file."""
+    if case.simulator is None:
+        return content
+    return content | {"simulator": case.simulator.within()}
 
 
 def _take_blocks(settings: Settings) -> tuple[Block, ...]:

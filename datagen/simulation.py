@@ -18,8 +18,10 @@ from datagen.random_streams import normal_by_index
 from datagen.recipe import OPERATING_COLUMNS, SENSOR_COLUMNS, Block, Recipe
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
+from soilml.numerics.smooth_functions import SmoothFunctions
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column
@@ -133,7 +135,7 @@ def _simulate(recipe: Recipe, piece: Piece) -> tuple[np.ndarray, dict[str, np.nd
 
 
 def model_error(recipe: Recipe, block: int, rows: SampledRows) -> dict[str, Floats]:
-    r"""The error about its mean (n,) of each column with a [remainder].
+    r"""The error about its mean (n,) of each column with a [remainder] or from an emulator.
 
     .. math:: \delta_r(s, W) = \sum_j w_{rj} \phi_j(s, \ln W), \quad w_{rj} \sim N(0, 1)
 
@@ -143,19 +145,28 @@ def model_error(recipe: Recipe, block: int, rows: SampledRows) -> dict[str, Floa
 
     References: Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2.
     """
-    remainder, errors = recipe.case.remainder, dict[str, Floats]()
-    if remainder is None:
-        return errors
+    errors = dict[str, Floats]()
     first, last = int(rows.run[0]), int(rows.run[-1]) + 1
-    for name in CHANNELS:
-        if not remainder.of(name):
-            continue
-        functions = remainder.error_functions(name, *recipe.driven)
+    for name, functions in _error_functions(recipe).items():
         index = np.arange(first * functions.count, last * functions.count)
         seed = recipe.seed, block, SENSOR_COLUMNS.index(column(name)), 3
         weights = normal_by_index(seed, index).reshape(-1, functions.count)[rows.run - first]
         errors[column(name)] = (functions.at(rows.slip, rows.load) * weights).sum(axis=1)
     return errors
+
+
+def _error_functions(recipe: Recipe) -> dict[str, SmoothFunctions]:
+    """Functions of slip and load whose weighted sum is the error of a channel, by its name."""
+    parts: dict[str, list[SmoothFunctions]] = {}
+    if (remainder := recipe.case.remainder) is not None:
+        for name in filter(remainder.of, CHANNELS):
+            parts[name] = [remainder.error_functions(name, *recipe.driven)]
+    if (simulator := recipe.case.simulator) is not None:
+        for name in CHANNELS:
+            if std := simulator.error.get(column(name)):
+                error = Discrepancy(constant=std).error_functions(*recipe.driven)
+                parts.setdefault(name, []).append(error)
+    return {name: SmoothFunctions.joined(own) for name, own in parts.items()}
 
 
 def _add_gear_sensors(

@@ -128,6 +128,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.physics.computing_device import computing_on
 
     recipe = read_recipe(args.recipe, available_effects(args)).sized(args.rows, args.seed)
+    if args.device is not None and recipe.case.simulator is not None:
+        raise InputError("--device solves equations, and [simulator] has none: omit it")
     write = generate_folder if _is_folder(args.out) else generate
     try:
         on_device = nullcontext() if args.device is None else computing_on(args.device)
@@ -143,8 +145,12 @@ def run(args: argparse.Namespace) -> int:
     consequence = (
         "errors of the model are neither in the rows nor in the intervals of files trained on them"
     )
-    for line in ignored_discrepancy(recipe.case, "generate", consequence):
-        print(line, file=sys.stderr)
+    if recipe.case.simulator is None or recipe.case.simulator.states_discrepancy:
+        for line in ignored_discrepancy(recipe.case, "generate", consequence):
+            print(line, file=sys.stderr)
+    if recipe.case.simulator is not None:
+        text = "the error of the simulator's emulator is in the rows, one draw of it a run"
+        print(text, file=sys.stderr)
     if (learned := recipe.case.remainder) is not None:
         what = f"[remainder] of {', '.join(learned.columns)}"
         print(f"{what} is in the rows: its mean, and one draw of its error a run", file=sys.stderr)

@@ -50,6 +50,8 @@ class Simulator:
         Standard deviation of the emulator by column, in its unit; empty where no runs were read.
     states_discrepancy
         Whether the model file states a [discrepancy] of its own.
+    runs_read
+        The runs: those of the file, or of the key `runs`, by which a recipe has them within it.
     """
 
     table: str
@@ -61,6 +63,7 @@ class Simulator:
     gear: Gear
     error: dict[str, float] = field(default_factory=dict)
     states_discrepancy: bool = False
+    runs_read: Table | None = field(default=None, repr=False, compare=False)
 
     @property
     def runs(self) -> Path:
@@ -70,18 +73,32 @@ class Simulator:
     def lines(self) -> list[str]:
         """The table as lines of TOML, with the full path of the runs."""
         own = {"python": self.python, "command": self.command}
+        runs = f"table = '{self.runs.resolve()}'"
+        if not self.table:
+            columns = (f"{key} = {values}" for key, values in self.columns().items())
+            runs = f"runs = {{ {', '.join(columns)} }}"
         return [
             "[simulator]",
-            f"table = '{self.runs.resolve()}'",
+            runs,
             *(f"{key} = '''{text}'''" for key, text in own.items() if text),
             f"slip = [{self.slip[0]!r}, {self.slip[1]!r}]",
             f"load_N = [{self.load[0]!r}, {self.load[1]!r}]",
         ]
 
+    def columns(self) -> dict[str, list[float]]:
+        """The runs that were read, as lists of numbers by column."""
+        found = {} if self.runs_read is None else self.runs_read.columns
+        return {key: x.tolist() for key, x in found.items() if x.dtype.kind == "f"}
+
+    def within(self) -> dict[str, object]:
+        """The table [simulator] with the runs in it, which depends on no file."""
+        return {"runs": self.columns(), "slip": list(self.slip), "load_N": list(self.load)}
+
 
 def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     """Read the table [simulator]; raises `InputError` for what is missing, unknown or wrong."""
-    table = settings.text("table")
+    own_runs = _take_runs(settings) if "runs" in settings else None
+    table = settings.text("table") if own_runs is None else ""
     python, command = settings.text("python", ""), settings.text("command", "")
     if python and command:
         settings.fail("python and command are both given; needed is one of them")
@@ -98,7 +115,20 @@ def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     if load[0] <= 0.0:
         settings.fail("load_N must be above zero")
     settings.finish()
-    return Simulator(table, python, command, slip, load, settings.folder, gear)
+    return Simulator(table, python, command, slip, load, settings.folder, gear, runs_read=own_runs)
+
+
+def _take_runs(settings: Settings) -> Table:
+    """The runs of the key `runs`, a list of numbers for each column."""
+    needed = "lists of as many numbers, by column"
+    found = settings.take("runs", dict, needed)
+    try:
+        columns = {key: np.asarray(values, dtype=np.float64) for key, values in found.items()}
+    except (TypeError, ValueError):
+        settings.fail(f"runs has a value that is no number; needed are {needed}")
+    if len({x.shape for x in columns.values()}) != 1 or next(iter(columns.values())).ndim != 1:
+        settings.fail(f"runs has columns of different lengths; needed are {needed}")
+    return Table(columns, f"{settings.where} runs")
 
 
 def _take_range(settings: Settings, key: str) -> tuple[float, float]:
@@ -118,16 +148,17 @@ def emulated(
     runs of one input differ, and where the soil or a prior reaches beyond the design.
     """
     need("scipy", "a model file with [simulator]")
-    if not simulator.runs.is_file():
+    table = simulator.runs_read
+    if table is None and not simulator.runs.is_file():
         raise InputError(
             f"{simulator.runs}: there is no such file; `soilml design-runs` proposes the runs of "
             "[simulator], and makes them where it has python or command"
         )
-    table = read_runs(simulator.runs)
+    table = read_runs(simulator.runs) if table is None else table
     gear, emulator = emulator_of(table, simulator.gear, prior)
-    _check_soil(gear, soil, prior, str(simulator.runs))
+    _check_soil(gear, soil, prior, table.source)
     error = {column(name): float(e) for name, e in zip(gear.channels, emulator.error, strict=True)}
-    return gear, replace(simulator, error=error)
+    return gear, replace(simulator, error=error, runs_read=table)
 
 
 def read_runs(path: Path) -> Table:

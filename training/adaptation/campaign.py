@@ -17,6 +17,7 @@ from soilml.gap.checks import estimate_repeat_noise
 from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT, split_holdout
 from soilml.io.table import Table
 from soilml.physics.effects import Effect
+from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import SHEAR, column
 from soilml.remarks import Remark
@@ -91,10 +92,10 @@ class DrivenRange:
     load: tuple[float, float]
 
     @staticmethod
-    def of(table: Table) -> DrivenRange:
+    def of(table: Table, case: Case) -> DrivenRange:
         """The range of a log with a margin; rows that brake or roll freely are left out.
 
-        Raises `InputError` where no row drives.
+        It does not reach beyond the runs of a simulator. Raises `InputError` where no row drives.
         """
         driving = table["slip"] > 0.0
         if not driving.any():
@@ -105,10 +106,11 @@ class DrivenRange:
         slip, load = table["slip"][driving], table["load_N"][driving]
         low = max(LEAST_SLIP, float(slip.min()) - SLIP_MARGIN)
         high = min(MOST_SLIP, float(slip.max()) + SLIP_MARGIN)
-        return DrivenRange(
-            (round(min(low, high - SLIP_MARGIN), 4), round(high, 4)),
-            (_three_digits(load.min() / LOAD_FACTOR), _three_digits(load.max() * LOAD_FACTOR)),
-        )
+        slips = round(min(low, high - SLIP_MARGIN), 4), round(high, 4)
+        loads = _three_digits(load.min() / LOAD_FACTOR), _three_digits(load.max() * LOAD_FACTOR)
+        if isinstance(gear := case.model.gear, EmulatedGear):
+            slips, loads = gear.cut("slip", slips), gear.cut("load", loads)
+        return DrivenRange(slips, loads)
 
     def as_toml(self) -> str:
         """The table [operating] of a recipe."""

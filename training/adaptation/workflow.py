@@ -148,7 +148,7 @@ def adapt(
             "for one: give a model with [gear], and the rows of that gear"
         )
     table = table.rows(table.answered)
-    split, driven = split_runs(table, seed), DrivenRange.of(table)
+    split, driven = split_runs(table, seed), DrivenRange.of(table, case)
     old = board_unknowns(with_noise_of_log(case, table))[0]
     earlier = _check_earlier(against, case, model_name)
     target = Path(folder)

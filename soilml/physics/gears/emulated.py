@@ -92,6 +92,11 @@ class EmulatedGear:
         u = self.fractions(x)[:, i]
         return np.asarray((u < -MARGIN) | (u > 1.0 + MARGIN))
 
+    def cut(self, name: str, ends: tuple[float, float]) -> tuple[float, float]:
+        """A range of an input without what lies beyond the design."""
+        i = self.inputs.index(name)
+        return max(ends[0], self.lower[i]), min(ends[1], self.upper[i])
+
     def values(self, u: Floats) -> Floats:
         """Inputs (m, d) at points of the unit cube."""
         log = np.asarray(self.logarithmic)

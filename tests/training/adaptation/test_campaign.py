@@ -62,12 +62,12 @@ def test_of_few_runs_none_is_kept_back():
 
 def test_ranges_have_a_margin_and_leave_braking_out():
     table = log()
-    driven = DrivenRange.of(table)
+    driven = DrivenRange.of(table, case)
     assert driven.slip == pytest.approx((0.05, 0.55)) and driven.load == (33.3, 120.0)
     braking = Table(table.columns | {"slip": np.where(table["slip"] < 0.2, -0.2, table["slip"])})
-    assert DrivenRange.of(braking).slip[0] == pytest.approx(0.1833, abs=1e-4)
+    assert DrivenRange.of(braking, case).slip[0] == pytest.approx(0.1833, abs=1e-4)
     with pytest.raises(InputError, match="no row has a slip above 0"):
-        DrivenRange.of(Table(table.columns | {"slip": -table["slip"]}))
+        DrivenRange.of(Table(table.columns | {"slip": -table["slip"]}), case)
 
 
 def test_noise_of_the_log_fills_what_is_not_declared(case):
@@ -87,7 +87,7 @@ def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     prior = {**case.prior, "slip-sinkage.n1": Prior(0.3, 0.5)}
     own = replace(case, model=model, prior=prior)
     path = tmp_path / "recipe.toml"
-    path.write_text(recipe_text(own, DrivenRange.of(log()), 5000, 7))
+    path.write_text(recipe_text(own, DrivenRange.of(log(), case), 5000, 7))
     recipe = read_recipe(path)
     assert (recipe.rows, recipe.seed) == (5000, 7)
     assert (recipe.slip.lower, recipe.load.upper) == pytest.approx((0.05, 120.0))
@@ -103,7 +103,7 @@ def test_bias_is_written_where_there_is_some(case, tmp_path):
         "load_N": Noise(share=0.01),
     }
     path = tmp_path / "recipe.toml"
-    path.write_text(recipe_text(replace(case, bias=bias), DrivenRange.of(log()), 500, 1))
+    path.write_text(recipe_text(replace(case, bias=bias), DrivenRange.of(log(), case), 500, 1))
     assert set(read_recipe(path).bias) == {"torque_Nm", "load_N"}
 
 

@@ -1,0 +1,187 @@
+"""Recipes whose model is another program: rows, and a file for the board, from its runs alone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from datagen.generate import generate
+from datagen.recipe import parse_recipe, read_recipe
+from datagen.simulation import simulate_rows
+from soilml import Estimator, Model, Operating, Wheel, read_table, soil
+from soilml.cli import main
+from soilml.config.case import read_case
+from soilml.config.write_case import case_as_toml
+from soilml.errors import InputError
+from soilml.experiment_design.simulator_runs import space_filling_runs
+from soilml.io.text_tables import csv_text
+from training.adaptation.campaign import DrivenRange, recipe_text
+from training.dataset import read_dataset
+from training.export.model_file import export_model
+from training.set_posterior.families.recipe_family import RecipeFamily
+from training.spec import read_spec
+from training.train import train
+
+RECIPE = """\
+rows = 1000
+seed = 2
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.4, 0.8]
+shear_modulus = [0.005, 0.03]
+[operating]
+slip = [0.05, 0.6]
+load_N = [30.0, 110.0]
+[noise]
+torque_Nm = "2 %"
+drawbar_pull_N = "2 % + 0.2"
+sinkage_m = "2 %"
+"""
+SIMULATOR = '[simulator]\ntable = "simulated.csv"\nslip = [0.05, 0.6]\nload_N = [30.0, 110.0]\n'
+WHEEL = Model(Wheel(radius=0.15, width=0.12))
+CHANNELS = {"torque_Nm": "torque", "drawbar_pull_N": "drawbar_pull", "sinkage_m": "sinkage"}
+
+
+def forces(columns):
+    """The channels of the wheel that the runs are of."""
+    ground = soil(
+        "wong1989/dry_sand",
+        cohesion=columns["cohesion_Pa"],
+        friction_angle=columns["friction_angle_rad"],
+        shear_modulus=columns["shear_modulus_m"],
+    )
+    force = WHEEL(ground, Operating(slip=columns["slip"], load=columns["load_N"]))
+    return {key: getattr(force, name) for key, name in CHANNELS.items()}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    work = tmp_path_factory.mktemp("recipe")
+    (work / "model.toml").write_text(RECIPE.split("[operating]")[0].partition("2\n")[2] + SIMULATOR)
+    design = space_filling_runs(read_case(work / "model.toml", with_simulator=False), 150)
+    (work / "simulated.csv").write_text(csv_text(design | forces(design)))
+    (work / "recipe.toml").write_text(RECIPE + SIMULATOR)
+    (work / "front.toml").write_text(RECIPE)
+    return work
+
+
+@pytest.fixture(scope="module")
+def recipe(folder):
+    return read_recipe(folder / "recipe.toml")
+
+
+def test_rows_are_those_of_the_simulator_with_a_draw_of_its_emulator_s_error(recipe):
+    quiet = replace(recipe, case=replace(recipe.case, noise={}))
+    columns = simulate_rows(quiet, 0, 0, 1000)
+    truth, error = forces(columns), recipe.case.simulator.error
+    sure = replace(quiet, case=replace(quiet.case, simulator=None))
+    without = simulate_rows(sure, 0, 0, 1000)
+    for name in CHANNELS:
+        drawn = columns[name] - without[name]
+        assert np.std(drawn) == pytest.approx(error[name], rel=0.15)  # one draw for each soil
+        apart = without[name] - truth[name]
+        assert np.sqrt(np.mean(apart**2)) < 1.3 * error[name]  # as stated of new runs
+
+
+def test_the_text_of_the_recipe_needs_no_file(recipe, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    again = parse_recipe(recipe.text, "metadata")
+    assert again.text == recipe.text and "simulated.csv" not in recipe.text
+    own, copied = (simulate_rows(r, 0, 0, 50) for r in (recipe, again))
+    for name in CHANNELS:
+        np.testing.assert_array_equal(own[name], copied[name])
+    (tmp_path / "case.toml").write_text(case_as_toml(again.case))
+    assert read_case(tmp_path / "case.toml").simulator.error == recipe.case.simulator.error
+
+
+def test_ranges_beyond_the_runs_are_refused_or_cut(folder, tmp_path, recipe, capsys):
+    (tmp_path / "simulated.csv").write_bytes((folder / "simulated.csv").read_bytes())
+    far = (folder / "recipe.toml").read_text().replace("110.0]\n[noise]", "160.0]\n[noise]")
+    (tmp_path / "recipe.toml").write_text(far)
+    assert main(["generate", str(tmp_path / "recipe.toml"), str(tmp_path / "out.parquet")]) == 2
+    said = capsys.readouterr().err
+    assert (
+        "load_N is [30, 160]; the runs of the simulator have 30" in said and said.count("\n") == 1
+    )
+    rows = {
+        "run": ["a"] * 2,
+        "slip": [0.06, 0.58],
+        "load_N": [31.0, 109.0],
+        "torque_Nm": [1.0, 2.0],
+    }
+    (tmp_path / "rows.csv").write_text(csv_text(rows))
+    driven = DrivenRange.of(read_table(tmp_path / "rows.csv"), recipe.case)
+    gear = recipe.case.model.gear
+    assert driven.slip[1] <= gear.upper[0] and driven.load[1] <= gear.upper[1]
+    (tmp_path / "adapted.toml").write_text(recipe_text(recipe.case, driven, 100, 1))
+    assert read_recipe(tmp_path / "adapted.toml").case.simulator is not None
+    one = str(folder / "recipe.toml"), str(tmp_path / "out.parquet")
+    assert main(["generate", *one, "--device", "cpu"]) == 2
+    assert "--device solves equations" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("runs", "said"),
+    [
+        ("{ slip = [0.1, 0.2], load_N = [1.0] }", "columns of different lengths"),
+        ('{ slip = ["a"], load_N = [1.0] }', "a value that is no number"),
+        ("{}", "columns of different lengths"),
+        ("3", "runs is 3; needed is lists"),
+    ],
+)
+def test_runs_within_a_file_that_cannot_be_read_are_one_line(tmp_path, runs, said):
+    text = SIMULATOR.replace('table = "simulated.csv"', f"runs = {runs}")
+    (tmp_path / "model.toml").write_text(RECIPE.partition("2\n")[2].split("[operating]")[0] + text)
+    with pytest.raises(InputError, match=said):
+        read_case(tmp_path / "model.toml")
+
+
+def test_the_set_posterior_sees_the_simulator_s_response(folder, recipe):
+    """Logarithms of torque and sinkage, and pull over load, of the black box and of the wheel."""
+    targets = ("cohesion", "friction_angle", "shear_modulus")
+    box, front = (RecipeFamily.of(r, targets) for r in (recipe, read_recipe(folder / "front.toml")))
+    designs = box.designs(128, 1)
+    x = np.random.default_rng(0).uniform(-0.5, 0.5, (8, 3))
+    ours, theirs = (family.responses(designs, x) for family in (box, front))
+    torque = designs[:, None, 1] * (np.exp(ours[..., 0]) - np.exp(theirs[..., 0]))
+    assert np.sqrt(np.mean(torque**2)) < 1.3 * recipe.case.simulator.error["torque_Nm"]
+    assert np.std(ours[..., 1] - theirs[..., 1]) < 0.01
+    assert box.model_errors()["contact"] == 0.0  # a black box has no contact to err in
+
+
+@pytest.mark.long
+def test_a_file_trained_on_the_runs_answers_as_one_trained_on_the_equations(folder, tmp_path):
+    found = {}
+    for name in ("recipe", "front"):
+        generate(read_recipe(folder / f"{name}.toml").sized(20_000), tmp_path / f"{name}.parquet")
+        spec = read_spec("fused")
+        data = read_dataset(tmp_path / f"{name}.parquet", spec.features, spec.targets)
+        export_model(train(spec, data), tmp_path / f"{name}.onnx", tmp_path / f"{name}.parquet")
+        found[name] = Estimator.load(tmp_path / f"{name}.onnx")
+    rng = np.random.default_rng(9)
+    apart, wider = [], []
+    for _ in range(40):
+        columns = {
+            "slip": rng.uniform(0.05, 0.6, 8),
+            "load_N": rng.uniform(30.0, 110.0, 8),
+            "cohesion_Pa": rng.uniform(0.0, 3000.0),
+            "friction_angle_rad": rng.uniform(0.4, 0.8),
+            "shear_modulus_m": rng.uniform(0.005, 0.03),
+        }
+        torque = forces(columns)["torque_Nm"] * (1.0 + 0.02 * rng.standard_normal(8))
+        one = {
+            "slip": columns["slip"][None],
+            "torque": torque[None],
+            "load": columns["load_N"][None],
+        }
+        box, front = (found[name](**one) for name in ("recipe", "front"))
+        apart.append((box.mean - front.mean) / front.std)
+        wider.append(box.std / front.std)
+    assert np.sqrt(np.mean(np.square(apart))) < 0.25
+    assert 0.9 < np.mean(wider) < 1.2
