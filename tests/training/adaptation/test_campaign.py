@@ -60,7 +60,7 @@ def test_of_few_runs_none_is_kept_back():
     assert split.kept_back is None and split.runs == () and len(split.campaign) == len(table)
 
 
-def test_ranges_have_a_margin_and_leave_braking_out():
+def test_ranges_have_a_margin_and_leave_braking_out(case):
     table = log()
     driven = DrivenRange.of(table, case)
     assert driven.slip == pytest.approx((0.05, 0.55)) and driven.load == (33.3, 120.0)
