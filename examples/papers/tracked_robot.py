@@ -14,7 +14,7 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from soilml import Case, Model, Operating, soil
+from soilml import Case, Model, Operating, SlipSinkage, soil
 from soilml.config.measurement_noise import Noise
 from soilml.numerics.prior import Prior
 from soilml.papers.wang2018 import LEVEL, plateau, printed
@@ -81,7 +81,9 @@ def main() -> None:
             f"{ground}  {balance.front:11.0%}  {balance.middle:12.0%}  {balance.rear:10.0%}"
             f"  {sunk:10.1f}  {1e-3 * balance.tension:10.1f}"
         )
+    grouser_gains()
     trim_by_moments()
+    sinkage_under_pull()
     pull_test()
     case, groups = eight_groups()
     fresh = simulate_group(
@@ -155,6 +157,47 @@ def sensitivity_to_assumptions() -> None:
             for some in ((), (lugs,))
         ]
         print(f"{name:29s}" + "{:4.0f}  {:8.0f}  {:4.0f}  {:8.0f}".format(*found))
+
+
+def grouser_gains() -> None:
+    """What grousers add, and the largest pull, by where soil between them yields."""
+    slips = np.linspace(0.01, 0.9, 90)
+    print("\nGain by grousers, and largest pull on clay (N), by j_k, where soil yields")
+    print("j_k / K   sand   clay   largest on clay")
+    for ratio in (3.0, 2.0, 1.5, 1.0):
+        found, largest = [], 0.0
+        for ground in COLOURS:
+            some = (replace(GROUSERS, yielding=ratio), *BEYOND_PEAK[ground])
+            pull = WANG2018.pull(soil(f"wang2018/{ground}"), LEVEL, some).mean()
+            found.append(pull - plateau(ground, grousers=False))
+            largest = WANG2018.pull(soil(f"wang2018/{ground}"), slips, some).max()
+        print("{:7.1f}   {:4.0f}   {:4.0f}   {:15.0f}".format(ratio, *found, largest))
+    print("printed     20    150   below 1200, where the axis of its figure ends")
+    area = (
+        2.0 * 2.0 * GROUSERS.height * WANG2018.track.base
+    )  # both sides of the blocks of two tracks
+    sides = [area * float(soil(f"wang2018/{ground}").cohesion) for ground in COLOURS]
+    print("sides    {:5.0f}  {:5.0f}   cohesion on both sides of the sheared block".format(*sides))
+
+
+def sinkage_under_pull() -> None:
+    """Sinkage of the rear wheel, as the paper measures it, against the pull of both tracks."""
+    sand, slip = soil("wang2018/sand"), np.asarray([0.02, 0.1, 0.2, 0.5])
+    at, track = Operating(slip=slip, load=WANG2018.load), WANG2018.track
+    cases = {"trim constant": (track, ())}
+    for hitch in (0.03, 0.1):
+        settling = settling_from_moments(Model(track), sand, at, behind=0.0, hitch=hitch)
+        name = f"moments, hitch at {hitch:g} m"
+        cases[name] = (replace(track, settling=settling), ())
+    cases["and slip-sinkage, n1 0.4"] = (cases[name][0], (SlipSinkage(n1=0.4),))
+    print("\nPull of both tracks (N), and sinkage of the rear wheel (mm), on sand")
+    print("slip                      " + "".join(f"{s:14.2f}" for s in slip))
+    for name, (gear, some) in cases.items():
+        force = Model(gear, some)(sand, at)
+        trim = gear.contact_geometry(force.sinkage, sand, at).trim
+        rear = 1e3 * (force.sinkage + gear.base * np.sin(trim))
+        pairs = zip(2.0 * force.drawbar_pull, rear, strict=True)
+        print(f"{name:26s}" + "".join(f"{pull:7.0f} {sunk:6.2f}" for pull, sunk in pairs))
 
 
 def eight_groups() -> tuple[Case, GroupFits]:

@@ -34,6 +34,27 @@ def test_clay_pulls_more_than_sand_and_grousers_matter_on_clay():
     assert lugged["clay"] - bare["clay"] > 4.0 * (lugged["sand"] - bare["sand"])
 
 
+def test_grousers_that_add_what_is_printed_on_clay_would_pull_too_much_at_small_slip():
+    """The paper prints a gain of 150 N, in a figure of pulls that ends at 1200 N."""
+    soon = replace(GROUSERS, yielding=1.0)
+    assert plateau(CLAY, "clay", soon) - plateau(CLAY, "clay") == pytest.approx(150.0, rel=0.1)
+    assert WANG2018.pull(CLAY, 0.04, (soon, *BEYOND_PEAK["clay"])) > 1800.0
+    assert WANG2018.pull(CLAY, 0.04, (GROUSERS, *BEYOND_PEAK["clay"])) < 1200.0
+
+
+def test_the_rear_sinks_under_pull_where_moments_balance_and_not_at_constant_trim():
+    """Wang et al. 2018, Fig. 12f: sinkage and inclination rise with the pull."""
+    at = Operating(slip=np.asarray([0.02, 0.2, 0.5]), load=WANG2018.load)
+
+    def rear(track):
+        sunk = Model(track)(SAND, at).sinkage
+        return sunk + track.base * np.sin(track.contact_geometry(sunk, SAND, at).trim)
+
+    assert (np.diff(rear(WANG2018.track)) < 0.0).all()
+    settling = settling_from_moments(Model(WANG2018.track), SAND, at, hitch=0.1)
+    assert (np.diff(rear(replace(WANG2018.track, settling=settling))) > 1e-4).all()
+
+
 def test_two_tracks_pull_twice_as_much_as_one():
     one = Model(WANG2018.track)(SAND, Operating(slip=0.4, load=0.5 * 130.0 * 9.81))
     assert WANG2018.pull(SAND, 0.4) == pytest.approx(2.0 * float(one.drawbar_pull))
