@@ -41,6 +41,18 @@ class ProcessDivisions:
     gram: Floats  # (q, q)
     channel: NDArray[np.int64]  # (q,)
     _kept: dict[tuple[int, bytes], Division] = field(default_factory=dict)
+    _reduced: dict[bytes, Floats] = field(default_factory=dict)
+
+    def reduce(self, amplitude: Floats) -> Floats:
+        """The inverse of the factor of V times the amplitudes (channels,), (q, q)."""
+        key = amplitude.tobytes()
+        if key not in self._reduced:
+            while len(self._reduced) >= KEPT:
+                self._reduced.pop(next(iter(self._reduced)))
+            t = amplitude[self.channel]
+            factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * self.gram * t)
+            self._reduced[key] = np.linalg.solve(factor, np.diag(t))
+        return self._reduced[key]
 
     def at(self, amplitude: Floats, channel: int) -> Division:
         """The division with one channel apart, others at their amplitudes (channels,)."""
@@ -97,21 +109,19 @@ class LinearisedFit:
         value = self._solve(plain - explained)[0] + part.log_determinant + growth
         return np.asarray(value + amplitude_penalty(trials))
 
-    def step_and_precision(self, amplitude: Floats) -> tuple[Floats, Floats]:
-        """Step (p,) to the optimum at amplitudes (channels,), and marginal precisions (p,)."""
-        _, step, h = self._solve(self._product(amplitude)[None])
+    def step_and_precision(self, product: Floats) -> tuple[Floats, Floats]:
+        """Step (p,) to the optimum, and marginal precisions (p,); see `product`."""
+        _, step, h = self._solve(product[None])
         return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
 
-    def slope_and_curvature(self, amplitude: Floats) -> tuple[Floats, Floats]:
-        """Gradient (p,) and curvature (p, p) of ln p at amplitudes (channels,), bounds ignored."""
-        p, product = len(self.prior_gradient), self._product(amplitude)
+    def slope_and_curvature(self, product: Floats) -> tuple[Floats, Floats]:
+        """Gradient (p,) and curvature (p, p) of ln p, bounds ignored; see `product`."""
+        p = len(self.prior_gradient)
         return product[:p, p] - self.prior_gradient, product[:p, :p] + self.precision
 
-    def _product(self, amplitude: Floats) -> Floats:
+    def product(self, amplitude: Floats) -> Floats:
         """Products (p + 1, p + 1) of Jacobian and residual under amplitudes (channels,)."""
-        t = amplitude[self.divisions.channel]
-        factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * self.divisions.gram * t)
-        reduced = np.linalg.solve(factor, t[:, None] * self.cross)
+        reduced = self.divisions.reduce(amplitude) @ self.cross
         return np.asarray(self.plain - reduced.T @ reduced)
 
     def _solve(self, product: Floats) -> tuple[Floats, Floats, Floats]:

@@ -128,14 +128,19 @@ def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFi
     return first if first.evidence.value <= second.evidence.value else second
 
 
-def fit_shapes(problem: FitProblem, candidates: Sequence[Explanation]) -> list[Explanation]:
-    """The candidates with the shape coefficients of their effects estimated as well."""
+def fit_shapes(
+    problem: FitProblem, candidates: Sequence[Explanation], limit: float = np.inf
+) -> list[Explanation]:
+    """The candidates with the shape coefficients of their effects estimated as well.
+
+    limit: Objective from which fits under noise alone are no further starts.
+    """
     started, index = [], []
     no_discrepancy = np.zeros(len(problem.readings.channels))
     for i, candidate in enumerate(candidates):
         shapes = problem.shape_coordinates(candidate.names)
         first = [(candidate.catalogue_law.fit, candidate.amplitude)]
-        if candidate.noise_only is not None:
+        if candidate.noise_only is not None and candidate.noise_only.objective < limit:
             first.append((candidate.noise_only, no_discrepancy))
         for fit, amplitude in first if shapes else []:
             coordinates = [*fit.coordinates, *shapes]

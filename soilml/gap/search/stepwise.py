@@ -215,14 +215,15 @@ def _fit_level(
     if not fitted:
         return []
     lowest = min(soil_alone.objective, *(c.objective for c in fitted))
+    notable = soil.objective - NOTABLE_GAIN
     promising = [
         c
         for c in fitted
         if c.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, c) < lowest
         or c.objective < lowest + WITHIN_REACH
-        or (c.noise_only is not None and c.noise_only.objective < soil.objective - NOTABLE_GAIN)
+        or (c.noise_only is not None and c.noise_only.objective < notable)
     ]
-    shaped = {c.names: c for c in fit_shapes(problem, promising)}
+    shaped = {c.names: c for c in fit_shapes(problem, promising, notable)}
     return [shaped.get(c.names, c) for c in fitted]
 
 

@@ -105,7 +105,7 @@ def test_amplitudes_are_root_mean_squares_over_their_tempered_probability():
     """Half of the difference of -2 ln p counts, and of each channel with the other at its best."""
     values = {0: (AMPLITUDES - 1.0) ** 2, 1: 3.0 * (AMPLITUDES - 0.4) ** 2}
     problem = SimpleNamespace(along=lambda amplitude, i: values[i])
-    found = _expected_amplitude(problem, np.asarray([1.0, 0.4]))
+    found = _expected_amplitude(problem, np.asarray([1.0, 0.4]), {})
     for i, value in values.items():
         weight = np.exp(-0.25 * value)
         assert found[i] ** 2 == pytest.approx(np.average(AMPLITUDES**2, weights=weight))

@@ -95,7 +95,8 @@ def fitting(monkeypatch):
         seen.requests = requests
         return [seen.results[r.names] for r in requests if r.names in seen.results]
 
-    def fit_shapes(problem, candidates):
+    def fit_shapes(problem, candidates, limit):
+        seen.limit = limit
         seen.shaped = [c.names for c in candidates]
         return [replace(c, noise_only="shaped") for c in candidates]
 
@@ -120,6 +121,7 @@ def test_shapes_are_fitted_where_they_could_bring_a_set_to_the_best(fitting):
     fitting.promise = {("promises",): 20.0, ("too-little",): 20.0}
     found = level(none, dict.fromkeys(fitting.results, none))
     assert fitting.shaped == [("best",), ("near",), ("promises",), ("by-noise",)]
+    assert fitting.limit == 80.0
     assert [c.names for c in found] == list(fitting.results)  # in their order, shaped or not
     assert [c.names for c in found if c.noise_only == "shaped"] == fitting.shaped
 

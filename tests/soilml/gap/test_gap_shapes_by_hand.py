@@ -105,6 +105,10 @@ def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatc
     assert one.free_law is fits[0] and two.free_law is fits[2]
     np.testing.assert_array_equal(asked[0], found.amplitude)
     np.testing.assert_array_equal(asked[1], np.zeros(len(problem.readings.channels)))
+    asked.clear()
+    fits.pop()
+    explanation.fit_shapes(problem, [first, found], limit=found.fit.objective)
+    assert len(asked) == 2
 
 
 def test_a_candidate_keeps_its_fit_under_noise_alone(dug):
