@@ -24,6 +24,7 @@ import model_errors
 import physics
 import prospects
 import slip
+import slip_unknown
 import small_changes
 import small_files
 import soil_tests
@@ -211,6 +212,13 @@ PARTS = (
         "points of the prior. False changes: rows of unchanged soil, from the "
         f"{small_changes.LATE}th on.",
         lambda folder: small_changes.table(ROOT / "exported" / "wheel.onnx"),
+    ),
+    Part(
+        "slip-unknown",
+        "driving",
+        "Slip without odometry",
+        slip_unknown.ABOUT,
+        lambda folder: slip_unknown.table(),
     ),
     Part(
         "loo", "training", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()

@@ -13,6 +13,7 @@ _SUFFIX = {
     "N m": "_Nm",
     "m/s": "_m_s",
     "m/s^2": "_m_s2",
+    "rad/s": "_rad_s",
     "m^2": "_m2",
     "N/m^3": "_N_m3",
     "N/m^(n+1)": "_SI",
@@ -74,6 +75,10 @@ _ALL = (
     Quantity("unit_weight", "gamma", "N/m^3", "weight of the soil per volume"),
     Quantity("slope", "alpha", "rad", "slope of the ground along the travel, positive uphill"),
     Quantity("rim_speed", "r omega", "m/s", "speed of the rim of the wheel about its axle"),
+    Quantity("wheel_speed", "omega", "rad/s", "rotation of the wheel, positive forward"),
+    Quantity("commanded_speed", "v_c", "m/s", "speed of the rims that was commanded"),
+    Quantity("current", "I", "A", "current of the motor, positive when it drives forward"),
+    Quantity("roll", "rho", "rad", "roll of the rover, positive where its left side is higher"),
     Quantity(
         "angle", "theta", "rad", "place on the rim, from straight down; rotation of a shear ring"
     ),

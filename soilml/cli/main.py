@@ -46,6 +46,7 @@ friction angle and shear modulus, each with its uncertainty.
   slopes that can be climbed   soilml pull (from measured rows)
                                soilml climb (from stress on the rims)
   wheels for a slope           soilml design
+  slip without odometry        soilml slip
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 
@@ -77,6 +78,7 @@ COMMANDS = {
     "design-runs": "soilml.cli.commands.design_runs",
     "pull": "soilml.cli.commands.pull",
     "design": "soilml.cli.commands.design",
+    "slip": "soilml.cli.commands.slip",
     "compare": "training.commands.compare",
     "climb": "soilml.cli.commands.climb",
     "sensor-wheel": "soilml.cli.commands.sensor_wheel",

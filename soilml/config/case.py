@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from soilml.config.drive_errors import DriveErrors, take_drive
 from soilml.config.measurement_noise import (
     Discrepancy,
     Noise,
@@ -73,6 +74,8 @@ class Case:
     simulator
         Another program whose runs stand in for the equations; the error of their emulator is a part
         of `discrepancy`.
+    drive
+        What the rover's drives report beside the torque on the soil.
     """
 
     model: Model
@@ -86,6 +89,7 @@ class Case:
     soil_tests: tuple[SoilTest, ...] = ()
     remainder: Remainder | None = None
     simulator: Simulator | None = None
+    drive: DriveErrors = field(default_factory=DriveErrors)
 
     @property
     def states_model_error(self) -> bool:
@@ -330,4 +334,5 @@ def take_case(
         soil_tests=soil_tests,
         remainder=remainder,
         simulator=simulator,
+        drive=take_drive(settings.table("drive")),
     )

@@ -56,25 +56,31 @@ class WheeledRover:
         """Weight, N."""
         return self.mass * self.gravity
 
-    def loads(self, slope: Any) -> Floats:
-        r"""Load perpendicular to the ground on each wheel, N (wheels, ...), straight up a slope.
+    def loads(self, slope: Any, roll: Any = 0.0) -> Floats:
+        r"""Load perpendicular to the ground on each wheel, N (wheels, ...), on a slope.
 
         .. math::
-            \sum W_i = m g \cos\alpha, \quad \sum W_i x_i = m g (x_c \cos\alpha - h \sin\alpha),
-            \quad \sum W_i y_i = m g\, y_c \cos\alpha
+            \sum W_i = m g \cos\alpha \cos\rho, \quad
+            \sum W_i x_i = m g (x_c \cos\alpha \cos\rho - h \sin\alpha), \quad
+            \sum W_i y_i = m g \cos\alpha (y_c \cos\rho - h \sin\rho)
 
-        at constant speed, with the offset of the wheel forces from the wheel's middle neglected. Of
-        the loads that balance, those of the least sum of squares: those of equally stiff wheels
-        under a rigid body. A suspension that shares the load otherwise is not described.
+        with the pitch alpha up the slope, and the roll rho (0 straight up), positive where the left
+        side is higher; at constant speed, with the offset of the wheel forces from the wheel's
+        middle neglected. Of the loads that balance, those of the least sum of squares: those of
+        equally stiff wheels under a rigid body. A suspension that shares the load otherwise is not
+        described.
 
         Raises `InputError` where wheels in one line do not carry the moment, or a wheel would leave
         the ground.
         """
-        slope = np.asarray(slope, dtype=np.float64)
+        slope, roll = np.broadcast_arrays(np.asarray(slope, dtype=np.float64), roll)
         x, y, height = self.centre_of_mass
-        across, along = np.cos(slope), np.sin(slope)
+        across, along = np.cos(slope) * np.cos(roll), np.sin(slope)
+        aside = np.cos(slope) * np.sin(roll)
         places = np.asarray([(1.0, w.forward, w.left) for w in self.wheels.values()]).T
-        needed = self.weight * np.stack([across, x * across - height * along, y * across])
+        needed = self.weight * np.stack(
+            [across, x * across - height * along, y * across - height * aside]
+        )
         loads = np.tensordot(np.linalg.pinv(places), needed, axes=1)
         missing = np.tensordot(places, loads, axes=1) - needed
         if np.abs(missing).max() > 1e-9 * self.weight * max(1.0, np.abs(places).max()):

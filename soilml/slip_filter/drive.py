@@ -1,0 +1,258 @@
+"""A drive without odometry: its table, its slips and soils row by row, and what to know of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.config.case import Case
+from soilml.errors import InputError, TableError
+from soilml.io.read_table import Rows, as_table
+from soilml.io.table import Table
+from soilml.numerics.quantiles import chi_squared_quantile
+from soilml.remarks import Remark
+from soilml.slip_filter.filter import CHANGE, SlipFilter
+from soilml.slip_filter.force_table import SOILS, force_table
+
+WIDE = 0.3  # Width of a 90 % interval of slip from which on the slip is not determined
+LIKELY = 0.5  # Probability from which on a ground is called hard, or a slip beyond the table
+#: Rows whose misfit is judged together, and normal quantile beyond which it is not chance.
+JUDGED, QUANTILE = 10, 3.72
+LEAST_SHARE = 0.02  # Rim speed below which a wheel stands, over the fastest of the drive
+BEHIND = 0.8  # Rim speed over the commanded one below which the drives do not keep up
+
+FLAGS = {
+    "standing": "all wheels stand: there is no slip",
+    "wheel-stopped": "a wheel stands or turns against the others: not described, passed over",
+    "not-steady": "the rims speed up or slow down: the force balance does not hold, passed over",
+    "no-soil": "no soil of the prior explains torque and pull, a hard floor does: refused",
+    "no-fit": "neither a soil of the prior nor a hard floor explains the torques: do not use them",
+    "beyond": "more slip than the table has, or stuck: the slip is a lower limit",
+    "not-determined": "the interval of the slip is wide",
+    "behind-command": "the rims turn more slowly than commanded",
+}
+#: Flags of rows without an answer.
+REFUSED = ("standing", "wheel-stopped", "not-steady", "no-soil")
+
+
+@dataclass(frozen=True)
+class DriveRows:
+    """Rows (n,) of a rover's k wheels."""
+
+    wheels: tuple[str, ...]
+    time: Floats  # s
+    rim_speed: Floats  # m/s (n, k)
+    torque: Floats  # N m (n, k); NaN where there is none
+    load: Floats  # N (n, k)
+    slope: Floats  # Pitch, rad, positive uphill (n,)
+    commanded: Floats  # m/s (n,); NaN where there is none
+
+
+@dataclass(frozen=True)
+class DriveSlip:
+    """Speed (m/s), slips and soil of each row: 5, 50 and 95 %; NaN where refused."""
+
+    rows: DriveRows
+    speed: Floats  # (n, 3)
+    slip: Floats  # (n, 3, k)
+    names: tuple[str, ...]  # Of the p soil parameters
+    soil: Floats  # (n, 3, p), SI units
+    no_soil: Floats  # Probability of a hard floor (n,)
+    flags: tuple[tuple[str, ...], ...]  # Codes of `FLAGS` of each row
+
+    @property
+    def answered(self) -> NDArray[np.bool_]:
+        """Which rows have an answer, (n,)."""
+        return np.isfinite(self.speed[:, 1])
+
+    def remarks(self) -> Iterator[Remark]:
+        """What to know of the drive, by code."""
+        count = len(self.flags)
+        for code, text in FLAGS.items():
+            rows = np.asarray([code in own for own in self.flags])
+            if not rows.any():
+                continue
+            said = f"{int(rows.sum())} of {count} rows: {text}"
+            if code == "not-determined":
+                low, high = np.median(self.slip[rows][:, [0, 2]].max(axis=2), axis=0)
+                said += f", {low:.2f} to {high:.2f} in the median"
+            severity = "note" if code in ("standing", "behind-command") else "warning"
+            yield Remark(code, said, severity=severity)  # type: ignore[arg-type]
+
+
+def read_drive(table: Rows, case: Case) -> DriveRows:
+    """The rows of a table that has one for each time and wheel.
+
+    Columns: time_s, wheel, rim_speed_m_s or wheel_speed_rad_s, torque_Nm or current_A, slope_rad
+    (the pitch), and, where known, roll_rad, load_N and commanded_speed_m_s. Without load_N, the
+    loads follow from [rover].
+
+    Raises `TableError` for a missing column or cell, an unknown wheel, a time without each wheel,
+    and wheels that all stand; `InputError` for a case without [rover].
+    """
+    table = as_table(table)
+    rover = case.rover
+    if rover is None:
+        raise InputError("the model file has no [rover]; soilml slip needs mass and wheels")
+    speed = _one_of(table, "rim_speed_m_s", "wheel_speed_rad_s")
+    reading = _one_of(table, "torque_Nm", "current_A")
+    for name in ("time_s", "wheel", speed, "slope_rad"):
+        _filled(table, name)
+    wheels = tuple(rover.wheels)
+    order = _by_wheel(table, wheels)
+
+    def each(name: str) -> Floats:
+        return np.asarray(table[name][order])
+
+    rim = each(speed)
+    if speed == "wheel_speed_rad_s":
+        models = [case.gears[w.gear] if w.gear else case.model for w in rover.wheels.values()]
+        rim = rim * np.asarray([float(getattr(model.gear, "radius", 0.0)) for model in models])
+    if not np.any(rim):
+        raise TableError(f"{table.source}: all wheels stand still in every row, {speed} is 0")
+    torque = each(reading)
+    if not np.isfinite(torque).any():
+        raise TableError(f"{table.source}: column {reading} has no value")
+    if reading == "current_A":
+        constant = case.drive.torque_per_ampere
+        if constant is None:
+            raise InputError(
+                "the table has current_A in place of torque_Nm; needed is torque_per_ampere, in "
+                "N m/A at the wheel, in [drive] of the model file"
+            )
+        torque = torque * constant
+    slope = each("slope_rad")[:, 0]
+    if "load_N" in table:
+        _filled(table, "load_N")
+        load = each("load_N")
+    else:
+        roll = each("roll_rad")[:, 0] if "roll_rad" in table else np.zeros(len(slope))
+        load = rover.loads(slope, np.nan_to_num(roll)).T
+    command = "commanded_speed_m_s"
+    commanded = each(command)[:, 0] if command in table else np.full(len(slope), np.nan)
+    return DriveRows(wheels, each("time_s")[:, 0], rim, torque, load, slope, commanded)
+
+
+def _one_of(table: Table, name: str, other: str) -> str:
+    """The one of two columns that a table has; raises `TableError` where it has none."""
+    for own in (name, other):
+        if own in table:
+            return own
+    raise TableError(f"{table.source}: column {name} is missing; needed is {name} or {other}")
+
+
+def _filled(table: Table, name: str) -> None:
+    if name not in table:
+        raise TableError(f"{table.source}: column {name} is missing; soilml slip needs it")
+    blank = table[name] == "" if name == "wheel" else ~np.isfinite(table[name])
+    if blank.any():
+        place = table.place(int(np.argmax(blank)))
+        raise TableError(f"{place}, column {name}: the cell is blank; soilml slip needs a value")
+
+
+def _by_wheel(table: Table, wheels: Sequence[str]) -> NDArray[np.int64]:
+    """Positions (n, k) of the rows of each time and wheel."""
+    known = np.isin(table["wheel"], wheels)
+    if not known.all():
+        row = int(np.argmin(known))
+        raise TableError(
+            f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r}; wheels of [rover] "
+            f"are: {', '.join(wheels)}"
+        )
+    times = np.unique(table["time_s"])
+    order = np.full((len(times), len(wheels)), -1)
+    at = np.searchsorted(times, table["time_s"])
+    number = np.asarray([wheels.index(name) for name in table["wheel"]])
+    order[at, number] = np.arange(len(table))
+    if len(table) != order.size or (order < 0).any():
+        time = times[np.argmax((order < 0).any(axis=1))]
+        raise TableError(
+            f"{table.source}: needed is one row for each of the {len(wheels)} wheels of [rover] at "
+            f"each time; {len(table)} rows have {len(times)} times, see time_s {time:g}"
+        )
+    return order
+
+
+def slip_of_drive(
+    case: Case, rows: Rows | DriveRows, *, soils: int = SOILS, change: float = CHANGE
+) -> DriveSlip:
+    """Slip of each wheel, body speed and soil along a drive, from torque and force balance.
+
+    case: With a rover, priors of the soil, noise of the torque, and errors of the drives.
+    rows: A table as `read_drive` takes it, or its rows.
+    soils: Number of draws of the prior that stand for all soils.
+    change: Probability that a row is on another soil than the row before.
+
+    Each answer knows the rows up to its own. Raises as `read_drive` and `force_table` do. Equations
+    and where they do not hold: `SlipFilter`.
+    """
+    drive = rows if isinstance(rows, DriveRows) else read_drive(rows, case)
+    assert case.rover is not None
+    table = force_table(case, (float(drive.load.min()), float(drive.load.max())), soils)
+    own = case.noise.get("torque_Nm")
+    noise = (0.0, 0.02) if own is None else (own.constant, own.share)
+    filter_ = SlipFilter(table, case.rover.weight, case.drive, noise, change)
+    n, k, p = len(drive.time), len(drive.wheels), len(table.names)
+    speed, slip, soil = (np.full((n, 3, *size), np.nan) for size in ((), (k,), (p,)))
+    no_soil, misfit, flags = np.full(n, np.nan), [], []
+    belief = filter_.start()
+    for i, before in enumerate(_before(drive, case)):
+        if before:
+            flags.append(before)
+            continue
+        way = 1.0 if drive.rim_speed[i, 0] > 0.0 else -1.0  # in reverse all signs change
+        answer, belief = filter_.step(
+            belief,
+            way * drive.rim_speed[i],
+            way * drive.torque[i],
+            drive.load[i],
+            way * float(drive.slope[i]),
+        )
+        misfit.append(answer.misfit)
+        no_soil[i] = answer.no_soil
+        found = list(_after(answer.no_soil, answer.beyond, misfit, answer.slip, k))
+        if drive.commanded[i] * BEHIND > np.abs(drive.rim_speed[i]).mean():
+            found.append("behind-command")
+        flags.append(tuple(found))
+        if "no-soil" not in found:
+            ends = answer.speed if way > 0.0 else -answer.speed[::-1]
+            speed[i], slip[i], soil[i] = ends, answer.slip, answer.soil
+    return DriveSlip(drive, speed, slip, table.names, soil, no_soil, tuple(flags))
+
+
+def _before(drive: DriveRows, case: Case) -> Iterator[tuple[str, ...]]:
+    """Flags of rows that are passed over; empty for others."""
+    assert case.rover is not None
+    moving = np.abs(drive.rim_speed) > LEAST_SHARE * np.abs(drive.rim_speed).max()
+    alike = np.abs(np.sign(drive.rim_speed).sum(axis=1)) == len(drive.wheels)
+    change: Floats = np.diff(drive.rim_speed.mean(axis=1), prepend=drive.rim_speed[0].mean())
+    passed: Floats = np.diff(drive.time, prepend=drive.time[0] - 1.0)
+    uneven = np.abs(change / passed) / case.rover.gravity
+    for i in range(len(drive.time)):
+        if not moving[i].any():
+            yield ("standing",)
+        elif not (moving[i].all() and bool(alike[i])):
+            yield ("wheel-stopped",)
+        else:
+            yield ("not-steady",) if uneven[i] > case.drive.pull_std else ()
+
+
+def _after(
+    no_soil: float, beyond: float, misfit: Sequence[float], slip: Floats, wheels: int
+) -> Iterator[str]:
+    """Flags of an answer."""
+    if no_soil > LIKELY:
+        yield "no-soil"
+        return
+    degrees = float(JUDGED * wheels)
+    limit = chi_squared_quantile(degrees, QUANTILE) / degrees
+    if len(misfit) >= JUDGED and np.mean(misfit[-JUDGED:]) > limit:
+        yield "no-fit"
+    if beyond > LIKELY:
+        yield "beyond"
+    if np.max(slip[2] - slip[0]) > WIDE:
+        yield "not-determined"

@@ -1,0 +1,56 @@
+"""`soilml slip`: files, flags, and one line for bad input."""
+
+import csv
+import io
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
+
+from slip_drives import simulate_drive
+
+from soilml.cli import main
+from soilml.io.text_tables import csv_text
+
+ROVER = str(Path(__file__).parents[2] / "examples/slip/rover.toml")
+
+
+@pytest.fixture
+def drive(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    few = {"soils": 256, "change": 0.01}
+    monkeypatch.setattr("soilml.slip_filter.drive.slip_of_drive.__kwdefaults__", few)
+    found = simulate_drive(5, soils=1, rows=8, apart=0.1)
+    Path("drive.csv").write_text(csv_text(found.columns()))
+    return found
+
+
+def test_table_json_and_picture_have_each_row(drive, capsys):
+    outputs = ["--out", "slip.csv", "--json", "slip.json", "--picture", "slip.png"]
+    assert main(["slip", "drive.csv", "--rover", ROVER, *outputs]) == 0
+    assert "8 rows of 4 wheels" in capsys.readouterr().out
+    rows = list(csv.DictReader(io.StringIO(Path("slip.csv").read_text())))
+    assert len(rows) == 8
+    for row in rows:
+        low, middle, high = (float(row[f"slip_rear-left{end}"]) for end in ("_p05", "", "_p95"))
+        assert low <= middle <= high
+        assert 0.0 <= float(row["no_soil"]) <= 1.0
+    content = json.loads(Path("slip.json").read_text())
+    assert set(content) == {"columns", "remarks"}
+    assert content["columns"]["flags"] == [row["flags"] for row in rows]
+    assert Path("slip.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_bad_input_is_one_line_and_writes_nothing(drive, capsys):
+    text = Path("drive.csv").read_text()
+    Path("drive.csv").write_text(text.replace("slope_rad", "slope_deg"))
+    assert main(["slip", "drive.csv", "--rover", ROVER, "--out", "slip.csv"]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not Path("slip.csv").exists()
+    Path("drive.csv").write_text(text)
+    Path("bad.toml").write_text(Path(ROVER).read_text().replace("pull_std", "pul_std"))
+    assert main(["slip", "drive.csv", "--rover", "bad.toml"]) == 2
+    assert "did you mean 'pull_std'" in capsys.readouterr().err
