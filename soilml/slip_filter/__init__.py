@@ -1,0 +1,1 @@
+"""Slip, body speed and soil of a rover without odometry."""
