@@ -25,6 +25,18 @@ class DriveErrors:
     speed_std: float = 0.005  # Error of the rim speed of a row, as a share of it
 
 
+#: Key of each field in the file.
+KEYS = {
+    "torque_per_ampere": "torque_per_ampere",
+    "loss": "loss_Nm",
+    "loss_std": "loss_Nm_std",
+    "gain_std": "gain_std",
+    "pull_std": "pull_std",
+    "slope_std": "slope_rad_std",
+    "speed_std": "rim_speed_std",
+}
+
+
 def take_drive(settings: Settings) -> DriveErrors:
     """Read `[drive]`; every key may be left out.
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
+from soilml.config.drive_errors import KEYS, DriveErrors
 from soilml.config.measurement_noise import discrepancy_as_settings
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.config.remainder import remainder_lines
@@ -55,6 +56,8 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         lines += ["", *remainder_lines(case.remainder)]
     if case.rover is not None:
         lines += ["", *_rover_lines(case.rover)]
+    if case.drive != DriveErrors():
+        lines += ["", *_drive_lines(case.drive)]
     for effect in case.model.effects:
         lines += ["", *_effect_lines(case, effect, "effect", effect.name)]
     return "\n".join(lines) + "\n"
@@ -89,6 +92,11 @@ def _gear_lines(gear: Gear) -> list[str]:
     braking = getattr(gear, "braking", RigidWheel.braking)
     law = [f'braking = "{braking}"'] if braking != RigidWheel.braking else []
     return [f'type = "{gear.name}"', *dimensions, *law]
+
+
+def _drive_lines(drive: DriveErrors) -> list[str]:
+    values = {KEYS[name]: value for name, value in vars(drive).items() if value is not None}
+    return ["[drive]", *(f"{key} = {_number(value)}" for key, value in values.items())]
 
 
 def _rover_lines(rover: WheeledRover) -> list[str]:

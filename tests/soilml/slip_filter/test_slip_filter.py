@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "bench"))
 from slip_drives import loads, simulate_drive
 
 from soilml import Operating, read_case
+from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
 from soilml.slip_filter.drive import read_drive, slip_of_drive
 from soilml.slip_filter.filter import SlipFilter, slip_of_ratio, travel_ratio
@@ -153,3 +154,9 @@ def test_loads_that_the_prior_does_not_carry_are_refused(case):
 def test_a_case_without_a_rover_is_refused(case, drive):
     with pytest.raises(InputError, match="mass and wheels"):
         read_drive(drive.columns(), replace(case, rover=None))
+
+
+def test_a_written_model_file_keeps_the_drives(case, tmp_path):
+    known = replace(case, drive=replace(case.drive, torque_per_ampere=0.5, speed_std=0.01))
+    (tmp_path / "model.toml").write_text(case_as_toml(known))
+    assert read_case(tmp_path / "model.toml").drive == known.drive
