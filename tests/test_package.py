@@ -44,6 +44,7 @@ def run(program, *arguments, cwd):
     )
 
 
+@pytest.mark.long
 def test_two_builds_are_the_same_to_the_last_byte(tmp_path):
     built = []
     for name in ("first", "second"):

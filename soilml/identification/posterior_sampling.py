@@ -47,9 +47,8 @@ def sampled(
 ) -> ImportanceSample:
     """Weighted fractions (n, p) of the priors, those of shared errors behind.
 
-    Samples of a similar posterior, `start`, show the region; with shared errors, and where the
-    posterior is narrow, the optimum does. Parameters that are uniform over several times their
-    least value are sampled in their logarithm.
+    Samples of a similar posterior, `start`, show the region, or the optimum does. Parameters that
+    are uniform over several times their least value are sampled in their logarithm.
 
     Raises `FitError` where no parameters in the prior carry the measured loads, or where the
     effective sample size is below 50.
@@ -57,7 +56,7 @@ def sampled(
     logs = in_logarithms(density)
     sample: ImportanceSample | None = None
     if optimum is not None:
-        sample = (_beside_errors if density.errors else _narrow)(density, optimum)
+        sample = (_beside_errors if density.errors else _about_optimum)(density, optimum)
     if sample is None:
         sample = _from_surface(density, None if start is None else logs.forth(start))
     if sample is None:
@@ -108,11 +107,14 @@ def _beside_errors(density: PosteriorDensity, optimum: Solution) -> ImportanceSa
     return of_model(logs, start, density.noise_scale, len(density.readings.row_slip))
 
 
-def _narrow(density: PosteriorDensity, optimum: Solution) -> ImportanceSample | None:
-    """Samples of a posterior that is a small part of the priors, or None; from its optimum on."""
+def _about_optimum(density: PosteriorDensity, optimum: Solution) -> ImportanceSample | None:
+    """Samples of soil from the optimum on; None where polynomials fail and much of the prior is it.
+
+    Of a narrow posterior, polynomials take the place of the model. A wide one may go on beyond
+    their region, and the model itself is sampled from theirs on.
+    """
     root = normal_root(density, optimum)
-    if float(np.sqrt((root**2).sum(axis=1)).max()) > NARROW:
-        return None
+    narrow = float(np.sqrt((root**2).sum(axis=1)).max()) <= NARROW
     logs = in_logarithms(density)
     middle, own_root = logs.around(optimum.x, root)
     start = normal_sample(middle, own_root)
@@ -120,9 +122,13 @@ def _narrow(density: PosteriorDensity, optimum: Solution) -> ImportanceSample | 
     found = surface_sample(logs, len(root), start)
     if found is not None and density.linearise_at_mean(logs.back(found)):
         found = surface_sample(logs, len(root), found)
-    if found is None:
+    if found is not None and not narrow:
+        return importance_sample(
+            logs, len(root), around=found, later=SMALL_ROUND, least_effective_size=ENOUGH
+        )
+    if found is None and narrow:
         around = middle, MUCH_WIDER * own_root
-        found = importance_sample(logs, len(root), around=around, later=SMALL_ROUND)
+        return importance_sample(logs, len(root), around=around, later=SMALL_ROUND)
     return found
 
 

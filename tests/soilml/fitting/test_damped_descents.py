@@ -93,7 +93,9 @@ def test_the_objective_counts_tests_of_the_soil():
 
     class Tested(LeastSquaresProblem):
         soil_tests = SimpleNamespace(
-            deviation=lambda x: 2.0 * np.asarray(x) - 1.0, rates=lambda x: np.asarray([[2.0]])
+            case=SimpleNamespace(soil_tests=["a test"]),
+            deviation=lambda x: 2.0 * np.asarray(x) - 1.0,
+            rates=lambda x: np.asarray([[2.0]]),
         )
 
     of = Coordinate("kphi", "", Prior(0.0, 1.0), lower=-5.0, upper=5.0)
