@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from soilml.config.drive_errors import DriveErrors, take_drive
 from soilml.config.measurement_noise import (
     Discrepancy,
     Noise,
@@ -30,7 +29,7 @@ from soilml.config.simulator import (
     take_simulator,
     with_emulator_error,
 )
-from soilml.config.wheeled_rover import WheeledRover, take_rover
+from soilml.config.wheeled_rover import DriveErrors, WheeledRover, take_drive, take_rover
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior

@@ -7,11 +7,10 @@ import re
 from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
-from soilml.config.drive_errors import KEYS, DriveErrors
 from soilml.config.measurement_noise import discrepancy_as_settings
 from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.config.remainder import remainder_lines
-from soilml.config.wheeled_rover import WheeledRover
+from soilml.config.wheeled_rover import DRIVE_KEYS, DriveErrors, WheeledRover
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.effects import Effect
@@ -95,7 +94,7 @@ def _gear_lines(gear: Gear) -> list[str]:
 
 
 def _drive_lines(drive: DriveErrors) -> list[str]:
-    values = {KEYS[name]: value for name, value in vars(drive).items() if value is not None}
+    values = {DRIVE_KEYS[name]: value for name, value in vars(drive).items() if value is not None}
     return ["[drive]", *(f"{key} = {_number(value)}" for key, value in values.items())]
 
 

@@ -26,13 +26,13 @@ MAX_ITERATIONS = 25
 #: `ENOUGH` (far below the thresholds on differences of the objective, which start at 9) or by less
 #: than the fraction `SHARE` of its excess over the number of readings (while the model is far from
 #: the data); and where the best of several steps lowers it by less than `ENOUGH` or `STEP_SHARE`.
-ENOUGH, SHARE, STEP_SHARE = 0.02, 5e-4, 2e-3
+ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several.
 KEPT_PROMISE = 0.5
 #: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
 #: factor after an iteration without improvement, and the bounds.
-FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.3, 1.0, 10.0), 1e2
+FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 1.0, 10.0), 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 #: Multiples of the last step that are tried beside damped ones: along a curved valley these are
 #: short, and each is like the last.

@@ -135,6 +135,7 @@ def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
             axes.axvspan(s.start, s.stop, color=_LEFT_OUT if s.why else _WINDOW, lw=0, zorder=0)
         scale = 1e3 if title.endswith("mm") else 1.0
         shown: list[Floats] = []
+        means: list[Floats] = []
         for name, label, colour in zip(names, labels, _LINES, strict=False):
             if not _finite(series, name):
                 continue
@@ -145,8 +146,8 @@ def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
             axes.plot(*_thinned(series.time, values), color=colour, lw=0.7, alpha=0.65)
             if label:
                 axes.plot([], [], color=colour, label=label)
-            _draw_means(axes, rows, name, scale, colour)
-        _limits(axes, shown)
+            means.append(_draw_means(axes, rows, name, scale))
+        _limits(axes, shown, means)
         axes.set_title(title, fontsize=9.5, pad=3)
         axes.tick_params(labelsize=8.5, labelbottom=k == len(panels) - 1)
         axes.set_xlim(series.time[0], series.time[-1])
@@ -159,23 +160,25 @@ def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
     axes.set_xlabel("time, s", fontsize=9.5)
 
 
-def _draw_means(axes: Axes, rows: Any, name: str, scale: float, colour: str) -> None:
+def _draw_means(axes: Axes, rows: Table, name: str, scale: float) -> Floats:
+    """Draw the values of the rows with their 90 % intervals; returns those that are known."""
     key = _COLUMNS.get(name)
     if key is None or key not in rows or not len(rows):
-        return
+        return np.zeros(0)
     std = rows[f"{key}_std"] if f"{key}_std" in rows else np.zeros(len(rows))
     axes.errorbar(
         rows["time_s"], scale * rows[key], Z_90 * scale * np.nan_to_num(std), fmt="o", ms=3.2,
         color="black", ecolor="black", elinewidth=1.2, capsize=2, zorder=4,
     )  # fmt: skip
+    return np.asarray(scale * rows[key][np.isfinite(rows[key])])
 
 
-def _limits(axes: Axes, shown: list[Floats]) -> None:
-    """Limits by percentiles, so that a single spike does not flatten the rest."""
+def _limits(axes: Axes, shown: list[Floats], means: list[Floats]) -> None:
+    """Limits by percentiles, so that a single spike does not flatten the rest; all means are in."""
     values = np.concatenate(shown) if shown else np.zeros(0)
     if values.size:
-        low, high = np.percentile(values, [0.5, 99.5])
-        low, high = min(low, 0.0), max(high, 0.0)
+        ends = np.concatenate([np.percentile(values, [0.5, 99.5]), [0.0], *means])
+        low, high = float(ends.min()), float(ends.max())
         margin = 0.08 * (high - low) or 1.0
         axes.set_ylim(low - margin, high + margin)
 

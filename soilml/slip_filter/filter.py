@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.drive_errors import DriveErrors
+from soilml.config.wheeled_rover import DriveErrors
 from soilml.numerics.prior import Prior
 from soilml.numerics.resampling import effective_size, weighted_quantiles
 from soilml.slip_filter.force_table import ForceTable

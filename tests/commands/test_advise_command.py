@@ -122,7 +122,8 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     assert left < content["advice"]["repeat"]["remaining_fraction"]["cohesion"] - 0.2
     assert main([*command, "--out", "o.json"]) == 0
     said = capsys.readouterr().out
-    assert "cohesion: not identified by these rows, 99% of the prior's width remains" in said
+    wide = re.search(r"cohesion: not identified by these rows, (\d+)% of the prior's width", said)
+    assert 96 <= int(wide[1]) <= 102  # a fiftieth is the error of its samples
     assert "Most informative next: slip" in said
     assert (
         main([*command[:3], "--method", "nonlinear", "--out", "o.json"]) == 0

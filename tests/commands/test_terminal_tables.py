@@ -58,6 +58,7 @@ ELSEWHERE = {
     "design-runs",
     "export-c",
     "export-fusion",
+    "slip",
     "export-soil",  # in the units of the program that it writes for
     "export-step",
     "adapt",
