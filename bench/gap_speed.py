@@ -62,7 +62,7 @@ def run() -> None:
     parser.add_argument("--sets", type=int, default=SETS, help=f"of each size (default: {SETS})")
     parser.add_argument("--write", action="store_true", help="write docs/benchmarks/gap-speed.md")
     args = parser.parse_args()
-    analyse(next(_sets(64, "sweep")))  # libraries are loaded
+    analyse(next(sets(64, "sweep")))  # libraries are loaded
     rows = [_row(size, args.sets) for size in SIZES]
     header = ("sets", "raw: median, 90 %, longest", "scaled: median, 90 %, longest", "gate", "met")
     text = (
@@ -78,14 +78,14 @@ def run() -> None:
 def _row(size: tuple[int, str, float, float | None], count: int) -> list[str]:
     """The line of the table on sets of one size."""
     number, design, median, longest = size
-    sets = list(islice(_sets(number, design), count))
-    timed = [analyse(drawn) for drawn in sets]
+    drawn_sets = list(islice(sets(number, design), count))
+    timed = [analyse(drawn) for drawn in drawn_sets]
     scaled = [t.scaled for t in timed]
-    calls = np.median([_python_calls(drawn) for drawn in sets[:COUNTED]])
+    calls = np.median([_python_calls(drawn) for drawn in drawn_sets[:COUNTED]])
     met = float(np.median(scaled)) <= median and (longest is None or max(scaled) <= longest)
     gate = f"<= {median:g}" + (f", longest <= {longest:g}" if longest else "")
     return [
-        f"{len(sets)} of {number} rows",
+        f"{len(drawn_sets)} of {number} rows",
         _figures([t.seconds for t in timed]),
         _figures(scaled),
         gate,
@@ -98,7 +98,7 @@ def _figures(seconds: list[float]) -> str:
     return f"{np.median(seconds):.2f}, {np.quantile(seconds, 0.9):.2f}, {max(seconds):.2f}"
 
 
-def _sets(rows: int, design: str) -> Iterator[BlindSet]:
+def sets(rows: int, design: str) -> Iterator[BlindSet]:
     """Blind sets of a design with so many rows of three channels, in an order by chance."""
     for seed in range(SEED, SEED + 5):
         plans = [plan for plan in benchmark_plans(seed) if plan.design == design]
