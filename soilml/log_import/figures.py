@@ -132,7 +132,8 @@ def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
         top = height - 16 - _HEIGHT * k
         axes = canvas.add_axes((0.13, (top - _HEIGHT + 18) / height, 0.85, (_HEIGHT - 18) / height))
         for s in series.stretches:
-            axes.axvspan(s.start, s.stop, color=_LEFT_OUT if s.why else _WINDOW, lw=0, zorder=0)
+            colour = _LEFT_OUT if s.why else _WINDOW  # windows that touch are told apart
+            axes.axvspan(s.start, s.stop, facecolor=colour, edgecolor="white", lw=1, zorder=0)
         scale = 1e3 if title.endswith("mm") else 1.0
         shown: list[Floats] = []
         means: list[Floats] = []
