@@ -110,9 +110,9 @@ PARTS = (
         "twice that in an end of the 90 % interval. Sets for which no polynomial was accurate "
         "enough "
         "are left out; `identify` samples the model for them. The last table has the averaged "
-        "answer of `identify` with the exact model's beside it, on blind sets with hidden effects: "
-        "seconds of one core, and of one that makes 500,000 forward solutions in a second (goal: "
-        "a median of 2 s for 64 rows).",
+        "answer of `identify` with the exact model's beside it, on blind sets with hidden "
+        "effects. *Scaled*: for a core that makes 500,000 forward solutions in a second. "
+        "Goal: a median of 2 s for 64 rows.",
         lambda folder: identification.text(),
     ),
     Part(

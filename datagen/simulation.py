@@ -22,6 +22,7 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.smooth_functions import SmoothFunctions
+from soilml.numerics.smooth_process import process_columns, slip_load_points
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column
@@ -164,9 +165,21 @@ def _error_functions(recipe: Recipe) -> dict[str, SmoothFunctions]:
     if (simulator := recipe.case.simulator) is not None:
         for name in CHANNELS:
             if std := simulator.error.get(column(name)):
-                error = Discrepancy(constant=std).error_functions(*recipe.driven)
-                parts.setdefault(name, []).append(error)
+                error = Discrepancy(constant=std)
+                parts.setdefault(name, []).append(_process_functions(error, *recipe.driven))
     return {name: SmoothFunctions.joined(own) for name, own in parts.items()}
+
+
+def _process_functions(
+    error: Discrepancy, slip: tuple[float, float], load: tuple[float, float]
+) -> SmoothFunctions:
+    """The absolute part of a discrepancy as functions of slip and load (N)."""
+    lengths = error.slip_length, error.log_load_length
+
+    def columns(slip: Floats, load: Floats) -> Floats:
+        return process_columns(slip_load_points(slip, load, *lengths), error.constant)
+
+    return SmoothFunctions.of(columns, lengths, slip, load)
 
 
 def _add_gear_sensors(

@@ -333,5 +333,5 @@ def take_case(
         soil_tests=soil_tests,
         remainder=remainder,
         simulator=simulator,
-        drive=take_drive(settings.table("drive")),
+        drive=take_drive(settings.table("drive")) if "drive" in settings else DriveErrors(),
     )

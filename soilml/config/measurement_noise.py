@@ -16,8 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.io.toml_settings import Settings
-from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, slip_load_points
 from soilml.quantities import CHANNELS, column
 
 #: Largest share of a reading, and largest constant part, in the unit of any column.
@@ -200,17 +198,6 @@ class Discrepancy:
         1.0
         """
         return math.hypot(self.constant, self.share * span)
-
-    def error_functions(
-        self, slip: tuple[float, float], load: tuple[float, float]
-    ) -> SmoothFunctions:
-        """Its absolute part as functions of slip and load (N) with normal weights."""
-        lengths = self.slip_length, self.log_load_length
-
-        def columns(slip: NDArray[np.float64], load: NDArray[np.float64]) -> NDArray[np.float64]:
-            return process_columns(slip_load_points(slip, load, *lengths), self.constant)
-
-        return SmoothFunctions.of(columns, lengths, slip, load)
 
     def as_setting(self) -> Any:
         """The amplitude as it is written in TOML."""
