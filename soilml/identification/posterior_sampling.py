@@ -10,9 +10,8 @@ from soilml.fitting.coordinates import log_ratios
 from soilml.fitting.least_squares import Solution
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.logarithmic_density import LogarithmicDensity
 from soilml.numerics.surface_sampling import MOST_ROUNDS, normal_sample, surface_sample
-from soilml.numerics.surrogate_density import SamplingBox
+from soilml.numerics.surrogate_density import LogarithmicDensity, SamplingBox
 
 #: Effective sample size below which mean and spread of the samples are not reported: their errors
 #: then exceed 1 / sqrt(50) = 14 % of the standard deviation.

@@ -13,9 +13,9 @@ from soilml.fitting.coordinates import Coordinate, log_ratios, rates_at
 from soilml.fitting.covariance import Whitening
 from soilml.fitting.least_squares import SoilTestTerms, Solution
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.logarithmic_density import LogarithmicDensity
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.numerics.surface_sampling import normal_sample, surface_sample
+from soilml.numerics.surrogate_density import LogarithmicDensity
 
 MOST_ROUNDS = 5  # Rounds in which polynomials are fitted to the model
 TINY = 1e-300  # Smallest share of a normal density whose logarithm is taken
