@@ -23,7 +23,7 @@ from soilml.remarks import Remark
 
 #: Fractions of the posterior below the ends of the 90 % interval.
 INTERVAL = np.asarray([0.05, 0.95])
-#: Readings from which on the posterior may be so narrow that the search begins at its optimum.
+#: Readings from which on the search begins at the optimum: fewer may leave several.
 MANY_READINGS = 48
 #: Factor on the noise up to which the posterior with the declared noise shows the region.
 SIMILAR_NOISE = 2.0

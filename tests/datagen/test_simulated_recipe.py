@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import WHEEL_ON_SAND
 
 from datagen.generate import generate
 from datagen.recipe import parse_recipe, read_recipe
@@ -22,19 +23,19 @@ from training.set_posterior.families.recipe_family import RecipeFamily
 from training.spec import read_spec
 from training.train import train
 
-RECIPE = """\
-rows = 1000
-seed = 2
-[gear]
-type = "wheel"
-radius = 0.15
-width = 0.12
-[soil]
-name = "wong1989/dry_sand"
+MODEL = (
+    WHEEL_ON_SAND
+    + """\
 [soil.prior]
 cohesion = [0.0, 3000.0]
 friction_angle = [0.4, 0.8]
 shear_modulus = [0.005, 0.03]
+"""
+)
+RECIPE = f"""\
+rows = 1000
+seed = 2
+{MODEL}
 [operating]
 slip = [0.05, 0.6]
 load_N = [30.0, 110.0]
@@ -63,7 +64,7 @@ def forces(columns):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     work = tmp_path_factory.mktemp("recipe")
-    (work / "model.toml").write_text(RECIPE.split("[operating]")[0].partition("2\n")[2] + SIMULATOR)
+    (work / "model.toml").write_text(MODEL + SIMULATOR)
     design = space_filling_runs(read_case(work / "model.toml", with_simulator=False), 250)
     (work / "simulated.csv").write_text(csv_text(design | forces(design)))
     (work / "recipe.toml").write_text(RECIPE + SIMULATOR)
@@ -137,7 +138,7 @@ def test_ranges_beyond_the_runs_are_refused_or_cut(folder, tmp_path, recipe, cap
 )
 def test_runs_within_a_file_that_cannot_be_read_are_one_line(tmp_path, runs, said):
     text = SIMULATOR.replace('table = "simulated.csv"', f"runs = {runs}")
-    (tmp_path / "model.toml").write_text(RECIPE.partition("2\n")[2].split("[operating]")[0] + text)
+    (tmp_path / "model.toml").write_text(MODEL + text)
     with pytest.raises(InputError, match=said):
         read_case(tmp_path / "model.toml")
 
