@@ -50,23 +50,30 @@ def _declared(cls: type) -> dict[str, Parameter]:
 
 
 @cache
+def _field_names(cls: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(cls))
+
+
+@cache
 def _part_fields(cls: type) -> tuple[str, ...]:
     """Names of the fields of a dataclass that are no parameters."""
     own = declared(cls)
-    return tuple(field.name for field in fields(cls) if field.name not in own)
+    return tuple(name for name in _field_names(cls) if name not in own)
 
 
-def _is_node(tree: Any) -> bool:
-    """Whether `tree` is an instance of a dataclass."""
-    return hasattr(type(tree), "__dataclass_fields__")
+def _is_node(cls: Any) -> bool:
+    """Whether instances of a class are dataclasses."""
+    return hasattr(cls, "__dataclass_fields__")
 
 
 def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
     """(path name, key, part) of the parts of `tree` that may hold parameters."""
-    if _is_node(tree):
-        cls: type = type(tree)
+    cls: type = type(tree)
+    if _is_node(cls):
         for name in _part_fields(cls):
-            yield name, name, getattr(tree, name)
+            part = getattr(tree, name)
+            if isinstance(part, tuple) or _is_node(type(part)):
+                yield name, name, part
     elif isinstance(tree, tuple):
         for index, part in enumerate(tree):
             if hasattr(part, "name"):
@@ -76,7 +83,7 @@ def _parts(tree: Any) -> Iterator[tuple[str, str | int, Any]]:
 def located(tree: Any, prefix: str = "") -> dict[str, tuple[Parameter, Real]]:
     """Every parameter of the tree that has a value, dotted path -> (declaration, value)."""
     found: dict[str, tuple[Parameter, Real]] = {}
-    if _is_node(tree):
+    if _is_node(type(tree)):
         for name, parameter in declared(type(tree)).items():
             if (value := getattr(tree, name)) is not None:
                 found[prefix + name] = parameter, value
@@ -91,20 +98,32 @@ def values(tree: Any) -> dict[str, Real]:
 
 
 def mapped(tree: T, change: Callable[[Any], Real]) -> T:
-    """The same tree with every parameter's value replaced by what `change` makes of it."""
+    """The same tree with every parameter's value replaced by what `change` makes of it.
+
+    Dataclasses do not check their fields again: values change their type, or lose rows.
+    """
     changed: dict[str | int, Any] = {}
-    if _is_node(tree):
+    if _is_node(type(tree)):
         for name in declared(type(tree)):
             old = getattr(tree, name)
             if old is not None and (new := change(old)) is not old:
                 changed[name] = new
     for _, key, part in _parts(tree):
-        if (isinstance(part, tuple) or _is_node(part)) and (
-            new := mapped(part, change)
-        ) is not part:
+        if (new := mapped(part, change)) is not part:
             changed[key] = new
-    whole: T = _with_fields(tree, changed) if changed else tree
+    if not changed:
+        return tree
+    whole: T = _with_elements(tree, changed) if isinstance(tree, tuple) else _copied(tree, changed)
     return whole
+
+
+def _copied(tree: Any, changed: Mapping[Any, Any]) -> Any:
+    """A dataclass with some fields replaced, without its checks."""
+    cls: Any = type(tree)
+    copy = object.__new__(cls)
+    for name in _field_names(cls):
+        object.__setattr__(copy, name, changed[name] if name in changed else getattr(tree, name))
+    return copy
 
 
 def with_values(tree: T, new: Mapping[str, Real]) -> T:
@@ -130,14 +149,14 @@ def _rebuilt(tree: Any, new: Mapping[str, Real]) -> Any:
         }
         if inner:
             changed[key] = _rebuilt(part, inner)
-    return _with_fields(tree, changed)
-
-
-def _with_fields(tree: Any, changed: Mapping[str | int, Any]) -> Any:
-    """A dataclass with some fields replaced, or a tuple with some elements."""
     if isinstance(tree, tuple):
-        return tuple(changed.get(index, part) for index, part in enumerate(tree))
+        return _with_elements(tree, changed)
     return replace(tree, **{str(key): value for key, value in changed.items()})
+
+
+def _with_elements(tree: tuple[Any, ...], changed: Mapping[Any, Any]) -> Any:
+    """A tuple with some elements replaced."""
+    return tuple(changed.get(index, part) for index, part in enumerate(tree))
 
 
 def check(tree: Any, where: str = "") -> None:

@@ -104,6 +104,11 @@ class Case:
         return dict(self._parameters)
 
     @cached_property
+    def numbers(self) -> dict[str, Any]:
+        """The value of every parameter by path."""
+        return {path: value for path, (_, value) in self._parameters.items()}
+
+    @cached_property
     def _parameters(self) -> dict[str, tuple[Parameter, Any]]:
         own = located(self.soil)
         for path, entry in located(self.model).items():
@@ -115,7 +120,7 @@ class Case:
 
     def with_values(self, new: dict[str, Any]) -> Case:
         """The same case with some parameters replaced, by path."""
-        unknown = sorted(new.keys() - self.parameters().keys())
+        unknown = sorted(new.keys() - self._parameters.keys())
         if unknown:
             raise InputError(
                 f"no parameter {unknown[0]!r}; this model has: {', '.join(self.parameters())}"

@@ -14,6 +14,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.parameters import check
 from soilml.parameters import values as parameter_values
+from soilml.physics.contact import Resolution
 from soilml.physics.effects.base import Effect
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened
@@ -66,9 +67,9 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     Raises `InputError` for a value outside its bounds; `graphlib.CycleError` where two cases have
     the same effects in contrary order.
     """
-    effects = _joined_effects([part.case for part in parts])
-    parameters = [part.case.parameters() for part in parts]
-    whole = _with_effects(parts[0].case, effects)
+    cases = list({id(part.case): part.case for part in parts}.values())
+    effects = _joined_effects(cases)
+    whole = _with_effects(cases[0], effects)
     neutral: dict[str, Any] = {}
     for effect in effects.values():
         unchanged = parameter_values(effect())  # at which it changes nothing
@@ -77,23 +78,24 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     points = np.asarray([part.points for part in parts])
     set_ends = np.cumsum(sets)
     set_of_row = np.repeat(np.arange(set_ends[-1]), np.repeat(points, sets))
+    known = {id(case): neutral | case.numbers for case in cases}
+    varied = {path for part in parts for path in part.values}
     values: dict[str, Any] = {}
-    for path, (_, first) in whole.parameters().items():
-        own = [
-            part.values.get(path, known[path][1] if path in known else neutral[path])
-            for part, known in zip(parts, parameters, strict=True)
-        ]
-        if any(np.ndim(value) or value != first for value in own):
-            by_set = np.empty(set_ends[-1])
-            for value, part, end in zip(own, parts, set_ends, strict=True):
-                by_set[end - part.sets : end] = value
-            values[path] = by_set[set_of_row]
+    for path, first in whole.numbers.items():
+        if path not in varied and all(own[path] == first for own in known.values()):
+            continue
+        by_set = np.empty(set_ends[-1])
+        for part, end in zip(parts, set_ends, strict=True):
+            own = known[id(part.case)][path]
+            by_set[end - part.sets : end] = part.values.get(path, own)
+        values[path] = by_set[set_of_row]
     whole = whole.with_values(values)
     at = _joined_operating(parts)
     check(at)
     check(whole.soil, "soil ")
     check(whole.model)
-    return flattened(LoadCase(whole.model.gear, whole.soil, at, whole.model.effects))[0]
+    joined = LoadCase(whole.model.gear, whole.soil, at, whole.model.effects, Resolution.FIT)
+    return flattened(joined)[0]
 
 
 def _joined_effects(cases: Sequence[Case]) -> dict[str, type[Effect]]:

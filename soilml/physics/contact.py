@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import Any
 
 from soilml.arrays import Array, Real, namespace
@@ -13,6 +14,14 @@ from soilml.physics.soils import Soil
 SMALLEST_DEPTH = 1e-300
 #: Shear strength (Pa) below which the shear stress counts as none.
 SMALLEST_STRENGTH = 1e-30
+
+
+class Resolution(Enum):
+    """How finely a contact is divided into points for integration."""
+
+    COARSE = "coarse"  # the load to a few per cent: where a search begins
+    FIT = "fit"  # forces far within the noise of any sensor: what fits compare with readings
+    FULL = "full"
 
 
 @dataclass(frozen=True)

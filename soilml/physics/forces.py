@@ -19,14 +19,11 @@ def apply_input_effects(load_case: LoadCase) -> LoadCase:
     return replace(load_case, soil=apply_stage(effects, "on_soil", load_case.soil, load_case))
 
 
-def forces_at_sinkage(load_case: LoadCase, sinkage: Array, *, coarse: bool = False) -> Force:
-    """Forces on a gear at this sinkage (m), whatever its load; `load` is the load carried.
-
-    `coarse` takes few integration points, for the load to a few per cent.
-    """
+def forces_at_sinkage(load_case: LoadCase, sinkage: Array) -> Force:
+    """Forces on a gear at this sinkage (m), whatever its load; `load` is the load carried."""
     xp = namespace(sinkage)
     soil = load_case.soil
-    geometry, stresses = stresses_at_sinkage(load_case, sinkage, coarse=coarse)
+    geometry, stresses = stresses_at_sinkage(load_case, sinkage)
     load, pull, torque = integrate(stresses)
     status = load_case.gear.geometry_status(geometry)
     bearing_modulus = soil.kc / stresses.contact.width + soil.kphi + 0.0 * load
@@ -42,20 +39,17 @@ def forces_at_sinkage(load_case: LoadCase, sinkage: Array, *, coarse: bool = Fal
     return apply_stage(load_case.effects, "on_force", force, load_case)
 
 
-def load_at_sinkage(load_case: LoadCase, sinkage: Array, *, coarse: bool = False) -> Array:
+def load_at_sinkage(load_case: LoadCase, sinkage: Array) -> Array:
     """Load (N) that the soil carries at this sinkage (m); see `forces_at_sinkage`."""
     if any(effect.overrides("on_force") for effect in load_case.effects):
-        return forces_at_sinkage(load_case, sinkage, coarse=coarse).load
-    return vertical_load(stresses_at_sinkage(load_case, sinkage, coarse=coarse)[1])
+        return forces_at_sinkage(load_case, sinkage).load
+    return vertical_load(stresses_at_sinkage(load_case, sinkage)[1])
 
 
-def stresses_at_sinkage(
-    load_case: LoadCase, sinkage: Array, *, coarse: bool = False
-) -> tuple[Any, Stress]:
+def stresses_at_sinkage(load_case: LoadCase, sinkage: Array) -> tuple[Any, Stress]:
     """Geometry of the contact at this sinkage (m), and the stresses along it."""
-    gear, at = load_case.gear, load_case.at
     geometry = _geometry(load_case, sinkage)
-    contact = gear.coarse_contact(geometry, at) if coarse else gear.contact(geometry, at)
+    contact = load_case.gear.contact(geometry, load_case.at, load_case.resolution)
     return geometry, _stresses(load_case, contact)
 
 

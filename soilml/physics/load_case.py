@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from soilml.arrays import Array, namespace
 from soilml.parameters import mapped
-from soilml.physics.contact import Force
+from soilml.physics.contact import Force, Resolution
 from soilml.physics.gears.base import Gear
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
@@ -24,6 +24,7 @@ class LoadCase:
     soil: Soil
     at: Operating
     effects: tuple[Any, ...] = ()  # of `Effect`, whose module needs this one
+    resolution: Resolution = Resolution.FULL
 
 
 def rows(load_case: LoadCase, index: Array) -> LoadCase:
@@ -53,7 +54,8 @@ def merged_position(keep: Array) -> Array:
     )
 
 
-def single_precision(load_case: LoadCase) -> LoadCase:
-    """The load case in float32, for estimates that are checked in float64."""
+def coarse(load_case: LoadCase) -> LoadCase:
+    """The load case at coarse resolution in float32, for estimates that are checked."""
     xp = namespace(load_case.at.load)
-    return mapped(load_case, lambda v: xp.astype(v, xp.float32) if hasattr(v, "dtype") else v)
+    single = mapped(load_case, lambda v: xp.astype(v, xp.float32) if hasattr(v, "dtype") else v)
+    return replace(single, resolution=Resolution.COARSE)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 from soilml.arrays import Array, namespace
 from soilml.physics.contact import Force
 from soilml.physics.forces import forces_at_sinkage, load_at_sinkage
-from soilml.physics.load_case import LoadCase, merge_rows, merged_position, rows, single_precision
+from soilml.physics.load_case import LoadCase, coarse, merge_rows, merged_position, rows
 from soilml.row_status import Status
 
 COARSE_EVALUATIONS = 4  # Most evaluations of the load. The last step is not evaluated.
@@ -58,15 +58,15 @@ class SinkageEstimate:
 def coarse_estimate(load_case: LoadCase) -> SinkageEstimate:
     """Sinkage by secant steps on few points, in single precision, to a few thousandths."""
     xp = namespace(load_case.at.load)
-    single = single_precision(load_case)
-    soil, at, gear = single.soil, single.at, single.gear
+    few = coarse(load_case)
+    soil, at, gear = few.soil, few.at, few.gear
     largest = xp.log(gear.largest_sinkage() + 0.0 * at.load)
     x = xp.minimum(xp.log(gear.initial_sinkage(soil, at)), largest - INITIAL_MARGIN)
     slope = soil.n + 0.5 + 0.0 * at.load  # of a rigid wheel, load against sinkage
     log_load = xp.log(at.load)
     step = last_x = last_y = x
     for number in range(COARSE_EVALUATIONS):
-        y = xp.log(load_at_sinkage(single, xp.exp(x), coarse=True)) - log_load
+        y = xp.log(load_at_sinkage(few, xp.exp(x))) - log_load
         if number > 0:
             change = x - last_x
             secant = (y - last_y) / xp.where(change == 0, xp.ones_like(change), change)

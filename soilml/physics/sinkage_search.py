@@ -16,7 +16,7 @@ from soilml.arrays import Array, namespace
 from soilml.numerics.root_finding import first_bracket, rising_root
 from soilml.physics.contact import Force, vertical_load
 from soilml.physics.forces import forces_at_sinkage, load_at_sinkage, stresses_at_sinkage
-from soilml.physics.load_case import LoadCase, merge_rows, rows, single_precision
+from soilml.physics.load_case import LoadCase, coarse, merge_rows, rows
 from soilml.physics.sinkage_estimate import (
     INITIAL_MARGIN,
     SinkageEstimate,
@@ -159,12 +159,12 @@ def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array
     xp = namespace(slope)
     if load_rises_with_sinkage(load_case):
         return xp.zeros_like(slope, dtype=xp.bool)
-    single, sinkage = single_precision(load_case), xp.astype(force.sinkage, xp.float32)
-    in_doubt = _load_may_fall_with_sinkage(single, sinkage)
+    few, sinkage = coarse(load_case), xp.astype(force.sinkage, xp.float32)
+    in_doubt = _load_may_fall_with_sinkage(few, sinkage)
     index = xp.nonzero(in_doubt)[0]
     if index.shape[0] == 0:
         return slope < SMALLEST_POWER
-    largest_load = _largest_load_below(single, sinkage, index)
+    largest_load = _largest_load_below(few, sinkage, index)
     # back to all rows: row i in doubt is number (rows in doubt up to i) - 1 of `largest_load`;
     # a zero is appended for the case that nothing is in doubt
     number = xp.clip(xp.cumulative_sum(xp.astype(in_doubt, xp.int64)) - 1, 0, None)
@@ -175,22 +175,22 @@ def earlier_equilibrium_possible(load_case: LoadCase, force: Force, slope: Array
 
 
 def _load_may_fall_with_sinkage(load_case: LoadCase, sinkage: Array) -> Array:
-    """Rows in which downward shear or an effect may make the load fall with sinkage."""
+    """Rows of a coarse load case in which shear or an effect may make it fall with sinkage."""
     xp, effects = namespace(sinkage), load_case.effects
     if any(effect.overrides("on_stress") and not effect.load_rises for effect in effects):
         return xp.ones_like(sinkage, dtype=xp.bool)
-    _, stresses = stresses_at_sinkage(load_case, sinkage, coarse=True)
+    _, stresses = stresses_at_sinkage(load_case, sinkage)
     lift = stresses.shear * stresses.contact.frontal_area
     downward_shear = xp.sum(xp.maximum(-lift, xp.zeros_like(lift)), axis=0)
     in_doubt = downward_shear > NEGLIGIBLE_DOWNWARD_SHEAR * load_case.at.load
     if any(effect.overrides("on_force") for effect in effects):
-        load = forces_at_sinkage(load_case, sinkage, coarse=True).load
+        load = forces_at_sinkage(load_case, sinkage).load
         in_doubt = in_doubt | (load != vertical_load(stresses))
     return in_doubt
 
 
 def _largest_load_below(load_case: LoadCase, sinkage: Array, index: Array) -> Array:
-    """Largest load that the rows `index` carry at sinkages smaller than `sinkage`, coarsely."""
+    """Largest load that the rows `index` of a coarse load case carry at smaller sinkages."""
     xp = namespace(sinkage)
     fractions = [
         LARGEST_CHECKED_FRACTION * ((i + 1) / CHECKED_SINKAGES) ** 2
@@ -198,7 +198,7 @@ def _largest_load_below(load_case: LoadCase, sinkage: Array, index: Array) -> Ar
     ]
     smaller = xp.concat([sinkage[index] * fraction for fraction in fractions], axis=0)
     repeated = rows(load_case, xp.concat([index] * CHECKED_SINKAGES, axis=0))
-    load = load_at_sinkage(repeated, smaller, coarse=True)
+    load = load_at_sinkage(repeated, smaller)
     return xp.max(xp.reshape(load, (CHECKED_SINKAGES, index.shape[0])), axis=0)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,9 +12,14 @@ from soilml.errors import InputError, raised
 from soilml.fitting.candidate_effects import effect_names
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import PredictionRequest, linearise_many, predict_many
+from soilml.fitting.predictions import (
+    Linearisation,
+    PredictionRequest,
+    linearise_many,
+    predict_many,
+)
 from soilml.fitting.readings import Readings
-from soilml.gap.design.planned_readings import expected_readings, with_default_covariates
+from soilml.gap.design.planned_readings import readings_like, with_default_covariates
 from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.evidence.problem import FitProblem, covariance_at
@@ -53,32 +58,100 @@ def next_runs(problem: FitProblem, explanations: Sequence[Explanation]) -> list[
     effects = [
         problem.effects[name] for name in _effects_of(fits.values()) if name in problem.effects
     ]
-    present = _differences(fits, problem.readings, problem.covariance.whiten, first.prediction)
+    whiten = problem.covariance.whiten
+    present = [_difference(whiten, first.prediction, rival.linearisation) for rival in rivals]
     proposals: list[NextRun] = []
-    for option in run_options(problem.readings, first.fitted(), effects):
-        changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
-        one, *others = changed.values()
+    options = _expected(problem, fits, run_options(problem.readings, first.fitted(), effects))
+    for run, new in zip(options, _differences_each(problem, options), strict=True):
+        if new is None:
+            continue
+        _, *others = run.fits.values()
         try:
-            readings = expected_readings(option.at, problem.readings, one.fitted(), option.kind)
-            y = _predictions(option, readings, changed)
-            if _is_plain_repeat(readings, y):
-                continue
-            whiten = covariance_at(problem, one, readings).whiten
-            new = _differences(changed, readings, whiten, y[0, 0])
             sigmas = [
                 _discrimination(rival, old, _all_columns(rival, added, other))
                 for rival, other, old, added in zip(rivals, others, present, new, strict=True)
             ]
-            rows = _rows(readings, dict(zip(changed, y[0], strict=True)), option)
-        except (InputError, np.linalg.LinAlgError):
+        except np.linalg.LinAlgError:
             continue
         if np.isfinite(sigmas).all():
-            proposals.append(NextRun(option.kind, option.text, _mean_capped(sigmas), rows))
+            rows = _rows(run.readings, dict(zip(run.fits, run.predicted, strict=True)), run.option)
+            proposals.append(NextRun(run.option.kind, run.option.text, _mean_capped(sigmas), rows))
     proposals += _static_proposals(fits, present, effects)
     useful = [
         run for run in _without_equal_rows(proposals) if run.discrimination >= MIN_DISCRIMINATION
     ]
     return sorted(useful, key=lambda run: -run.discrimination)
+
+
+@dataclass(frozen=True)
+class _ExpectedRun:
+    """A run, the explanations on its gear, and what these predict, (fits, m)."""
+
+    option: RunOption
+    fits: Mapping[str, Solution]
+    readings: Readings
+    predicted: Floats
+
+    def readings_of(self, fit: Solution) -> Readings:
+        """The readings, with usual covariates that the effects of a fit need."""
+        return replace(self.readings, at=with_default_covariates(self.readings.at, fit.case))
+
+
+def _expected(
+    problem: FitProblem, fits: Mapping[str, Solution], options: Iterable[RunOption]
+) -> list[_ExpectedRun]:
+    """What the explanations predict for runs; those that they refuse, and repeats, are left out."""
+    asked: list[tuple[RunOption, dict[str, Solution], int]] = []
+    requests: list[PredictionRequest] = []
+    for option in options:
+        changed = {name: _with_gear(fit, option) for name, fit in fits.items()}
+        ways = [option.at] if option.plain is None else [option.at, option.plain]
+        for at in ways:
+            for fit in changed.values():
+                whole = with_default_covariates(at, fit.case)
+                readings = Readings.of_every_row(whole, problem.readings.channels)
+                requests.append(
+                    PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
+                )
+        asked.append((option, changed, len(ways)))
+    answers = iter(predict_many(requests))
+    expected = []
+    for option, changed, count in asked:
+        own = [next(answers) for _ in range(count * len(changed))]
+        if any(isinstance(y, InputError) for y in own):
+            continue
+        y = np.concatenate([raised(one) for one in own]).reshape(count, len(changed), -1)
+        case = next(iter(changed.values())).case
+        readings = readings_like(option.at, problem.readings, case, y[0, 0], option.kind)
+        if not _is_plain_repeat(readings, y):
+            expected.append(_ExpectedRun(option, changed, readings, y[0]))
+    return expected
+
+
+def _differences_each(
+    problem: FitProblem, runs: Sequence[_ExpectedRun]
+) -> list[list[Difference] | None]:
+    """How the first explanation differs from the others in each run; None where one is refused."""
+    requests = [
+        PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], run.readings_of(fit))
+        for run in runs
+        for fit in list(run.fits.values())[1:]
+    ]
+    linear = iter(linearise_many(requests))
+    found: list[list[Difference] | None] = []
+    for run in runs:
+        one, *others = run.fits.values()
+        own = [next(linear) for _ in others]
+        try:
+            whiten = covariance_at(problem, one, run.readings).whiten
+            found.append([_difference(whiten, run.predicted[0], raised(line)) for line in own])
+        except (InputError, np.linalg.LinAlgError):
+            found.append(None)
+    return found
+
+
+def _difference(whiten: Floats, expected: Floats, rival: Linearisation) -> Difference:
+    return whiten @ (expected - rival.prediction), whiten @ rival.jacobian
 
 
 def _effects_of(fits: Iterable[Solution]) -> list[str]:
@@ -104,23 +177,6 @@ def _all_columns(fit: Solution, difference: Difference, changed: Solution) -> Di
     jacobian = np.zeros((len(difference[0]), len(paths)))
     jacobian[:, [paths.index(c.path) for c in changed.coordinates]] = difference[1]
     return difference[0], jacobian
-
-
-def _predictions(option: RunOption, readings: Readings, fits: Mapping[str, Solution]) -> Floats:
-    """Predictions (1 or 2, fits, m) of a run, and of the plain run where that differs."""
-    ways = [option.at] if option.plain is None else [option.at, option.plain]
-    requests = [
-        PredictionRequest(
-            fit.case,
-            fit.coordinates,
-            fit.x[None, :],
-            replace(readings, at=with_default_covariates(at, fit.case)),
-        )
-        for at in ways
-        for fit in fits.values()
-    ]
-    predicted = np.concatenate([raised(found) for found in predict_many(requests)])
-    return predicted.reshape(len(ways), len(fits), len(readings))
 
 
 def _is_plain_repeat(readings: Readings, y: Floats) -> bool:
@@ -185,18 +241,6 @@ def _soil_difference(
 def _mean_capped(sigmas: Sequence[float]) -> float:
     """Mean discrimination from the rivals, each capped at `MAX_DISCRIMINATION`."""
     return float(np.mean([min(sigma, MAX_DISCRIMINATION) for sigma in sigmas]))
-
-
-def _differences(
-    fits: Mapping[str, Solution], readings: Readings, whiten: Floats, expected: Floats
-) -> list[Difference]:
-    """How the first explanation, which predicts `expected`, differs from each of the others."""
-    _, *rivals = (
-        PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
-        for fit in fits.values()
-    )
-    linear = [raised(found) for found in linearise_many(rivals)]
-    return [(whiten @ (expected - one.prediction), whiten @ one.jacobian) for one in linear]
 
 
 def _discrimination(rival: Solution, present: Difference, new: Difference) -> float:

@@ -59,21 +59,28 @@ def planned_readings(case: Case, design: Table) -> Readings:
 
 def expected_readings(at: Operating, like: Readings, case: Case, run: str = "next") -> Readings:
     """The readings that a case expects of rows, in the channels and with the noise of `like`."""
-    at = with_default_covariates(at, case)
-    force = forces(case, at)
-    readings, stds = [], []
-    for i, name in enumerate(like.channels):
-        expected = np.asarray(getattr(force, name))
+    force = forces(case, with_default_covariates(at, case))
+    measured = np.concatenate([np.asarray(getattr(force, name)) for name in like.channels])
+    return readings_like(at, like, case, measured, run)
+
+
+def readings_like(
+    at: Operating, like: Readings, case: Case, measured: Floats, run: str
+) -> Readings:
+    """Measured values (m,) of rows, in the channels and with the noise of `like`."""
+    stds = []
+    for i, (name, own) in enumerate(
+        zip(like.channels, np.split(measured, len(like.channels)), strict=True)
+    ):
         noise = like.noise[i] or case.noise.get(column(name))
         present = like.std[like.channel == i]
         typical = float(np.median(present)) if present.size else np.nan
-        std = np.full(expected.shape, typical) if noise is None else noise.std(expected)
-        readings.append(expected)
+        std = np.full(own.shape, typical) if noise is None else noise.std(own)
         stds.append(np.maximum(std, 1e-12))
     return Readings.of_every_row(
-        at,
+        with_default_covariates(at, case),
         like.channels,
-        measured=np.concatenate(readings),
+        measured=measured,
         std=np.concatenate(stds),
         noise=like.noise,
         runs=(run,),

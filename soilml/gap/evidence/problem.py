@@ -28,6 +28,7 @@ from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel, Evidence
 from soilml.gap.evidence.prior_odds import effect_penalties
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
+from soilml.remarks import Remark
 
 #: Size, in reference sizes, from which the fit of a new effect starts: away from zero, where the
 #: derivative of some effects vanishes.
@@ -93,9 +94,14 @@ class FitProblem:
     def signatures_beside(self, fit: Solution) -> list[Signature]:
         """Signatures of the effects that a fit lacks, at the fit; they are kept for each fit."""
         if id(fit) not in self._signatures:
-            found, _ = effect_signatures(fit.fitted(), self.readings, self.effects_not_in(fit))
-            self._signatures[id(fit)] = fit, found
+            self._signatures[id(fit)] = fit, self.signatures_and_untestable(fit)[0]
         return self._signatures[id(fit)][1]
+
+    def signatures_and_untestable(self, fit: Solution) -> tuple[list[Signature], dict[str, Remark]]:
+        """Signatures of the effects that a fit lacks, and why the runs cannot test the others."""
+        estimate = fit.linearisation.sinkage_at(np.zeros((1, len(fit.x))))
+        effects = self.effects_not_in(fit)
+        return effect_signatures(fit.fitted(), self.readings, effects, estimate)
 
     @cached_property
     def _signatures(self) -> dict[int, tuple[Solution, list[Signature]]]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.fitting.effect_signatures import Signature, effect_signatures
+from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import smooth_basis
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
@@ -132,7 +132,7 @@ def search(
     progress: Called with the share of the search that is done, from 0 to 1.
     """
     starts = starts or {}
-    signatures, untestable = effect_signatures(soil.fitted(), problem.readings, problem.effects)
+    signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed)
     if soil_test.p_value >= GAP_LEVEL:
         return without_search(soil, soil_test, untestable)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from soilml.arrays import Array, Real
-from soilml.physics.contact import Contact
+from soilml.physics.contact import Contact, Resolution
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 
@@ -46,12 +46,10 @@ class Gear(Protocol):
         """`soilml.row_status.Status` where a geometry cannot carry stresses, 0 where it can."""
         ...
 
-    def contact(self, geometry: Any, at: Operating) -> Contact:
+    def contact(
+        self, geometry: Any, at: Operating, resolution: Resolution = Resolution.FULL
+    ) -> Contact:
         """The points along the contact, (points, batch), for integration."""
-        ...
-
-    def coarse_contact(self, geometry: Any, at: Operating) -> Contact:
-        """Fewer points, for the load to a few per cent."""
         ...
 
     def profile_contact(self, geometry: Any, at: Operating, points: int) -> tuple[Array, Contact]:

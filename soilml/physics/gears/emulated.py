@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Array, Floats, Real
 from soilml.errors import InputError
 from soilml.parameters import Parameter
-from soilml.physics.contact import Contact, Force
+from soilml.physics.contact import Contact, Force, Resolution
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
@@ -124,11 +124,9 @@ class EmulatedGear:
         """Refused: a simulator has no contact."""
         self._refuse()
 
-    def contact(self, geometry: Any, at: Operating) -> Contact:
-        """Refused: a simulator has no contact."""
-        self._refuse()
-
-    def coarse_contact(self, geometry: Any, at: Operating) -> Contact:
+    def contact(
+        self, geometry: Any, at: Operating, resolution: Resolution = Resolution.FULL
+    ) -> Contact:
         """Refused: a simulator has no contact."""
         self._refuse()
 

@@ -69,35 +69,37 @@ def flat_rim_points(
     axle. Behind the maximum the pressure is that at the mirrored angle before it.
     """
     xp = namespace(angle)
-    chord, radius = rim.chord + 0.0 * angle, rim.radius
-    height = radius * xp.cos(chord)
-    flat = xp.abs(angle) < chord
-    front, rear = xp.maximum(angle, chord), xp.minimum(angle, -chord)
-    across = xp.minimum(xp.maximum(angle, -chord), chord)
-    sin_chord = xp.sin(chord)
-    passed = rim.entry - front
+    chord, radius = rim.chord + 0.0 * rim.entry, rim.radius
+    sin_chord, cos_chord = xp.sin(chord), xp.cos(chord)
+    height = radius * cos_chord
+    sine, cosine, none = xp.sin(angle), xp.cos(angle), xp.zeros_like(angle)
+    before, behind = angle >= chord, angle <= -chord  # the points on both arcs
+    flat = ~(before | behind)
+    passed = rim.entry - xp.where(before, angle, chord + none)
     sin_difference, _ = differences_from_entry(xp.sin(rim.entry), xp.cos(rim.entry), passed)
-    on_chord = radius * sin_chord - height * xp.tan(across)
-    along = radius * (passed - chord - rear) + on_chord
-    horizontal = radius * (sin_difference - sin_chord - xp.sin(rear)) + on_chord
+    edge = xp.where(before, sin_chord + none, -sin_chord + none)
+    across = xp.where(flat, sine / cosine, edge / cos_chord)  # tangent of the angle on the chord
+    on_chord = radius * sin_chord - height * across
+    along = radius * (passed - xp.where(behind, chord + angle, none)) + on_chord
+    horizontal = sin_difference - xp.where(behind, sin_chord + sine, none)
+    horizontal = radius * horizontal + on_chord
     travelled = rim.travelled(at.slip, law)
     displacement = rim.shear_radius / radius * (along - travelled * horizontal)
     mirrored = rim.entry - (angle - rim.exit) * ((rim.entry - rim.peak) / (rim.peak - rim.exit))
     higher = xp.maximum(xp.where(angle < rim.peak, mirrored, angle), chord)
     depth = xp.sin(0.5 * (rim.entry - higher)) * xp.sin(0.5 * (rim.entry + higher))
     depth = 2.0 * radius * depth
-    area = rim.width * arc * xp.where(flat, height / xp.cos(across) ** 2, radius + 0.0 * chord)
-    level = xp.where(flat, xp.zeros_like(angle), angle)
+    area = rim.width * arc * xp.where(flat, height / cosine**2, radius + none)
     return Contact(
         depth=xp.maximum(depth, xp.full_like(depth, SMALLEST_DEPTH)),
         shear_displacement=displacement,
         surface_travel=rim.shear_radius * (rim.entry - angle),
         area=area,
-        horizontal_area=area * xp.cos(level),
-        frontal_area=area * xp.sin(level),
-        shear_lever_arm=rim.lever - xp.where(flat, radius - height, xp.zeros_like(height)),
+        horizontal_area=area * xp.where(flat, xp.ones_like(angle), cosine),
+        frontal_area=area * xp.where(flat, none, sine),
+        shear_lever_arm=rim.lever - xp.where(flat, radius - height, none),
         width=rim.width,
-        normal_lever_arm=xp.where(flat, height * xp.tan(across), xp.zeros_like(height)),
+        normal_lever_arm=xp.where(flat, height * across, none),
         shear_direction=displacement_direction(displacement, at.slip, law),
         travel_ratio=travelled,
         geometry=rim,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, final
 
 from soilml.arrays import Array, namespace
-from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
 from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc, displacement_direction
 from soilml.physics.operating_point import Operating
 
@@ -31,7 +31,9 @@ class LinearWheel(RigidWheel):
 
     name: ClassVar[str] = "linear-wheel"
 
-    def contact(self, geometry: WheelArc, at: Operating) -> Contact:
+    def contact(
+        self, geometry: WheelArc, at: Operating, resolution: Resolution = Resolution.FULL
+    ) -> Contact:
         """Two points, exit and maximum stress; at entry there is no stress.
 
         The stress falls linearly from the maximum to both ends. With its value at a point factored
@@ -69,10 +71,6 @@ class LinearWheel(RigidWheel):
             travel_ratio=travelled,
             geometry=geometry,
         )
-
-    def coarse_contact(self, geometry: WheelArc, at: Operating) -> Contact:
-        """The same two points."""
-        return self.contact(geometry, at)
 
     def profile_contact(
         self, geometry: WheelArc, at: Operating, points: int

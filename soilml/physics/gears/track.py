@@ -10,7 +10,7 @@ import numpy as np
 from soilml.arrays import Array, Real, namespace
 from soilml.errors import InputError
 from soilml.parameters import Parameter, as_numbers
-from soilml.physics.contact import Contact
+from soilml.physics.contact import Contact, Resolution
 from soilml.physics.gears.rigid_wheel import SMALLEST_DIVISOR, entry_angle
 from soilml.physics.gears.track_belt import Belt, belt_contact, belt_profile
 from soilml.physics.operating_point import Operating
@@ -18,8 +18,7 @@ from soilml.physics.soils import Soil
 
 #: Nodes of the arc that enters the soil, of each part of the middle arc, and of each short
 #: segment; their accuracy is tested against dense quadrature.
-ENTRY_NODES, MIDDLE_NODES, SHORT_NODES = 16, 16, 8
-COARSE_NODES = 4  # Enough for the load to a few per cent
+NODES = {Resolution.FULL: (16, 16, 8), Resolution.FIT: (16, 16, 8), Resolution.COARSE: (4, 4, 4)}
 
 
 @final
@@ -122,13 +121,11 @@ class Track:
         xp = namespace(geometry.entry)
         return xp.zeros_like(geometry.entry, dtype=xp.int64)
 
-    def contact(self, geometry: Belt, at: Operating) -> Contact:
+    def contact(
+        self, geometry: Belt, at: Operating, resolution: Resolution = Resolution.FULL
+    ) -> Contact:
         """The points along the belt where it touches the soil."""
-        return belt_contact(geometry, at, ENTRY_NODES, MIDDLE_NODES, SHORT_NODES)
-
-    def coarse_contact(self, geometry: Belt, at: Operating) -> Contact:
-        """Few points along the belt."""
-        return belt_contact(geometry, at, COARSE_NODES, COARSE_NODES, COARSE_NODES)
+        return belt_contact(geometry, at, *NODES[resolution])
 
     def profile_contact(self, geometry: Belt, at: Operating, points: int) -> tuple[Array, Contact]:
         """Evenly spaced points along the belt from entry to exit, and their inclinations.

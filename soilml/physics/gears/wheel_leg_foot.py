@@ -10,14 +10,14 @@ from typing import Annotated, ClassVar, final
 from soilml.arrays import Array, Real, namespace
 from soilml.numerics.quadrature import columns, crowded_ends
 from soilml.parameters import Parameter
-from soilml.physics.contact import SMALLEST_DEPTH, Contact
+from soilml.physics.contact import SMALLEST_DEPTH, Contact, Resolution
 from soilml.physics.gears.rigid_wheel import differences_from_entry, entry_angle, reversals
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 from soilml.row_status import Status
 
 #: Nodes in each part of the contact, two parts when driving and three when braking.
-NODES, COARSE_NODES = 16, 5
+NODES = {Resolution.FULL: 16, Resolution.FIT: 16, Resolution.COARSE: 5}
 LARGEST_INITIAL = 0.5  # Largest initial sinkage, as a fraction of the radius
 
 
@@ -128,13 +128,11 @@ class Midstance:
         inside = (geometry.peak > 0) & (geometry.peak < geometry.entry)
         return xp.where(inside, ok, ok + int(Status.NO_PEAK))
 
-    def contact(self, geometry: Sole, at: Operating) -> Contact:
+    def contact(
+        self, geometry: Sole, at: Operating, resolution: Resolution = Resolution.FULL
+    ) -> Contact:
         """The points along the sole."""
-        return _sole_contact(geometry, at, NODES)
-
-    def coarse_contact(self, geometry: Sole, at: Operating) -> Contact:
-        """Few points along the sole."""
-        return _sole_contact(geometry, at, COARSE_NODES)
+        return _sole_contact(geometry, at, NODES[resolution])
 
     def profile_contact(self, geometry: Sole, at: Operating, points: int) -> tuple[Array, Contact]:
         """Evenly spaced points from the top of the sole to below the hub, without area."""

@@ -91,8 +91,10 @@ def test_a_signature_is_what_the_effect_does_per_reference_size(clean, name):
     moved = clean.readings.stack(
         {n: np.asarray(getattr(force, n)) for n in clean.readings.channels}
     )
+    expected = 2.0 * (moved - clean.readings.measured)
+    # far below the noise: fits integrate on fewer points, and signatures end their search early
     np.testing.assert_allclose(
-        found.column, 2.0 * (moved - clean.readings.measured), rtol=1e-6, atol=1e-9
+        found.column / clean.readings.std, expected / clean.readings.std, rtol=1e-4, atol=1e-3
     )
     assert found.kind == about.kind
 

@@ -224,7 +224,6 @@ def searched(monkeypatch):
         return {(*c.names, "abc"[len(c.names)]): c for c in level}
 
     for name, value in {
-        "effect_signatures": lambda *_: ((), ("lacking",)),
         "residual_test": lambda *_: SimpleNamespace(p_value=seen.p_value),
         "_fit_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
@@ -236,7 +235,9 @@ def searched(monkeypatch):
     }.items():
         monkeypatch.setattr(stepwise, name, value)
     penalties = dict.fromkeys("abcdefgh", 0.0)
-    problem = SimpleNamespace(readings=None, effects={}, penalties=penalties)
+    problem = SimpleNamespace(
+        penalties=penalties, signatures_and_untestable=lambda _: ((), ("lacking",))
+    )
 
     def run():
         seen.levels, seen.done = [], []

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from conftest import input_box, solved
 
-from soilml import EFFECTS, Model, Operating, Status, Track, Wheel, soil
+from soilml import EFFECTS, Model, Operating, Soil, Status, Track, Wheel, soil
 from soilml.errors import InputError
 from soilml.physics import sinkage_estimate, sinkage_search
+from soilml.physics.contact import Resolution
+from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.forces import load_at_sinkage
 from soilml.physics.load_case import LoadCase, rows
-from soilml.physics.model import flattened
+from soilml.physics.model import flattened, in_chunks
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Wheel(radius=0.15, width=0.12)
@@ -60,7 +62,7 @@ def test_ordinary_rows_need_few_evaluations(monkeypatch):
 
     def counted_coarse(*args, **options):
         counts["coarse"] += 1
-        assert options["coarse"] and args[1].dtype == np.float32
+        assert args[0].resolution is Resolution.COARSE and args[1].dtype == np.float32
         return coarse(*args, **options)
 
     def counted_full(*args, **options):
@@ -200,3 +202,32 @@ def test_an_effect_under_which_the_load_rises_needs_no_scan(name, monkeypatch):
     scanned = solved(box, [cls(**cls.about.reference)])
     np.testing.assert_array_equal(quick.status, scanned.status)
     np.testing.assert_allclose(quick.sinkage, scanned.sinkage, rtol=1e-9)
+
+
+@pytest.mark.parametrize("effects", [(), ("flat-rim",)], ids=["rigid", "flat"])
+@pytest.mark.parametrize("braking", [False, True])
+def test_forces_in_fits_differ_from_those_at_full_resolution_by_far_less_than_noise(
+    braking, effects
+):
+    box = input_box(4096, seed=5)
+    load, radius = box["load"], box["radius"]
+    slip = -np.abs(box["slip"]) if braking else np.abs(box["slip"])
+    names = ("cohesion", "friction_angle", "shear_modulus", "n", "kc", "kphi", "a0", "a1")
+    case = LoadCase(
+        Wheel(radius=radius, width=box["width"]),
+        Soil(**{name: box[name] for name in names}),
+        Operating(slip=slip, load=load),
+        tuple(EFFECTS[name](compliance=4e-5) for name in effects),
+    )
+    with np.errstate(all="ignore"):  # rows without an answer are flagged
+        full, fit = (
+            in_chunks(flattened(replace(case, resolution=own))[0], sensor_readings)
+            for own in (Resolution.FULL, Resolution.FIT)
+        )
+    both = (full.status == 0) & (fit.status == 0)
+    assert np.mean(both == (full.status == 0)) > 0.999
+    scales = {"torque": load * radius, "drawbar_pull": load, "sinkage": full.sinkage}
+    for name, scale in scales.items():
+        off = (np.abs(getattr(fit, name) - getattr(full, name)) / scale)[both]
+        assert np.quantile(off, 0.99) < 1e-4
+        assert off.max() < (2e-2 if braking else 1e-3)
