@@ -260,16 +260,21 @@ def available_effects(args: argparse.Namespace) -> dict[str, type[Effect]]:
 
 def parse_costs(args: argparse.Namespace) -> dict[str, float]:
     """The costs of `--cost` by kind; raises `InputError` for a text that is not KIND=NUMBER."""
-    costs = {}
-    for text in args.cost:
-        kind, _, number = text.rpartition("=")
+    return named_numbers(args.cost, "--cost", "KIND=NUMBER, such as reverse=2")
+
+
+def named_numbers(texts: Sequence[str], option: str, needed: str) -> dict[str, float]:
+    """Numbers by name from texts NAME=NUMBER; raises `InputError`, with what is `needed`."""
+    found = {}
+    for text in texts:
+        name, _, number = text.rpartition("=")
         try:
-            costs[kind] = read_number(number)
+            found[name] = read_number(number)
         except ValueError:
-            kind = ""
-        if not kind:
-            raise InputError(f"--cost {text!r}: needed is KIND=NUMBER, such as reverse=2")
-    return costs
+            name = ""
+        if not name:
+            raise InputError(f"{option} {text!r}: needed is {needed}")
+    return found
 
 
 def parse_names(text: str | None) -> list[str] | None:

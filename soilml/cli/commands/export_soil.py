@@ -9,10 +9,10 @@ from soilml.cli.options import (
     InputFile,
     add_seed_option,
     folder_outputs,
+    named_numbers,
     whole_number_from,
 )
 from soilml.errors import InputError
-from soilml.io.cell_text import read_number
 
 HELP = "soil parameters for Chrono, Gazebo, Isaac or a table"
 DESCRIPTION = """\
@@ -83,15 +83,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.report.terminal import significant
     from soilml.soil_export import export_soil
 
-    given: dict[str, float] = {}
-    for text in args.given:
-        name, equals, value = text.partition("=")
-        try:
-            given[name] = read_number(value)
-        except ValueError:
-            equals = ""
-        if not equals:
-            raise InputError(f"--set {text!r}: needed is NAME=NUMBER, such as elastic_K=1e8")
+    given = named_numbers(args.given, "--set", "NAME=NUMBER, such as elastic_K=1e8")
     if not args.out:
         raise InputError("--out is empty; needed is a folder")
     words = getattr(args, "command_line", [])
