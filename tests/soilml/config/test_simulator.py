@@ -113,8 +113,9 @@ def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen
     truth, found = simulate(known), gear.emulate(gear.fractions(x))
     for i, (name, stated) in enumerate(case.simulator.error.items()):
         error = np.sqrt(np.mean((found[:, i] - truth[name]) ** 2))
-        assert 0.3 * stated < error < 1.3 * stated  # an upper estimate: of fewer runs
-        assert stated < 0.06 * np.std(truth[name])
+        # an upper estimate, of three quarters of the runs: 1.5 to 1.7 times the error here
+        assert 0.3 * stated < error < 1.3 * stated
+        assert stated < 0.03 * np.std(truth[name])
         assert case.discrepancy[name].constant == stated
 
 
@@ -123,12 +124,11 @@ def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder, box):
     front = identify(read_case(folder / "front.toml"), rows, method="posterior")
     found = identify(box, rows, method="posterior")
     assert found.names == front.names
-    # apart by no more than the emulator's error makes the intervals wider
+    # apart by no more than the emulator's error makes the intervals wider: at most 0.9 of it in 32
+    # sets of rows, four designs of 120 and 160 runs
     apart = np.abs(found.values - front.values)
-    assert np.all(
-        apart < 2.0 * np.sqrt(np.maximum(found.std**2 - front.std**2, 0.0)) + 0.1 * found.std
-    )
-    assert np.all(found.std > front.std) and np.all(found.std < 3.0 * front.std)
+    assert np.all(found.std > front.std) and np.all(found.std < 2.5 * front.std)
+    assert np.all(apart < np.sqrt(found.std**2 - front.std**2))
     for name, value in TRUTH.items():
         assert abs(found[name] - value) < 3.0 * found.std[found.names.index(name)]
     assert "discrepancy-included" in {remark.code for remark in found.warnings}
