@@ -25,7 +25,10 @@ MODEL_NOISE = 0.02  # Error of the model of a row, over the torque
 #: Power of the density of a row: errors of the model are alike in rows beside each other.
 POWER = 0.2
 OUTLIER, OUTLIER_STD = 0.01, 0.3  # Share of glitches, and their error over load and radius
-QUANTILES = np.asarray([0.05, 0.5, 0.95])
+#: Quantiles that are the ends of the 90 % interval, and the median. Those at 5 and 95 % covered 79 %
+#: of the slips of 22 simulated drives with rims alike, these 90 %: rovers are driven to the limit
+#: of a soil more often than soils of the prior have it, and a change of soil shows late.
+QUANTILES = np.asarray([0.02, 0.5, 0.98])
 
 
 @dataclass(frozen=True)
@@ -49,6 +52,8 @@ class SlipAnswer:
     beyond: float  # Probability that the slip is above the largest of the table
     misfit: float  # Mean square of the residuals over their variance, 1 on average or less
     effective: float  # Effective number of soils
+    mean: float  # Of the speed, m/s
+    std: float  # Standard deviation of the speed, m/s
 
 
 class SlipFilter:
@@ -251,6 +256,7 @@ class SlipFilter:
         of_row = weighted_quantiles(np.column_stack([speed, slip]), weight, QUANTILES)
         no_soil = float(weight[soils:].sum())
         of_soil = weight[:soils] / max(1.0 - no_soil, 1e-300)
+        mean = float(weight @ speed)
         return SlipAnswer(
             of_row[:, 0],
             of_row[:, 1:],
@@ -259,6 +265,8 @@ class SlipFilter:
             float(weight[missing > 0.0].sum()),
             misfit,
             effective_size(weight),
+            mean,
+            float(np.sqrt(weight @ (speed - mean) ** 2)),
         )
 
 
