@@ -1,0 +1,212 @@
+"""One step of the slip filter as ONNX and as C, beside the filter in Python, number by number."""
+
+import ctypes
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from soilml import read_case, read_table
+from soilml.cli import main
+from soilml.errors import InputError, ModelFileError
+from soilml.onboard.slip_stream import FLAGS, SlipStream
+from soilml.slip_filter.drive import WIDE, _after, read_drive
+from soilml.slip_filter.filter import SlipFilter
+from soilml.slip_filter.force_table import force_table
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "slip"
+SOILS = 256
+
+
+@pytest.fixture(scope="module")
+def case():
+    return read_case(EXAMPLE / "rover.toml")
+
+
+@pytest.fixture(scope="module")
+def drive(case):
+    return read_drive(read_table(EXAMPLE / "drive.csv"), case)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """rover.onnx, rover.c and rover.h."""
+    work = tmp_path_factory.mktemp("slip_step")
+    words = ["export-slip", str(EXAMPLE / "rover.toml"), str(work / "rover.onnx")]
+    assert main([*words, "--c", str(work / "rover.c"), "--soils", str(SOILS)]) == 0
+    return work
+
+
+@pytest.fixture(scope="module")
+def stream(folder):
+    return SlipStream.load(folder / "rover.onnx")
+
+
+@pytest.fixture(scope="module")
+def answers(case, drive, stream):
+    """What Python and the graph say of each row of the drive, and their beliefs after it."""
+    load = case.rover.loads(np.deg2rad(np.linspace(-25.0, 25.0, 21)))
+    table = force_table(case, (float(load.min()), float(load.max())), SOILS)
+    assert stream.load_range == pytest.approx((table.load[0], table.load[-1]))
+    filter_ = SlipFilter(table, case.rover.weight, case.drive)
+    belief, state, found = filter_.start(), stream.start(), []
+    for i in range(len(drive.time)):
+        row = drive.rim_speed[i], drive.torque[i], drive.load[i], float(drive.slope[i])
+        one, belief = filter_.step(belief, *row)
+        other, state = stream.step(state, *row)
+        found.append((one, other, belief, state))
+    return found
+
+
+def test_the_graph_has_the_belief_of_python_row_by_row(answers):
+    for one, _other, belief, state in answers:
+        weight = state.grounds[:, 0]
+        assert np.abs(weight - belief.weight).max() < 1e-3 * belief.weight.max()
+        k = belief.mean.shape[2]
+        for number, own in enumerate((*belief.mean, *belief.cov)):
+            part = state.grounds[:, 1 + number * k : 1 + (number + 1) * k]
+            assert part == pytest.approx(own, abs=1e-3 * np.abs(own).max() + 1e-7)
+        assert state.recent[0] == pytest.approx(belief.apart, rel=1e-3, abs=1e-9)
+        assert state.recent[2] == pytest.approx(one.misfit, rel=2e-3, abs=1e-3)
+
+
+def test_the_graph_has_the_speeds_and_slips_of_python(answers):
+    apart = []
+    for one, other, _, _ in answers:
+        assert other.speed == pytest.approx(one.mean, abs=1e-3 * one.std + 1e-6)
+        assert other.speed_std == pytest.approx(one.std, rel=1e-3, abs=2e-6)
+        assert other.no_soil == pytest.approx(one.no_soil, abs=1e-3)
+        assert other.beyond == pytest.approx(one.beyond, abs=1e-3)
+        apart.append(np.abs(other.speeds - one.speed).max() / one.std)
+    # ends of intervals are read off another interpolation of the same distribution
+    assert np.median(apart) < 0.05 and np.quantile(apart, 0.9) < 0.2
+
+
+def test_the_flags_are_those_of_the_batch(answers):
+    misfit, seen = [], set()
+    for one, other, _, _ in answers:
+        misfit.append(one.misfit)
+        own = set(_after(one.no_soil, one.beyond, misfit, one.slip, 4))
+        seen |= own
+        near = abs(one.no_soil - 0.5) < 0.01 or abs(one.beyond - 0.5) < 0.01
+        wide = "not-determined"
+        assert near or own - {wide} == set(other.flags) - {wide}
+        if other.answered:  # the width is read off another interpolation
+            width = np.max(other.slips[2] - other.slips[0])
+            assert abs(width - WIDE) < 1e-3 or (wide in other.flags) == (width > WIDE)
+    assert {"no-soil", "not-determined"} <= seen
+
+
+def test_rows_that_are_passed_over_change_nothing(drive, stream):
+    row = {"rim_speed": drive.rim_speed[0], "torque": drive.torque[0], "load": drive.load[0]}
+    first, state = stream.step(stream.start(), **row, slope=0.0)
+    assert first.answered
+    stand, after = stream.step(state, np.zeros(4), np.zeros(4), row["load"], 0.0)
+    assert stand.flags == ("standing",) and not stand.answered
+    assert np.array_equal(after.grounds, state.grounds)
+    turning = row["rim_speed"] * np.asarray([1.0, 1.0, 1.0, -1.0])
+    passed, after = stream.step(state, turning, row["torque"], row["load"], 0.0)
+    assert passed.flags == ("passed-over",) and np.array_equal(after.grounds, state.grounds)
+    faster, _ = stream.step(state, 3.0 * row["rim_speed"], row["torque"], row["load"], 0.0)
+    assert faster.flags == ("passed-over",)  # 0.2 m/s faster within a second
+
+
+def test_backward_is_forward_seen_from_the_other_side(drive, stream):
+    rim, torque, load = drive.rim_speed[45], drive.torque[45], drive.load[45]
+    ahead, _ = stream.step(stream.start(), rim, torque, load, 0.1)
+    back, _ = stream.step(stream.start(), -rim, -torque, load, -0.1)
+    assert back.speed == pytest.approx(-ahead.speed) and np.allclose(back.slips, ahead.slips)
+    assert np.allclose(back.speeds, -ahead.speeds[::-1])
+
+
+def test_a_torque_that_is_missing_is_left_out(drive, stream):
+    rim, torque, load = drive.rim_speed[45], drive.torque[45].copy(), drive.load[45]
+    whole, _ = stream.step(stream.start(), rim, torque, load, 0.1)
+    torque[1:] = np.nan
+    one, state = stream.step(stream.start(), rim, torque, load, 0.1)
+    assert one.speed_std > whole.speed_std and np.isfinite(state.grounds).all()
+
+
+def test_loads_are_those_of_the_rover(case, stream):
+    for slope, roll in ((0.0, 0.0), (0.2, 0.0), (-0.1, 0.15), (0.25, -0.1)):
+        assert stream.loads(slope, roll) == pytest.approx(case.rover.loads(slope, roll), rel=1e-6)
+
+
+def test_wrong_input_is_one_line(stream, drive, tmp_path, capsys):
+    state, rim, load = stream.start(), drive.rim_speed[0], drive.load[0]
+    with pytest.raises(InputError, match="needed are 4 numbers, of front-left"):
+        stream.step(state, rim[:3], rim, load, 0.0)
+    with pytest.raises(InputError, match="slope is not finite"):
+        stream.step(state, rim, rim, load, np.nan)
+    with pytest.raises(InputError, match="above zero"):
+        stream.step(state, rim, rim, 0.0 * load, 0.0)
+    wheel = EXAMPLE.parents[1] / "exported" / "wheel.onnx"
+    with pytest.raises(ModelFileError, match="no file of soilml export-slip"):
+        SlipStream.load(wheel)
+    with pytest.raises(ModelFileError, match="cannot be read"):
+        SlipStream.load(tmp_path / "none.onnx")
+    model = EXAMPLE.parent / "wheel" / "model.toml"
+    assert main(["export-slip", str(model), str(tmp_path / "a.onnx")]) == 2
+    assert "no [rover]" in capsys.readouterr().err and not (tmp_path / "a.onnx").exists()
+
+
+class Row(ctypes.Structure):
+    """`rover_row` of the C file."""
+
+    _fields_ = [
+        *((name, ctypes.c_float * 4) for name in ("rim_speed", "torque", "load")),
+        ("slope", ctypes.c_float),
+        ("elapsed", ctypes.c_float),
+    ]
+
+
+class Answer(ctypes.Structure):
+    """`rover_estimate` of the C file."""
+
+    _fields_ = [
+        ("speed", ctypes.c_float),
+        ("speed_std", ctypes.c_float),
+        ("speeds", ctypes.c_float * 3),
+        ("slips", ctypes.c_float * 12),
+        ("no_soil", ctypes.c_float),
+        ("beyond", ctypes.c_float),
+        ("flags", ctypes.c_int),
+    ]
+
+
+@pytest.mark.slow
+def test_c_computes_the_numbers_of_the_graph(folder, drive, stream):
+    strict = "-std=c99 -Wall -Wextra -Wconversion -pedantic -Wfloat-equal -Werror"
+    words = ["gcc", *strict.split(), "-O2", "-shared", "-fPIC", "rover.c", "-lm", "-o", "rover.so"]
+    subprocess.run(words, cwd=folder, check=True)
+    library = ctypes.CDLL(str(folder / "rover.so"))
+    sizes = dict(
+        line.split()[1:]
+        for line in (folder / "rover.h").read_text().splitlines()
+        if "_BYTES" in line
+    )
+    c_state = ctypes.create_string_buffer(int(sizes["ROVER_STATE_BYTES"]))
+    work = ctypes.create_string_buffer(int(sizes["ROVER_WORK_BYTES"]) + 64)
+    library.rover_start(c_state)
+    state = stream.start()
+    begun = np.frombuffer(c_state, np.float32)
+    assert np.array_equal(begun[: state.grounds.size].reshape(state.grounds.shape), state.grounds)
+    for i in range(len(drive.time)):
+        other, state = stream.step(
+            state, drive.rim_speed[i], drive.torque[i], drive.load[i], float(drive.slope[i])
+        )
+        row, answer = Row(slope=drive.slope[i], elapsed=1.0), Answer()
+        row.rim_speed[:], row.torque[:] = drive.rim_speed[i], drive.torque[i]
+        row.load[:] = drive.load[i]
+        code = library.rover_step(c_state, ctypes.byref(row), ctypes.byref(answer), work)
+        assert code == (0 if other.answered else 1)
+        assert answer.flags == sum(1 << FLAGS.index(name) for name in other.flags)
+        assert answer.speed == pytest.approx(other.speed, abs=2e-3 * other.speed_std)
+        assert answer.speed_std == pytest.approx(other.speed_std, rel=2e-3)
+        assert list(answer.speeds) == pytest.approx(other.speeds, abs=0.02 * other.speed_std)
+        assert list(answer.slips) == pytest.approx(other.slips.ravel(), abs=2e-2)
+    row = Row(slope=np.nan, elapsed=1.0)
+    before = bytes(c_state)
+    assert library.rover_step(c_state, ctypes.byref(row), ctypes.byref(answer), work) == -1
+    assert bytes(c_state) == before

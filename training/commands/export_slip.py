@@ -1,0 +1,87 @@
+"""`soilml export-slip`: the filter of `soilml slip` for the board, as ONNX and as C."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_output,
+    number,
+    whole_number_from,
+)
+from soilml.errors import InputError
+from soilml.io.atomic_files import output_files
+
+HELP = "write the slip filter of a rover without odometry as ONNX, and as C99"
+DESCRIPTION = """\
+Write one step of the filter of `soilml slip` for a rover: belief and readings
+in, belief, speed, slips and flags out. All shapes are numbers, so that memory
+and time of a step are fixed.
+
+  soilml export-slip ROVER.toml rover_slip.onnx
+  soilml export-slip ROVER.toml rover_slip.onnx --c rover_slip.c --soils 512
+
+ROVER.toml is that of `soilml slip`. The table of its forces is part of the
+file: fewer --soils are smaller and coarser. soilml.onboard.slip_stream runs
+OUT.onnx with numpy and onnxruntime alone; OUT.c needs the C library alone.
+"""
+SOILS = 1024
+STEEPEST = 25.0  # Degrees; pitch to either side for which loads are tabulated
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover and prior")
+    add_output(parser, "out", "OUT.onnx", "file to write")
+    parser.add_argument("--c", metavar="OUT.c", help="C file to write too; OUT.h is beside it")
+    parser.add_argument(
+        "--soils", type=whole_number_from(32, 16384), default=SOILS, metavar="N",
+        help=f"draws of the prior that stand for all soils (default: {SOILS})",
+    )  # fmt: skip
+    parser.add_argument(
+        "--least-speed", type=number, default=0.005, metavar="M/S",
+        help="speed of a rim below which the wheel stands (default: 0.005)",
+    )  # fmt: skip
+    add_effects_option(parser)
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files that the command writes."""
+    return [Path(args.out), *output_files(args.c, ".c", ".h")]
+
+
+def run(args: argparse.Namespace) -> int:
+    """Make the table and write the files."""
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import tell
+    from soilml.cli.progress import working
+    from soilml.config.case import read_case
+    from soilml.io.atomic_files import write_files
+    from soilml.optional_imports import need
+    from training.export_c.c_names import check_c_name
+    from training.slip_step.files import slip_files
+
+    need("onnx", "export-slip")
+    need("jinja2", "export-slip")
+    if args.c is not None:
+        check_c_name(Path(args.c))
+    if args.least_speed <= 0.0:
+        raise InputError(f"--least-speed is {args.least_speed:g}; it must be above zero")
+    case = read_case(args.rover, available_effects(args))
+    with working(f"tabulating forces on {args.soils} soils"):
+        found = slip_files(case, args.soils, STEEPEST, args.least_speed, args.c, args.out)
+    paths = outputs(args)
+
+    def model(path: Path) -> None:
+        path.write_bytes(found.model)
+
+    texts = [found.source, found.header] if args.c is not None else []
+    write_files(dict(zip(paths, [model, *texts], strict=True)))
+    tell(
+        f"written: {', '.join(map(str, paths))}; {found.grounds} grounds, "
+        f"{found.state_bytes / 1000:.0f} kB of state, {len(found.model) / 1e6:.1f} MB"
+    )
+    return 0

@@ -1,0 +1,71 @@
+"""One step of the slip filter as C99: its graph by `training.export_c`, and functions around it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from soilml import __version__
+from soilml.onboard.slip_stream import FLAGS, QUANTILES, RECENT
+from soilml.slip_filter.filter import SlipFilter
+from training.export_c.c_file import BYTES, kernel_texts, template_environment
+from training.export_c.c_text import array
+from training.export_c.functions import graph_function
+from training.export_c.interface import input_shapes
+from training.export_c.program import Program, SharedParts
+from training.export_c.stage_text import ARRAYS
+from training.export_c.tensor import Size, Tensor
+from training.slip_step.graph import start_of
+
+OUTPUTS = ("speed", "slip", "probability", "flags", "grounds_out", "recent_out")
+
+
+def write_slip_c(model: Any, filter_: SlipFilter, name: str, origin: str) -> tuple[str, str]:
+    """Texts of the C file and of its header.
+
+    model: Of `slip_step_model`.
+    name: Prefix of all C names.
+    origin: Name of the model file, for the comment at the head.
+    """
+    shared = SharedParts()
+    inputs = {
+        key: Tensor(f"in_{key}", kind, tuple(Size(int(d)) for d in dims))
+        for key, (kind, dims) in input_shapes(model).items()
+    }
+    function = graph_function("step_graph", model, Program(shared, {}), inputs, OUTPUTS)
+    used = [parts for parts in shared.constants.values() if parts[0] in function.constants]
+    start, _ = start_of(filter_)
+    arrays = {ARRAYS[kind]: (kind, length) for kind, length in function.lengths.items()}
+    sizes = {
+        "work_bytes": sum(BYTES[kind] * length for kind, length in arrays.values()),
+        "state_bytes": 4 * (start.size + RECENT),
+        "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in used) + 4 * start.shape[0],
+    }
+    values = {
+        "name": name,
+        "NAME": name.upper(),
+        "origin": origin,
+        "version": __version__,
+        "wheels": filter_.table.wheels,
+        "grounds": start.shape[0],
+        "columns": start.shape[1],
+        "recent": RECENT,
+        "quantiles": len(QUANTILES),
+        "flags": FLAGS,
+        "function": function,
+        "arrays": arrays,
+        "constants": [array(*parts) for parts in used],
+        "prior": array("prior", start[:, 0].astype(np.float32), "float"),
+        "begin": start[0, 1:].tolist(),
+        "kernels": kernel_texts(shared),
+        "load": (float(filter_.table.load[0]), float(filter_.table.load[-1])),
+        **sizes,
+    }
+    environment = template_environment()
+    environment.loader.searchpath.append(str(Path(__file__).parent))
+    source, header = (
+        environment.get_template(f"slip.{part}.j2").render(values) for part in ("c", "h")
+    )
+    return source, header
