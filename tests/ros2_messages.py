@@ -28,9 +28,9 @@ GIVEN = {
 }
 KINDS = {
     "diagnostic_msgs": ("DiagnosticArray", "DiagnosticStatus", "KeyValue"),
-    "geometry_msgs": ("WrenchStamped",),
+    "geometry_msgs": ("TwistWithCovarianceStamped", "WrenchStamped"),
     "nav_msgs": ("Odometry",),
-    "sensor_msgs": ("JointState",),
+    "sensor_msgs": ("Imu", "JointState"),
 }
 
 

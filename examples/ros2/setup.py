@@ -12,5 +12,10 @@ setup(
         ("share/soil_estimator/config", ["config/wheel.yaml"]),
     ],
     install_requires=["setuptools", "soilml"],
-    entry_points={"console_scripts": ["soil_estimator = soil_estimator.node:main"]},
+    entry_points={
+        "console_scripts": [
+            "soil_estimator = soil_estimator.node:main",
+            "slip_speed = soil_estimator.slip_node:main",
+        ]
+    },
 )

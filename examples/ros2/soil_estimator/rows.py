@@ -69,6 +69,8 @@ class RowCollector:
         Longest wait for late messages, s of the stamps.
     least_speed : float
         Speed of the rim (m/s) below which the wheel counts as standing.
+    sources : mapping
+        Quantities, and what messages call them.
     """
 
     wheel_radius: float
@@ -80,11 +82,12 @@ class RowCollector:
     repeated: int = 0
     doubtful: int = 0
     clocks_set: int = 0
+    sources: Mapping[str, str] = field(default_factory=lambda: SOURCES)
     _channels: dict[str, StampedSamples] = field(init=False)
     _closed: int | None = None  # number of the last stretch that is closed
 
     def __post_init__(self) -> None:
-        names = [name for name in SOURCES if name != "load" or self.load is None]
+        names = [name for name in self.sources if name != "load" or self.load is None]
         reach = round(SECOND * max(self.patience, self.period))
         self._channels = {name: StampedSamples(reach) for name in names}
 
@@ -172,12 +175,13 @@ class RowCollector:
         for name, samples in taken.items():
             least = 1 if name == "load" else LEAST_SAMPLES
             if len(samples) < least:
-                return Stretch(end, None, f"{len(samples)} samples of {SOURCES[name]}")
+                return Stretch(end, None, f"{len(samples)} samples of {self.sources[name]}")
             if least > 1 and samples[-1][0] - samples[0][0] < LEAST_SPAN * length:
-                return Stretch(end, None, f"{SOURCES[name]} for a part of the time only")
-        return self._row(end, {n: [v for _, v in samples] for n, samples in taken.items()})
+                return Stretch(end, None, f"{self.sources[name]} for a part of the time only")
+        return self.row(end, {n: [v for _, v in samples] for n, samples in taken.items()})
 
-    def _row(self, end: int, values: Mapping[str, list[float]]) -> Stretch:
+    def row(self, end: int, values: Mapping[str, list[float]]) -> Stretch:
+        """The row of the samples of a stretch, by quantity."""
         mean = {name: sum(part) / len(part) for name, part in values.items()}
         # backward driving is forward driving seen from the other side
         sign = 1.0 if mean["wheel_speed"] >= 0.0 else -1.0

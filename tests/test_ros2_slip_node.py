@@ -1,0 +1,139 @@
+"""The ROS 2 node that publishes a speed without odometry, with real message definitions."""
+
+import importlib
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from ros2_messages import ROOT, SECOND, MessageStore, put_stand_ins
+
+from soilml import read_case, read_table
+from soilml.cli import main
+from soilml.onboard.slip_stream import SlipStream
+from soilml.slip_filter.drive import read_drive
+
+pytest.importorskip("rosbags")
+SLIP = ROOT / "examples" / "slip"
+JOINTS = ["fl", "fr", "rl", "rr"]
+RADIUS, RATE = 0.15, 5
+TWIST = "geometry_msgs/msg/TwistWithCovarianceStamped"
+
+
+@pytest.fixture(scope="module")
+def store():
+    return MessageStore()
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    file = str(tmp_path_factory.mktemp("slip_node") / "rover.onnx")
+    assert main(["export-slip", str(SLIP / "rover.toml"), file, "--soils", "128"]) == 0
+    return file
+
+
+@pytest.fixture
+def node_module(monkeypatch, store, model):
+    """The module of the node, freshly loaded with the given parameters."""
+    monkeypatch.syspath_prepend(str(ROOT / "examples" / "ros2"))
+
+    def load(**given):
+        usual = {"model": model, "joints": JOINTS, "wheel_radius": RADIUS}
+        put_stand_ins(monkeypatch, store, usual | given)
+        sys.modules.pop("soil_estimator.slip_node", None)
+        return importlib.import_module("soil_estimator.slip_node")
+
+    yield load
+    sys.modules.pop("soil_estimator.slip_node", None)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    case = read_case(SLIP / "rover.toml")
+    return read_drive(read_table(SLIP / "drive.csv"), case)
+
+
+def messages(store, drive, rows, begin=100):
+    """Joint states and attitudes of some rows of a drive, `RATE` a second, serialised once."""
+    for number, i in enumerate(rows):
+        for k in range(RATE):
+            at = begin * SECOND + number * SECOND + k * SECOND // RATE
+            seconds, nanoseconds = divmod(at, SECOND)
+            time = store.of("builtin_interfaces", "Time", sec=seconds, nanosec=nanoseconds)
+            head = store.of("std_msgs", "Header", stamp=time)
+            fields = {
+                "name": ["arm", *JOINTS],
+                "velocity": np.append(9.0, drive.rim_speed[i] / RADIUS),
+                "effort": np.append(9.0, drive.torque[i]),
+            }
+            joints = store.of("sensor_msgs", "JointState", header=head, **fields)
+            yield "joint_states", store.again(joints, "sensor_msgs/msg/JointState")
+            imu = store.of("sensor_msgs", "Imu", header=head)
+            # uphill is a negative rotation about y, which points to the left
+            imu.orientation.y = float(np.sin(-0.5 * drive.slope[i]))
+            imu.orientation.w = float(np.cos(0.5 * drive.slope[i]))
+            yield "imu", store.again(imu, "sensor_msgs/msg/Imu")
+
+
+def play(node, messages):
+    for topic, message in messages:
+        node.callbacks[topic](message)
+
+
+def test_its_twists_are_those_of_the_stream(node_module, store, drive, model):
+    node, rows = node_module().SlipNode(), range(45, 65)
+    play(node, messages(store, drive, rows))
+    twists = [store.again(message, TWIST) for message in node.published["slip_twist"]]
+    assert [t.header.stamp.sec for t in twists] == list(range(101, 120))
+    assert twists[0].header.frame_id == "base_link"
+    stream = SlipStream.load(model)
+    state = stream.start()
+    for i, twist in zip(rows, twists, strict=False):
+        load = stream.loads(float(drive.slope[i]))
+        row = drive.rim_speed[i], drive.torque[i], load, float(drive.slope[i])
+        found, state = stream.step(state, *row)
+        assert twist.twist.twist.linear.x == pytest.approx(found.speed, rel=1e-4)
+        covariance = np.reshape(twist.twist.covariance, (6, 6))
+        assert covariance[0, 0] == pytest.approx(found.speed_std**2, rel=1e-3)
+        # what is not estimated is left to other sensors of the filter
+        assert np.diag(covariance)[1:].min() > 1e5 and np.all(
+            covariance == np.diag(covariance.diagonal())
+        )
+
+
+def test_rows_without_an_answer_have_a_flag_and_no_twist(node_module, store, drive):
+    node = node_module().SlipNode()
+    play(node, messages(store, drive, range(45, 50)))
+    count = len(node.published["slip_twist"])
+    still = SimpleNamespace(
+        rim_speed=0.0 * drive.rim_speed, torque=0.0 * drive.torque, slope=drive.slope
+    )
+    play(node, messages(store, still, range(45, 50), begin=105))
+    # the row that ends as the wheels stop is the last one with an answer
+    assert len(node.published["slip_twist"]) <= count + 1
+    last = node.published["slip_flags"][-1].status[0]
+    assert last.message == "standing" and last.values[0].value == "False"
+    assert node.callbacks["~/restart"](None, SimpleNamespace()).success
+    assert node.logic._state.recent[1] < 0.0
+
+
+def test_a_message_without_an_orientation_is_no_attitude(node_module, store):
+    node = node_module().SlipNode()
+    node.callbacks["imu"](store.of("sensor_msgs", "Imu"))
+    assert not node.published["slip_flags"]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"model": None}, "the parameter model is missing"),
+        ({"joints": ["a"]}, "names 1; "),
+        ({"joint_signs": [1.0, 1.0, 2.0, 1.0]}, "other numbers than 1.0 and -1.0"),
+        ({"wheel_radius": 0.0}, "wheel_radius is 0; it must be above zero"),
+        ({"model": str(ROOT / "exported" / "wheel.onnx")}, "no file of soilml export-slip"),
+    ],
+)
+def test_a_wrong_parameter_ends_it_with_one_line(node_module, capsys, given, said):
+    assert node_module(**given).main() == 2
+    told = capsys.readouterr().err
+    assert told.startswith("slip_speed: ") and said in told and told.count("\n") == 1
