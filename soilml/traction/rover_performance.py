@@ -141,6 +141,32 @@ class RoverPerformance:
         return np.asarray(np.mean(self.margin >= 0.0, axis=0))
 
 
+def on_slopes(
+    case: Case, draws: SoilDraws, slopes: Floats, slip: Floats, speed: float | None = None
+) -> tuple[Floats, dict[str, Floats]]:
+    """Needed slip, margin, energy, torque and sinkage on slopes (m,), by name, (..., n, m).
+
+    With the slips between which is interpolated: those given, and some below the first. Takes what
+    `rover_performance` takes, and raises as it does.
+    """
+    rover = case.rover
+    if rover is None:
+        raise InputError("the model file has no [rover]")
+    if not np.all((slopes >= 0.0) & (slopes <= LARGEST_SLOPE)):
+        raise InputError("slopes of a rover must lie between 0 and 60 degrees")
+    slip = np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
+    on_slope = []
+    for slope in slopes:
+        curves = wheel_curves(case, draws, np.asarray(slope), slip, speed)
+        if np.mean(~np.isfinite(curves.total_pull[:, 0])) > 0.5:
+            heaviest = float(rover.loads(float(slope)).max())
+            raise InputError(
+                f"the soil does not carry a wheel of {heaviest:.4g} N; check [rover], kphi and n"
+            )
+        on_slope.append(_at_needed_slip(curves, slip, rover.weight * np.sin(slope)))
+    return slip, {key: np.stack([one[key] for one in on_slope], axis=-1) for key in on_slope[0]}
+
+
 def rover_performance(
     case: Case, draws: SoilDraws, slopes: Floats, slip: Floats, speed: float | None = None
 ) -> RoverPerformance:
@@ -169,22 +195,10 @@ def rover_performance(
     ----------
     Wong, Theory of Ground Vehicles, chapters 2 and 3.
     """
+    slip, joined = on_slopes(case, draws, slopes, slip, speed)
     rover = case.rover
-    if rover is None:
-        raise InputError("the model file has no [rover]")
-    if not np.all((slopes >= 0.0) & (slopes <= LARGEST_SLOPE)):
-        raise InputError("slopes of a rover must lie between 0 and 60 degrees")
-    slip = np.concatenate([np.asarray(FIRST_SHARES) * slip[0], slip])
-    names, on_slope = list(rover.wheels), []
-    for slope in slopes:
-        curves = wheel_curves(case, draws, np.asarray(slope), slip, speed)
-        if np.mean(~np.isfinite(curves.total_pull[:, 0])) > 0.5:
-            heaviest = float(rover.loads(float(slope)).max())
-            raise InputError(
-                f"the soil does not carry a wheel of {heaviest:.4g} N; check [rover], kphi and n"
-            )
-        on_slope.append(_at_needed_slip(curves, slip, rover.weight * np.sin(slope)))
-    joined = {key: np.stack([one[key] for one in on_slope], axis=-1) for key in on_slope[0]}
+    assert rover is not None
+    names = list(rover.wheels)
     loads = rover.loads(slopes)
     level = wheel_curves(case, draws, np.zeros(1), slip, speed)
     return RoverPerformance(

@@ -1,0 +1,123 @@
+"""`soilml map`: the soil along a drive, and where a rover can climb."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_row_options,
+    folder_outputs,
+    number,
+    whole_number_from,
+)
+
+HELP = "a map of the soil along a drive, and of the slopes that can be climbed"
+DESCRIPTION = """\
+Make a map of the soil from the rows of a drive with positions: its parameters
+with uncertainty, where the soil changes, and for a rover the probability of
+climbing, the slip that slopes need, and the work of the wheels.
+
+  soilml map DRIVE.csv --rover ROVER.toml --out map
+  soilml map DRIVE.csv --rover ROVER.toml --slope 0,10,20 --cell 0.25 --out map
+  soilml map DRIVE.csv --rover ROVER.toml --elevation dem.tif --out map
+
+DRIVE.csv has x_m, y_m, slip, torque_Nm and load_N; several wheels also wheel
+and time_s. Positions are those of the wheel's contact, or those of the rover's
+origin where heading_rad and [rover.wheels] say where the wheels are.
+
+ROVER.toml has [gear], [soil], [soil.prior], [noise], and [rover] for slopes.
+The soil is estimated by the released file for wheels of any size, or by that of
+--from, in stretches between changes that `SoilTracker` finds. A Gaussian
+process over position joins them.
+
+The folder has map.tif (GeoTIFF), costmap.yaml and costmap.pgm for Nav2, whose
+occupancy is the probability of not climbing the steepest slope of --slope,
+map.png and map.json. With --elevation, a GeoTIFF of heights in the same
+coordinates, headings.tif has slope, probability, slip and work along eight
+headings, and the occupancy is that of the worst of them.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("runs", type=InputFile, metavar="DRIVE.csv", help="rows with positions")
+    parser.add_argument(
+        "--rover", type=InputFile, metavar="ROVER.toml", required=True, help="wheel, soil and rover"
+    )
+    parser.add_argument(
+        "--from", dest="trained", type=InputFile, metavar="FILE.onnx",
+        help="trained file for this wheel (default: any_wheel)",
+    )  # fmt: skip
+    parser.add_argument("--slope", metavar="DEG", help="slopes in degrees (default: 0,5,10,15)")
+    parser.add_argument("--cell", type=number, metavar="M", help="side of a cell (default: 0.5)")
+    parser.add_argument(
+        "--reach", type=number, metavar="M",
+        help="distance from a reading up to which the soil is known (default: 2)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--elevation", type=InputFile, metavar="DEM.tif", help="heights of the terrain, m"
+    )
+    parser.add_argument(
+        "--epsg", type=whole_number_from(1024, 32766), metavar="CODE",
+        help="projected coordinate system of x and y, for the GeoTIFF",
+    )  # fmt: skip
+    add_effects_option(parser)
+    add_row_options(parser)
+    parser.add_argument("--out", metavar="FOLDER", help="folder for the files")
+
+
+def outputs(args: argparse.Namespace) -> list[Path]:
+    """The files of the folder."""
+    from soilml.soil_maps.presentation import FILES
+
+    return folder_outputs("--out", args.out, FILES)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Make the map and write its folder."""
+    import numpy as np
+
+    from soilml.cli.options import available_effects, parse_numbers
+    from soilml.cli.output import show
+    from soilml.cli.progress import stage_progress
+    from soilml.cli.tables import read_case_of_rows, read_rows
+    from soilml.io.atomic_files import write_files
+    from soilml.onboard.estimator import Estimator
+    from soilml.optional_imports import need
+    from soilml.report.figure_style import save_png
+    from soilml.soil_maps.drive import NEEDED
+    from soilml.soil_maps.presentation import FILES, SIZE, map_files, map_text, plot_map
+    from soilml.soil_maps.raster import read_elevation
+    from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
+
+    if args.out is not None:
+        need("tifffile", "map --out", "map")
+        need("matplotlib", "map --out")
+    table = read_rows(args, NEEDED, NEEDED[:2])
+    case = read_case_of_rows(args, args.rover, table, available_effects(args))
+    with stage_progress() as progress:
+        found = soil_map(
+            case,
+            table,
+            None if args.trained is None else Estimator.load(args.trained),
+            cell=CELL if args.cell is None else args.cell,
+            reach=REACH if args.reach is None else args.reach,
+            slopes=SLOPES if args.slope is None
+            else np.deg2rad(np.sort(parse_numbers("--slope", args.slope))),
+            elevation=None if args.elevation is None else read_elevation(args.elevation),
+            progress=progress,
+        )  # fmt: skip
+    if args.out is not None:
+
+        def draw(path: Path) -> None:
+            save_png(lambda ax: plot_map(found, ax), 2, 2, SIZE, path)
+
+        folder = Path(args.out)
+        files = map_files(found, folder, args.epsg, draw)
+        earlier = [folder / name for name in FILES if folder / name not in files]
+        write_files(files, folders=[folder], remove=[p for p in earlier if p.exists()])
+    show(map_text(found))
+    return 0

@@ -1,0 +1,185 @@
+"""A map as text, as JSON, as a picture, and as the files of its folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.io.text_tables import format_table
+from soilml.quantities import QUANTITIES
+from soilml.report.figure_style import take_axes
+from soilml.report.page import json_text
+from soilml.report.terminal import shown_column, significant
+from soilml.soil_maps.raster import geotiff, nav2_files
+from soilml.soil_maps.workflow import SoilMap, parameter_moments
+
+SIZE = (11.0, 8.5)  # Width and height of the figure, inches
+FILES = ("map.tif", "headings.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
+
+
+def map_text(found: SoilMap) -> str:
+    """The verdict in few lines, the soil of each patch, the score and the remarks."""
+    drive, soils = found.drive, found.soils
+    span = drive.station.max() - drive.station.min()
+    wheels, names = len(np.unique(drive.wheel)), [QUANTITIES[c.path].column for c in soils.free]
+    changes = ", ".join(f"{s:.1f}" for s in found.changes)
+    lines = [
+        f"{len(drive.station)} rows of {wheels} wheel{'s' * (wheels > 1)} over {span:.3g} m, "
+        f"{len(soils.station)} stretches; {int(found.known.sum())} cells of {found.grid.cell:g} m",
+        f"the soil changes at {changes} m of the path" if changes else "no sharp change of soil",
+        f"within a patch it varies over about {found.field.length:.2g} m"
+        if found.field.local > 0.05 and np.isfinite(found.field.length)
+        else "within a patch no variation is found",
+        "",
+    ]
+    factors = [shown_column(name) for name in names]
+    rows = []
+    for patch in np.unique(soils.patch):
+        own = soils.patch == patch
+        score, covariance = found.field.at(soils.place[own])
+        mean, std = parameter_moments(soils, score, covariance)
+        ends = f"{soils.station[own].min():.1f} to {soils.station[own].max():.1f}"
+        cells = [
+            f"{significant(f * m, 3)} +- {significant(f * s, 2)}"
+            for (f, _), m, s in zip(factors, mean.mean(axis=0), std.mean(axis=0), strict=True)
+        ]
+        rows.append((ends, *cells))
+    header = ("patch, m", *(name for _, name in factors))
+    lines.append(format_table(header, rows, text_columns=len(header)))
+    if found.ability is not None:
+        lines += ["", _slopes(found)]
+    if found.held_out is not None:
+        scores = ", ".join(f"{name} {value:.2f}" for name, value in found.held_out.mean.items())
+        lines += [
+            "",
+            f"{found.held_out.rows} rows held out on {_pieces(found)} stretches, log density of "
+            f"the torque of a row: {scores}",
+        ]
+        for name in ("tracker", "one soil"):
+            gain, error = found.held_out.gain(name)
+            lines.append(f"map over {name}: {gain:+.2f} +- {error:.2f}")
+    return "\n".join([*lines, *(f"! {remark}" for remark in found.remarks())])
+
+
+def _pieces(found: SoilMap) -> int:
+    assert found.held_out is not None
+    return len(found.held_out.pieces["map"])
+
+
+def _slopes(found: SoilMap) -> str:
+    """A line for each slope: cells by the probability of climbing, mean slip and energy."""
+    ability, rows = found.ability, []
+    assert ability is not None
+    for j, slope in enumerate(np.rad2deg(ability.slope)):
+        climbed = ability.climbed[:, j]
+        known = np.isfinite(ability.slip[:, j])
+        slip, energy = (
+            significant(float(values[known, j].mean()), 2) if known.any() else ""
+            for values in (ability.slip, ability.energy)
+        )
+        shares = [f"{100 * np.mean(climbed > p):.0f} %" for p in (0.5, 0.9)]
+        rows.append((f"{slope:g}", *shares, slip, energy))
+    header = ("slope_deg", "cells above 50 %", "above 90 %", "mean slip", "energy_J/m")
+    return "probability of climbing\n" + format_table(header, rows)
+
+
+def map_json(found: SoilMap) -> dict[str, Any]:
+    """Stretches, changes, the settings of the field by weight, score and remarks."""
+    soils, field = found.soils, found.field
+    score, covariance = field.at(soils.place)
+    mean, std = parameter_moments(soils, score, covariance)
+    names = [QUANTITIES[c.path].column for c in soils.free]
+    stretches: dict[str, Any] = {
+        "station_m": soils.station,
+        "x_m": soils.place[:, 0],
+        "y_m": soils.place[:, 1],
+    }
+    stretches |= {"patch": soils.patch}
+    for i, name in enumerate(names):
+        stretches |= {name: mean[:, i], f"{name}_std": std[:, i]}
+    return {
+        "changes_m": found.changes.tolist(),
+        "length_m": field.length,
+        "local_share": field.local,
+        "cell_m": found.grid.cell,
+        "cells": int(found.known.sum()),
+        "stretches": {name: np.asarray(values).tolist() for name, values in stretches.items()},
+        "held_out": None
+        if found.held_out is None
+        else {"rows": found.held_out.rows, "log_density": found.held_out.mean,
+              "gain": {n: found.held_out.gain(n) for n in ("tracker", "one soil")}},
+        "remarks": [remark.as_json() for remark in found.remarks()],
+    }  # fmt: skip
+
+
+def map_files(
+    found: SoilMap, folder: Path, epsg: int | None, draw: Callable[[Path], None]
+) -> dict[Path, Any]:
+    """Content of each file of the folder of a map; `draw` makes the picture."""
+    binary = {"map.tif": geotiff(found.grid, found.bands(), epsg)}
+    if headings := found.heading_bands():
+        binary["headings.tif"] = geotiff(found.grid, headings, epsg)
+    if (occupied := found.occupied) is not None:
+        binary |= nav2_files(found.grid, found.grid.spread(occupied, found.known), "costmap")
+    files: dict[str, Any] = {
+        name: lambda path, content=content: path.write_bytes(content)
+        for name, content in binary.items()
+    }
+    files |= {"map.json": json_text(map_json(found)), "map.png": draw}
+    return {folder / name: content for name, content in files.items()}
+
+
+def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
+    """Draw friction angle and its uncertainty, the probability of climbing and the slip needed.
+
+    Without a rover, cohesion and its uncertainty are in the place of the last two. See `take_axes`.
+    """
+    panels = take_axes(ax, 2, 2, SIZE)
+    mean, std = found.moments
+    shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
+    for i in (1, 0)[: 1 if found.ability is not None else 2]:
+        factor, name = shown_column(QUANTITIES[found.soils.free[i].path].column)
+        shown.append(
+            (
+                name.rpartition("_")[0].replace("_", " ") + f", {name.rpartition('_')[2]}",
+                factor * mean[:, i],
+                (None, None),
+            )
+        )
+        shown.append(("its standard deviation", factor * std[:, i], (None, None)))
+    if found.ability is not None and (occupied := found.occupied) is not None:
+        which = f"{np.rad2deg(found.ability.slope[-1]):g} deg"
+        slip = found.ability.slip[:, -1]
+        if found.by_heading is not None:
+            which, slip = "the steepest heading", _largest(found.by_heading.slip)
+        shown.append((f"probability of climbing {which}", 1.0 - occupied, (0.0, 1.0)))
+        shown.append((f"slip needed for {which}", slip, (0.0, None)))
+    grid = found.grid
+    extent = (grid.west, grid.west + grid.cell * grid.shape[1],
+              grid.south, grid.south + grid.cell * grid.shape[0])  # fmt: skip
+    for panel, (title, values, ends) in zip(panels.ravel(), shown, strict=True):
+        image = panel.imshow(
+            grid.spread(values, found.known), origin="lower", extent=extent, cmap="viridis",
+            vmin=ends[0], vmax=ends[1], interpolation="nearest",
+        )  # fmt: skip
+        panel.figure.colorbar(image, ax=panel, shrink=0.8)
+        order = np.argsort(found.drive.station)
+        panel.scatter(*found.drive.place[order].T, s=0.5, color="#ffffff", lw=0)
+        for change in found.changes:
+            at = int(np.argmin(np.abs(found.drive.station - change)))
+            panel.plot(*found.drive.place[at], "x", color="#d62728", ms=9, mew=2)
+        panel.set_title(title)
+        panel.set_xlabel("x, m")
+        panel.set_ylabel("y, m")
+    return panels
+
+
+def _largest(values: Floats) -> Floats:
+    """The largest number of each row; NaN where there is none."""
+    known = np.isfinite(values)
+    return np.where(known.any(axis=1), np.where(known, values, -np.inf).max(axis=1), np.nan)

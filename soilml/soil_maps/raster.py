@@ -1,0 +1,183 @@
+"""Grids of a map, and the files in which other programs read them: GeoTIFF, Nav2's map_server."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.errors import InputError
+from soilml.optional_imports import need
+
+MOST_CELLS = 4_000_000
+# Tags and keys of GeoTIFF (OGC 19-008r4, annex B), and two of GDAL
+_SCALE, _TIEPOINT, _KEYS, _METADATA, _NODATA = 33550, 33922, 34735, 42112, 42113
+_MODEL_TYPE, _RASTER_TYPE, _PROJECTED = 1024, 1025, 3072
+_PROJECTED_MODEL, _USER_DEFINED, _PIXEL_IS_AREA = 1, 32767, 1
+UNKNOWN = 255  # Pixel of a cell without an answer
+
+
+@dataclass(frozen=True)
+class MapGrid:
+    """Square cells: rows from south to north, columns from west to east."""
+
+    west: float  # m
+    south: float  # m
+    cell: float  # Side of a cell, m
+    shape: tuple[int, int]  # Rows and columns
+
+    @staticmethod
+    def around(place: Floats, cell: float, margin: float) -> MapGrid:
+        """The grid that contains places (n, 2) and a margin; its corners are multiples of a cell.
+
+        Raises `InputError` for more cells than a map may have.
+        """
+        low = np.floor((place.min(axis=0) - margin) / cell)
+        high = np.ceil((place.max(axis=0) + margin) / cell)
+        columns, rows = (high - low).astype(np.int64)
+        if columns * rows > MOST_CELLS:
+            raise InputError(
+                f"the map would have {columns * rows} cells of {cell:g} m; at most {MOST_CELLS} "
+                "are possible: give larger ones with --cell, or map parts of the drive"
+            )
+        return MapGrid(float(low[0] * cell), float(low[1] * cell), cell, (int(rows), int(columns)))
+
+    @property
+    def centres(self) -> Floats:
+        """Middles of the cells, (cells, 2), m."""
+        rows, columns = self.shape
+        x = self.west + self.cell * (np.arange(columns) + 0.5)
+        y = self.south + self.cell * (np.arange(rows) + 0.5)
+        return np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
+
+    def spread(self, values: Floats, known: Any) -> Floats:
+        """Values (k,) of the cells that are known (cells,) as a grid; NaN elsewhere."""
+        whole = np.full(self.shape[0] * self.shape[1], np.nan)
+        whole[known] = values
+        return whole.reshape(self.shape)
+
+
+def geotiff(grid: MapGrid, bands: Mapping[str, Floats], epsg: int | None = None) -> bytes:
+    """A GeoTIFF with a band of 32-bit numbers for each grid of values, NaN where unknown.
+
+    epsg: Code of the projected coordinate system of x and y; None: local coordinates in m.
+
+    Raises `MissingLibraryError` where tifffile is not installed.
+    """
+    need("tifffile", "map", "map")
+    import tifffile
+
+    keys = [(_MODEL_TYPE, _PROJECTED_MODEL if epsg else _USER_DEFINED)]
+    keys += [(_RASTER_TYPE, _PIXEL_IS_AREA)]
+    keys += [(_PROJECTED, epsg)] if epsg else []
+    directory = [1, 1, 0, len(keys), *(n for key, value in keys for n in (key, 0, 1, value))]
+    names = "".join(
+        f'<Item name="DESCRIPTION" sample="{i}" role="description">{escape(name)}</Item>'
+        for i, name in enumerate(bands)
+    )
+    north = grid.south + grid.cell * grid.shape[0]
+    tags = [
+        (_SCALE, "d", 3, (grid.cell, grid.cell, 0.0), True),
+        (_TIEPOINT, "d", 6, (0.0, 0.0, 0.0, grid.west, north, 0.0), True),
+        (_KEYS, "H", len(directory), directory, True),
+        (_METADATA, "s", 0, f"<GDALMetadata>{names}</GDALMetadata>", True),
+        (_NODATA, "s", 0, "nan", True),
+    ]
+    content = io.BytesIO()
+    tifffile.imwrite(
+        content,
+        np.stack([values[::-1] for values in bands.values()]).astype(np.float32),
+        photometric="minisblack",
+        planarconfig="separate" if len(bands) > 1 else None,
+        compression="zlib",
+        metadata=None,
+        software="soilml",
+        extratags=tags,
+    )
+    return content.getvalue()
+
+
+def nav2_files(grid: MapGrid, occupied: Floats, name: str) -> dict[str, bytes]:
+    """NAME.yaml and NAME.pgm for nav2_map_server in its mode `raw`.
+
+    A pixel is the occupancy itself, 0 to 100, and 255 where it is unknown (nav2_map_server, map_io:
+    values above 100 are unknown).
+
+    occupied: Probability by cell, NaN where unknown.
+    """
+    known = np.isfinite(occupied)
+    pixel = np.full(grid.shape, UNKNOWN, np.uint8)
+    pixel[known] = np.round(100.0 * np.clip(occupied[known], 0.0, 1.0)).astype(np.uint8)
+    head = f"P5\n{grid.shape[1]} {grid.shape[0]}\n255\n".encode()
+    yaml = (
+        f"image: {name}.pgm\nmode: raw\nresolution: {grid.cell!r}\n"
+        f"origin: [{grid.west!r}, {grid.south!r}, 0.0]\nnegate: 0\n"
+        "occupied_thresh: 0.65\nfree_thresh: 0.25\n"
+    )
+    return {f"{name}.yaml": yaml.encode(), f"{name}.pgm": head + pixel[::-1].tobytes()}
+
+
+@dataclass(frozen=True)
+class Elevation:
+    """Heights (rows, columns), m, of points whose first is the north-west one."""
+
+    west: float  # x of the first point, m
+    north: float  # y of the first point, m
+    cell: float  # Distance of points, m
+    height: Floats
+    source: str
+
+    def at(self, place: Floats) -> Floats:
+        """Heights (...) at places (..., 2), between points; NaN outside and beside unknown ones."""
+        rows, columns = self.height.shape
+        across = (place[..., 0] - self.west) / self.cell
+        down = (self.north - place[..., 1]) / self.cell
+        inside = (across >= 0) & (across <= columns - 1) & (down >= 0) & (down <= rows - 1)
+        j = np.clip(across, 0, columns - 2).astype(np.int64)
+        i = np.clip(down, 0, rows - 2).astype(np.int64)
+        a, b = across - j, down - i
+        h = self.height
+        upper = (1 - a) * h[i, j] + a * h[i, j + 1]
+        lower = (1 - a) * h[i + 1, j] + a * h[i + 1, j + 1]
+        return np.where(inside, (1 - b) * upper + b * lower, np.nan)
+
+
+def read_elevation(path: str) -> Elevation:
+    """The first band of a GeoTIFF with square cells along the axes, in m.
+
+    Raises `InputError` for a file that is none.
+    """
+    need("tifffile", "map --elevation", "map")
+    import tifffile
+
+    try:
+        with tifffile.TiffFile(Path(path)) as file:
+            page: Any = file.pages[0]
+            height = np.asarray(page.asarray(), dtype=np.float64)
+            tags = {code: page.tags[code].value for code in (_SCALE, _TIEPOINT, _NODATA, _KEYS)
+                    if code in page.tags}  # fmt: skip
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file") from None
+    except Exception as error:  # of whatever a damaged file raises
+        first = " ".join(str(error).split())
+        raise InputError(f"{path} cannot be read as GeoTIFF: {first}") from None
+    if height.ndim != 2 or min(height.shape) < 2 or not {_SCALE, _TIEPOINT} <= tags.keys():
+        raise InputError(
+            f"{path}: needed is a GeoTIFF of one band with ModelPixelScale and ModelTiepoint"
+        )
+    size, tie = tags[_SCALE], tags[_TIEPOINT]
+    if not np.isclose(size[0], size[1]) or len(tie) != 6:
+        raise InputError(f"{path}: needed are square cells along the axes, with one tie point")
+    if _NODATA in tags:
+        height[height == float(str(tags[_NODATA]).strip("\0 "))] = np.nan
+    keys = np.reshape(tags.get(_KEYS, ()), (-1, 4))[1:]
+    half = 0.0 if [_RASTER_TYPE, 2] in keys[:, [0, 3]].tolist() else 0.5  # point or middle of area
+    west = tie[3] + (half - tie[0]) * size[0]
+    north = tie[4] - (half - tie[1]) * size[0]
+    return Elevation(float(west), float(north), float(size[0]), height, path)

@@ -1,0 +1,298 @@
+"""From the rows of a drive to a map: patches, stretches, the field, and what a rover does on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.config.case import Case
+from soilml.errors import InputError
+from soilml.identification.trained_estimator import estimators_for_case
+from soilml.io.read_table import Rows
+from soilml.onboard.estimator import Estimator
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES
+from soilml.remarks import Remark
+from soilml.soil_maps.ability import MapAbility, map_ability
+from soilml.soil_maps.drive import MapDrive, read_map_drive
+from soilml.soil_maps.field import SoilField
+from soilml.soil_maps.held_out import HeldOutScore, held_out_score
+from soilml.soil_maps.local_soils import (
+    FollowedRows,
+    LocalSoils,
+    follow,
+    local_soils,
+    soil_values,
+    with_exact_sensors,
+)
+from soilml.soil_maps.raster import Elevation, MapGrid
+
+MODEL = "any_wheel"  # Released file that is taken where none is named
+CELL, REACH = 0.5, 2.0  # m
+SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0])
+HEADINGS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
+STEPS = 8  # Slopes between which those of a terrain are interpolated
+NORMALS = 256  # Normal quantiles from which mean and spread of a parameter are computed
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class SoilMap:
+    """The soil along a drive, and what a rover does on it.
+
+    Attributes
+    ----------
+    drive, followed, soils, field
+        Rows, what became of each, estimates of stretches, and the field through them.
+    grid, known
+        Cells of the map, and which of them (cells,) are within reach of a reading.
+    score, covariance
+        Normal scores of the soil in the k cells that are known, (k, p) and (k, p, p).
+    ability
+        The rover straight up slopes; None for a model file without [rover].
+    pitch
+        Of each heading of `HEADINGS` in these cells, rad (k, 8); None without elevation.
+    by_heading
+        The rover along each heading, whose slopes are those of `pitch`, arrays (k, 8).
+    held_out
+        How well stretches are predicted that were left out; None for a short drive.
+    notes
+        Remarks on model file and trained file.
+    """
+
+    drive: MapDrive
+    followed: FollowedRows
+    soils: LocalSoils
+    field: SoilField
+    grid: MapGrid
+    known: NDArray[np.bool_]
+    score: Floats
+    covariance: Floats
+    ability: MapAbility | None
+    pitch: Floats | None
+    by_heading: MapAbility | None
+    held_out: HeldOutScore | None
+    notes: tuple[Remark, ...] = ()
+
+    @cached_property
+    def moments(self) -> tuple[Floats, Floats]:
+        """Means and standard deviations of the parameters in these cells, SI units, (k, p)."""
+        return parameter_moments(self.soils, self.score, self.covariance)
+
+    @property
+    def occupied(self) -> Floats | None:
+        """Probability (k,) of not climbing: the steepest slope asked for, or the worst heading."""
+        if self.by_heading is not None:
+            return np.asarray(1.0 - self.by_heading.climbed.min(axis=1))
+        return None if self.ability is None else 1.0 - self.ability.climbed[:, -1]
+
+    @property
+    def changes(self) -> Floats:
+        """Stations at which the soil changes, m."""
+        station, patch = self.drive.station[self.followed.used], self.followed.patch
+        ends = np.flatnonzero(np.diff(patch[self.followed.used])) + 1
+        return 0.5 * (station[ends - 1] + station[ends])
+
+    def bands(self) -> dict[str, Floats]:
+        """Grids of the parameters with their standard deviations, and of the rover's slopes."""
+        found: dict[str, Floats] = {}
+        mean, std = self.moments
+        for i, coordinate in enumerate(self.soils.free):
+            name = QUANTITIES[coordinate.path].column
+            found |= {name: mean[:, i], f"{name}_std": std[:, i]}
+        if self.ability is not None:
+            for j, slope in enumerate(np.rad2deg(self.ability.slope)):
+                found |= _bands_of(self.ability, j, f"{slope:g}_deg")
+        return {name: self.grid.spread(values, self.known) for name, values in found.items()}
+
+    def heading_bands(self) -> dict[str, Floats]:
+        """Grids by heading: pitch, probability of climbing, slip and energy; none without one."""
+        if self.by_heading is None or self.pitch is None:
+            return {}
+        found: dict[str, Floats] = {}
+        for j, name in enumerate(HEADINGS):
+            found |= {f"pitch_{name}_rad": self.pitch[:, j]} | _bands_of(self.by_heading, j, name)
+        return {name: self.grid.spread(values, self.known) for name, values in found.items()}
+
+    def remarks(self) -> Iterator[Remark]:
+        """What to know of the map, by code."""
+        yield from self.notes
+        aside = len(self.followed.used) - int(self.followed.used.sum()) - self.followed.unusable
+        if self.followed.unusable or aside:
+            text = (
+                f"not used: {self.followed.unusable} of {len(self.followed.used)} rows that are "
+                f"out of range, stuck or repeated, {aside} that disagree with those beside them"
+            )
+            yield Remark("rows-not-used", text, severity="note")
+        left = np.sqrt(np.diagonal(self.covariance, axis1=1, axis2=2)).min(axis=0)
+        vague = [c.path for c, s in zip(self.soils.free, left, strict=True)
+                 if s > NOT_IDENTIFIED_ABOVE]  # fmt: skip
+        if vague:
+            text = f"hardly determined in any cell: {', '.join(vague)}"
+            yield Remark("not-determined", text, tuple(vague))
+        if self.ability is None:
+            yield Remark("no-rover", "the model file has no [rover]: soil alone, no slopes")
+        if self.pitch is not None:
+            text = "side slopes are not considered, and downhill counts as level"
+            yield Remark("no-side-slope", text, severity="note")
+        if self.held_out is None:
+            text = "too few stretches to hold some out: how well it predicts is not known"
+            yield Remark("no-score", text)
+        else:
+            for name in ("tracker", "one soil"):
+                gain, error = self.held_out.gain(name)
+                if gain < -2.0 * error:
+                    text = f"on stretches held out, {name} predicts better: do not use the map"
+                    yield Remark("worse-than-simple", text, (name,))
+
+
+def soil_map(
+    case: Case,
+    rows: Rows,
+    estimator: Estimator | None = None,
+    *,
+    cell: float = CELL,
+    reach: float = REACH,
+    slopes: Floats | Sequence[float] = SLOPES,
+    elevation: Elevation | None = None,
+    score: bool = True,
+    progress: Progress | None = None,
+) -> SoilMap:
+    """A map of the soil from the rows of a drive with positions.
+
+    Parameters
+    ----------
+    case
+        Gear, soil and noise; priors for a file that needs them; with a rover for slopes.
+    rows
+        A table as `read_map_drive` takes it.
+    estimator
+        A trained file with a set posterior; by default the released one for wheels of any size.
+    cell, reach
+        Side of a cell, and how far from a reading the soil is said to be known, m.
+    slopes
+        Rising slopes that the rover is to climb, rad.
+    elevation
+        Heights of the terrain, for the slope along each heading.
+    score
+        Whether stretches are held out to see how well the map predicts them.
+    progress
+        Function of the stage, of what is done, and of all of it.
+
+    Returns
+    -------
+    SoilMap
+        The field with its uncertainty, and what the rover does on it.
+
+    Raises
+    ------
+    InputError
+        For a gear or effect that the file is not for, several gears, a cell or reach that is not
+        above zero, and as `rover_performance` does.
+    TableError, FitError
+        As `read_map_drive`, `follow` and `local_soils` do.
+    """
+    if not (0.0 < cell < np.inf and 0.0 < reach < np.inf):
+        raise InputError(f"cell is {cell:g} m and reach {reach:g} m; both must be above zero")
+    if case.gears:
+        raise InputError("the model file has several gears; a map is of the wheels of one: --gear")
+    own = Estimator.load(MODEL) if estimator is None else estimator
+    if own.sets is None:
+        raise InputError(f"{own.path} has no set posterior; train it with [set_posterior]")
+    (own,), notes = estimators_for_case([own], case, "the model file", pooled=True)
+    tell = progress or (lambda stage, done, total: None)
+    drive = read_map_drive(rows, case)
+    grid = MapGrid.around(drive.place, cell, reach)
+    followed = follow(own, drive, lambda done, total: tell("following the soil", done, total))
+    soils = local_soils(
+        own, drive, followed, lambda done, total: tell("estimating stretches", done, total)
+    )
+    field = SoilField(soils)
+    known = _within(grid, drive.place[followed.used], reach)
+    centres = grid.centres[known]
+    mean, covariance = field.at(centres)
+    ability = pitch = by_heading = None
+    if case.rover is not None:
+        asked = np.asarray(slopes, dtype=np.float64)
+        ability = map_ability(case, soils, mean, covariance, asked)
+        if elevation is not None:
+            pitch = _pitches(case, elevation, centres)
+            by_heading = _along(case, soils, mean, covariance, pitch)
+    held_out = None
+    if score:
+        tell("predicting stretches held out", 0, 1)
+        held_out = held_out_score(case, with_exact_sensors(own), drive, followed, soils)
+        tell("predicting stretches held out", 1, 1)
+    return SoilMap(
+        drive, followed, soils, field, grid, known, mean, covariance, ability, pitch, by_heading,
+        held_out, tuple(notes),
+    )  # fmt: skip
+
+
+def parameter_moments(
+    soils: LocalSoils, score: Floats, covariance: Floats
+) -> tuple[Floats, Floats]:
+    """Means and standard deviations (n, p) in SI units, from normal scores."""
+    from scipy.special import ndtri
+
+    normal = ndtri((np.arange(NORMALS) + 0.5) / NORMALS)
+    std = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+    values = soil_values(soils.free, score + std * normal[:, None, None])
+    return values.mean(axis=0), values.std(axis=0)
+
+
+def _bands_of(ability: MapAbility, j: int, name: str) -> dict[str, Floats]:
+    return {
+        f"climbs_{name}": ability.climbed[:, j],
+        f"slip_{name}": ability.slip[:, j],
+        f"energy_{name}_J_m": ability.energy[:, j],
+    }
+
+
+def _within(grid: MapGrid, place: Floats, reach: float) -> NDArray[np.bool_]:
+    """Cells whose middle is within reach of a place."""
+    from scipy.spatial import cKDTree
+
+    distance, _ = cKDTree(place).query(grid.centres, distance_upper_bound=reach)
+    return np.asarray(np.isfinite(distance))
+
+
+def _pitches(case: Case, elevation: Elevation, centres: Floats) -> Floats:
+    """Slope of the terrain along each heading, over the length of the rover, rad (k, 8)."""
+    assert case.rover is not None
+    forward = [wheel.forward for wheel in case.rover.wheels.values()]
+    half = max(0.5 * (max(forward) - min(forward)), 0.5 * elevation.cell)
+    angle = 2.0 * np.pi * np.arange(len(HEADINGS)) / len(HEADINGS)
+    step = half * np.column_stack([np.cos(angle), np.sin(angle)])
+    rise = elevation.at(centres[:, None] + step) - elevation.at(centres[:, None] - step)
+    pitch = np.arctan2(rise, 2.0 * half)
+    if not np.isfinite(pitch).any():
+        raise InputError(
+            f"{elevation.source} does not cover the drive: check the coordinates of both"
+        )
+    return pitch
+
+
+def _along(
+    case: Case, soils: LocalSoils, mean: Floats, covariance: Floats, pitch: Floats
+) -> MapAbility:
+    """The rover along each heading, interpolated between slopes; NaN without elevation."""
+    assert case.rover is not None
+    highest = min(float(np.nanmax(pitch)), 0.98 * case.rover.tipping_slope(np.deg2rad(60.0)))
+    slopes = np.linspace(0.0, max(highest, np.deg2rad(1.0)), STEPS)
+    found = map_ability(case, soils, mean, covariance, slopes)
+    place = np.clip(pitch / slopes[-1], 0.0, 1.0) * (STEPS - 1)
+    left = np.minimum(np.nan_to_num(place), STEPS - 2).astype(np.int64)
+    share, row = place - left, np.arange(len(pitch))[:, None]
+
+    def between(values: Any) -> Floats:
+        low, high = values[row, left], values[row, left + 1]
+        return np.asarray(np.where(share > 0.0, low + share * (high - low), low) + 0.0 * pitch)
+
+    climbed = np.where(pitch > slopes[-1], 0.0, between(found.climbed))
+    return MapAbility(pitch, climbed, between(found.slip), between(found.energy))

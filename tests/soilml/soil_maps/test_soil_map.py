@@ -1,0 +1,368 @@
+"""A map of a drive over two soils: where they change, what they are, and what the rover does."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from soilml import Estimator, Model, Operating, Wheel, read_case, soil, soil_map
+from soilml.cli import main
+from soilml.errors import FitError, InputError, TableError
+from soilml.io.text_tables import csv_text
+from soilml.soil_maps.ability import SLIP_LIMIT, SLIPS, map_ability
+from soilml.soil_maps.drive import read_map_drive
+from soilml.soil_maps.field import FieldSetting, SoilField
+from soilml.soil_maps.local_soils import LocalSoils, observation, soil_values
+from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files, read_elevation
+from soilml.soil_maps.workflow import HEADINGS, parameter_moments
+from soilml.traction.draws import SoilDraws
+from soilml.traction.rover_performance import on_slopes
+
+tifffile = pytest.importorskip("tifffile")
+
+ROVER = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+friction_angle = [0.436332, 0.785398]
+shear_modulus = [0.005, 0.03]
+[noise]
+torque_Nm = "2 %"
+[rover]
+mass = 24.0
+centre_of_mass = [0.0, 0.0, 0.2]
+[rover.wheels]
+front-left = { position = [0.4, 0.3] }
+front-right = { position = [0.4, -0.3] }
+rear-left = { position = [-0.4, 0.3] }
+rear-right = { position = [-0.4, -0.3] }
+"""
+#: A weak and a strong soil, and where the second begins, m.
+SOILS = {
+    "cohesion": (300.0, 2500.0),
+    "friction_angle": (0.47, 0.72),
+    "shear_modulus": (0.02, 0.012),
+}
+BORDER, STEP = 26.0, 0.25
+
+
+def two_soils(count=208):
+    """Columns of one wheel that drives to the east over both."""
+    rng = np.random.default_rng(3)
+    x = STEP * np.arange(count)
+    slip = np.clip(0.25 + 0.18 * np.sin(0.9 * np.arange(count)), 0.05, 0.5)
+    load = 60.0 + 20.0 * np.sin(0.37 * np.arange(count))
+    ground = soil(
+        "wong1989/dry_sand", **{n: np.where(x < BORDER, *pair) for n, pair in SOILS.items()}
+    )
+    force = Model(Wheel(radius=0.15, width=0.12))(ground, Operating(slip=slip, load=load))
+    torque = force.torque * (1.0 + 0.02 * rng.standard_normal(count))
+    return {"x_m": x, "y_m": 0.0 * x, "slip": slip, "torque_Nm": torque, "load_N": load}
+
+
+@pytest.fixture(scope="module")
+def rover(tmp_path_factory):
+    file = tmp_path_factory.mktemp("map") / "rover.toml"
+    file.write_text(ROVER)
+    return file
+
+
+@pytest.fixture(scope="module")
+def estimator():
+    return Estimator.load("wheel").on(noise={"torque": (0.0, 0.02)})
+
+
+@pytest.fixture(scope="module")
+def dem(tmp_path_factory):
+    """Ground that rises by 10 degrees to the east."""
+    grid = MapGrid(-10.0, -10.0, 1.0, (20, 70))
+    x = grid.centres[:, 0].reshape(grid.shape)
+    file = tmp_path_factory.mktemp("dem") / "dem.tif"
+    file.write_bytes(geotiff(grid, {"height_m": np.tan(np.deg2rad(10.0)) * x}))
+    return file
+
+
+@pytest.fixture(scope="module")
+def found(rover, estimator, dem):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("soilml.soil_maps.ability.DRAWS", 400)
+        return soil_map(
+            read_case(rover),
+            two_soils(),
+            estimator,
+            cell=1.0,
+            slopes=np.deg2rad([0.0, 15.0]),
+            elevation=read_elevation(str(dem)),
+        )
+
+
+def test_the_change_of_soil_is_where_it_is(found):
+    assert len(found.changes) == 1 and abs(found.changes[0] - BORDER) < 1.0
+    assert found.followed.used.mean() > 0.95
+
+
+def test_the_soils_are_within_their_intervals(found):
+    mean, std = found.moments
+    east = found.grid.centres[found.known][:, 0]
+    for side, rows in enumerate((east < BORDER - 2.0, east > BORDER + 2.0)):
+        true = np.asarray([pair[side] for pair in SOILS.values()])
+        assert np.all(np.abs(mean[rows] - true) < 2.5 * std[rows])
+    # a field that said nothing would pass: it says more than the prior
+    assert np.median(std, axis=0) == pytest.approx([560.0, 0.062, 0.0038], rel=0.5)
+    weak, strong = (np.median(mean[rows], axis=0) for rows in (east < 24.0, east > 28.0))
+    assert strong[0] > weak[0] and strong[1] > weak[1]
+
+
+def test_it_is_known_within_reach_of_the_path_alone(found):
+    centres = found.grid.centres
+    used = found.drive.place[found.followed.used]
+    nearest = np.hypot(*(centres[:, None] - used).transpose(2, 0, 1)).min(axis=1)
+    assert np.array_equal(found.known, nearest < 2.0)
+    bands = found.bands()
+    assert np.isnan(bands["cohesion_Pa"]).sum() == np.count_nonzero(~found.known)
+
+
+def test_the_weak_soil_is_climbed_with_less_probability_and_more_slip(found):
+    ability, east = found.ability, found.grid.centres[found.known][:, 0]
+    weak, strong = east < BORDER - 1.0, east > BORDER + 1.0
+    assert ability.climbed[weak, 1].max() < ability.climbed[strong, 1].min()
+    assert np.nanmin(ability.slip[weak, 1]) > np.nanmax(ability.slip[strong, 1])
+    # level ground takes less slip and work than a slope
+    assert np.all(ability.climbed[:, 0] >= ability.climbed[:, 1])
+    assert np.nanmax(ability.energy[:, 0]) < np.nanmin(ability.energy[:, 1])
+
+
+def test_uphill_is_the_worst_heading_and_downhill_counts_as_level(found):
+    pitch, along = found.pitch, found.by_heading
+    names = dict(zip(HEADINGS, np.rad2deg(np.median(pitch, axis=0)), strict=True))
+    assert names["E"] == pytest.approx(10.0, abs=1e-3)
+    assert names["W"] == pytest.approx(-10.0, abs=1e-3)
+    assert names["N"] == pytest.approx(0.0, abs=1e-3)
+    assert names["NE"] == pytest.approx(np.rad2deg(np.arctan(np.tan(np.deg2rad(10)) / 2**0.5)))
+    east, west, north = (HEADINGS.index(name) for name in ("E", "W", "N"))
+    assert np.all(along.slip[:, east] > along.slip[:, north])
+    assert np.allclose(along.slip[:, west], along.slip[:, north])
+    assert np.array_equal(found.occupied, 1.0 - along.climbed.min(axis=1))
+    assert "no-side-slope" in {remark.code for remark in found.remarks()}
+
+
+def test_stretches_held_out_are_predicted_better_than_by_one_soil(found):
+    gain, error = found.held_out.gain("one soil")
+    assert gain > 2.0 * error > 0.0
+    assert set(found.held_out.mean) == {"map", "tracker", "one soil"}
+
+
+def test_weights_of_all_places_agree_with_draws_of_one(rover, found, monkeypatch):
+    case, soils, slope = read_case(rover), found.soils, np.deg2rad([15.0])
+    some = np.linspace(0, len(found.score) - 1, 8).astype(int)
+    monkeypatch.setattr("soilml.soil_maps.ability.DRAWS", 2000)
+    ability = map_ability(case, soils, found.score[some], found.covariance[some], slope)
+    for at in (0, 7):
+        rng = np.random.default_rng(5)
+        root = np.linalg.cholesky(found.covariance[some[at]])
+        score = found.score[some[at]] + rng.standard_normal((2000, 3)) @ root.T
+        draws = SoilDraws(tuple(c.path for c in soils.free), soil_values(soils.free, score))
+        _, one = on_slopes(case, draws, slope, SLIP_LIMIT * SLIPS)
+        climbs = one["margin"][:, 0] >= 0.0
+        assert ability.climbed[at, 0] == pytest.approx(climbs.mean(), abs=0.05)
+        if climbs.mean() > 0.3:
+            mean = one["slip"][climbs, 0].mean()
+            assert ability.slip[at, 0] == pytest.approx(mean, rel=0.1)
+    assert np.ptp(ability.climbed) > 0.2
+
+
+def test_an_observation_and_the_prior_give_the_posterior_again():
+    rng = np.random.default_rng(0)
+    root = 0.3 * rng.standard_normal((3, 3)) + 0.4 * np.eye(3)
+    covariance, mean = root @ root.T, np.asarray([0.8, -0.4, 0.2])
+    y, error = observation(mean, covariance)
+    again = np.linalg.inv(np.eye(3) + np.linalg.inv(error))
+    assert again == pytest.approx(covariance, rel=1e-6)
+    assert again @ np.linalg.solve(error, y) == pytest.approx(mean, rel=1e-6)
+    # what is as wide as the prior, or wider, is no observation
+    y, error = observation(np.asarray([0.1, 0.0, 0.0]), np.diag([1.0, 1.3, 0.25]))
+    assert y[:2].tolist() == [0.0, 0.0] and np.all(np.diag(error)[:2] > 100.0)
+
+
+@pytest.mark.parametrize("as_read", [False, True])
+def test_the_field_is_the_conditional_normal(monkeypatch, as_read):
+    """Beside the joint covariance of places and stretches, written out."""
+    rng = np.random.default_rng(1)
+    place, patch = rng.uniform(0.0, 10.0, (5, 2)), np.asarray([0, 0, 0, 1, 1])
+    roots = 0.4 * rng.standard_normal((5, 2, 2))
+    errors = roots @ np.swapaxes(roots, 1, 2) + 0.1 * np.eye(2)
+    common = np.asarray([[0.5, 0.2], [0.2, 0.3]])
+    score = rng.standard_normal((5, 2))
+    soils = LocalSoils((), place, place[:, 0], patch, score, errors, common, ())
+    setting = FieldSetting(drive=0.2, patch=0.3, local=0.5, length=4.0, excess=2.0)
+    monkeypatch.setattr(SoilField, "settings", [setting])
+    monkeypatch.setattr("soilml.soil_maps.field.ACROSS", 0.5)
+    own = SoilField(replace(soils, patch=np.zeros(5, int)))  # one patch: no mixture at its end
+    at = np.asarray([[2.0, 3.0], [9.0, 1.0]])
+    mean, covariance = own.at(at, as_read=as_read)
+    every = np.vstack([at, place])
+    distance = np.hypot(*(every[:, None] - every).transpose(2, 0, 1))
+    root = np.sqrt(3.0) * distance / 4.0
+    joint = np.kron(0.2 + 0.3 + 0.5 * (1 + root) * np.exp(-root), np.eye(2))
+    seen = np.r_[np.full(4, as_read), np.ones(10, bool)].astype(float)
+    joint += np.outer(seen, seen) * np.kron(np.ones((7, 7)), common)
+    for i in range(5):
+        block = slice(4 + 2 * i, 6 + 2 * i)
+        joint[block, block] += 2.0 * errors[i]
+    across, inner = joint[:4, 4:], joint[4:, 4:]
+    assert mean.ravel() == pytest.approx(across @ np.linalg.solve(inner, score.ravel()), abs=1e-6)
+    left = joint[:4, :4] - across @ np.linalg.solve(inner, across.T)
+    assert covariance[0] == pytest.approx(left[:2, :2], abs=1e-6)
+    assert covariance[1] == pytest.approx(left[2:, 2:], abs=1e-6)
+
+
+def test_a_stretch_of_another_patch_says_less(monkeypatch):
+    place = np.asarray([[0.0, 0.0], [1.0, 0.0]])
+    error = np.tile(0.05 * np.eye(1), (2, 1, 1))
+    score, common = np.asarray([[1.0], [1.0]]), np.zeros((1, 1))
+    spread = []
+    for patch in (np.asarray([0, 0]), np.asarray([0, 1])):
+        soils = LocalSoils((), place, place[:, 0], patch, score, error, common, ())
+        monkeypatch.setattr(SoilField, "settings", [FieldSetting(0.2, 0.4, 0.4, 2.0, 1.0)])
+        mean, covariance = SoilField(soils).at(np.asarray([[0.0, 0.0]]))
+        spread.append((float(mean[0, 0]), float(covariance[0, 0, 0])))
+    (near, narrow), (alone, wide) = spread
+    assert wide > narrow and 0.0 < alone < near
+
+
+def test_moments_in_units_are_those_of_the_prior_where_nothing_is_known(found):
+    mean, std = parameter_moments(found.soils, np.zeros((1, 3)), np.eye(3)[None])
+    assert mean[0] == pytest.approx([1500.0, 0.610865, 0.0175], rel=1e-3)
+    assert std[0] == pytest.approx([866.0, 0.10077, 0.00722], rel=2e-3)
+
+
+def test_a_geotiff_lies_where_its_cells_are(tmp_path):
+    grid = MapGrid.around(np.asarray([[0.3, 1.2], [4.0, 2.0]]), 0.5, 1.0)
+    assert (grid.west, grid.south) == (-1.0, 0.0) and grid.shape == (6, 12)
+    values = np.arange(72.0).reshape(grid.shape)
+    values[0, 0] = np.nan
+    file = tmp_path / "a.tif"
+    file.write_bytes(geotiff(grid, {"one": values, "two & more": -values}, epsg=32633))
+    with tifffile.TiffFile(file) as opened:
+        page = opened.pages[0]
+        data, tags = opened.asarray(), {tag.code: tag.value for tag in page.tags}
+    # the first row of a GeoTIFF is the northern one
+    assert np.array_equal(data[0], values[::-1].astype(np.float32), equal_nan=True)
+    assert tags[33550][:2] == (0.5, 0.5) and tags[33922][3:5] == (-1.0, 3.0)
+    assert tags[34735][-4:] == (3072, 0, 1, 32633) and "two &amp; more" in tags[42112]
+    file.write_bytes(geotiff(grid, {"one": values}))
+    heights = read_elevation(str(file))
+    inner = grid.centres[grid.centres[:, 0] > -0.5]
+    expected = values.ravel()[grid.centres[:, 0] > -0.5]
+    assert heights.at(inner) == pytest.approx(expected)
+    middle = 0.5 * (inner[14] + inner[15])
+    assert heights.at(middle) == pytest.approx(0.5 * (expected[14] + expected[15]))
+    assert np.isnan(heights.at(np.asarray([99.0, 0.0])))
+
+
+def test_nav2_reads_the_probability_of_not_climbing():
+    grid = MapGrid(-1.5, 2.0, 0.5, (2, 3))
+    files = nav2_files(grid, np.asarray([[0.0, 0.304, 1.0], [np.nan, 0.5, 0.996]]), "costmap")
+    head, body = files["costmap.pgm"][:11], files["costmap.pgm"][11:]
+    assert head == b"P5\n3 2\n255\n"
+    assert list(body) == [255, 50, 100, 0, 30, 100]  # north first; above 100 is unknown
+    lines = dict(line.split(": ") for line in files["costmap.yaml"].decode().splitlines())
+    assert lines["mode"] == "raw" and lines["negate"] == "0" and lines["image"] == "costmap.pgm"
+    assert lines["origin"] == "[-1.5, 2.0, 0.0]" and lines["resolution"] == "0.5"
+
+
+def test_wheels_stand_where_the_heading_says(rover):
+    case, n = read_case(rover), 40
+    columns = {name: np.repeat(values[:n], 2) for name, values in two_soils().items()}
+    columns |= {
+        "time_s": np.repeat(np.arange(n, dtype=float), 2),
+        "wheel": np.tile(["front-left", "rear-right"], n),
+        "heading_rad": np.zeros(2 * n),
+    }
+    drive = read_map_drive(columns, case)
+    first = drive.place[np.argsort(drive.row)][:2]
+    assert first.tolist() == [[0.4, 0.3], [-0.4, -0.3]]
+    station = drive.station[np.argsort(drive.row)]
+    assert station[0] - station[1] == pytest.approx(0.8)
+    assert np.all(np.diff(drive.station) >= 0.0)
+
+
+def changed(**columns):
+    return {**two_soils(60), **columns}
+
+
+JUMP = np.where(np.arange(60) < 30, 0.25 * np.arange(60), 0.25 * np.arange(60) + 80.0)
+
+
+@pytest.mark.parametrize(
+    ("table", "error", "said"),
+    [
+        (changed(x_m=JUMP), TableError, "the position jumps by 80.2 m, the usual step is 0.25 m"),
+        (changed(y_m=np.where(np.arange(60) == 7, np.nan, 0.0)), TableError, "position is missing"),
+        (changed(x_m=np.zeros(60)), TableError, "there is no path"),
+        ({n: v[:20] for n, v in two_soils().items()}, FitError, "20 rows with position"),
+        ({n: v for n, v in two_soils().items() if n != "x_m"}, TableError, "column x_m is missing"),
+        (changed(wheel=np.tile(["a", "b"], 30)), TableError, "column time_s is missing"),
+        (changed(wheel=np.tile(["a", "b"], 30), time_s=np.arange(60.0), heading_rad=np.zeros(60)),
+         TableError, "'a'; wheels of [rover] are: front-left"),
+        (changed(load_N=np.full(60, 900.0)), FitError, "are outside the range of"),
+    ],
+)  # fmt: skip
+def test_bad_rows_are_refused_in_one_line(rover, estimator, table, error, said):
+    with pytest.raises(error) as raised:
+        soil_map(read_case(rover), table, estimator)
+    assert said in str(raised.value) and "\n" not in str(raised.value)
+
+
+def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
+    case = read_case(rover)
+    with pytest.raises(InputError, match="both must be above zero"):
+        soil_map(case, two_soils(), estimator, cell=0.0)
+    with pytest.raises(InputError, match=r"would have .* cells of 0.001 m"):
+        soil_map(case, two_soils(), estimator, cell=0.001)
+    with pytest.raises(InputError, match="has no set posterior"):
+        soil_map(case, two_soils(), Estimator.load("wheel_lssvm"))
+    (tmp_path / "dem.tif").write_text("no picture")
+    with pytest.raises(InputError, match="cannot be read as GeoTIFF"):
+        read_elevation(str(tmp_path / "dem.tif"))
+    far = replace(read_elevation(str(dem)), west=5000.0)
+    with pytest.raises(InputError, match="does not cover the drive"):
+        soil_map(case, two_soils(60), estimator, elevation=far, score=False)
+
+
+def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "drive.csv").write_text(csv_text(two_soils(60)))
+    words = ["map", "drive.csv", "--rover", str(rover), "--from", "wheel", "--cell", "2"]
+    monkeypatch.setattr("soilml.soil_maps.ability.DRAWS", 100)
+    assert main([*words, "--slope", "0,10", "--out", "map"]) == 0
+    said = capsys.readouterr().out
+    assert "no sharp change of soil" in said and "probability of climbing" in said
+    names = {file.name for file in (tmp_path / "map").iterdir()}
+    assert names == {"map.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png"}
+    content = json.loads((tmp_path / "map/map.json").read_text())
+    assert content["cells"] > 0 and len(content["stretches"]["station_m"]) >= 4
+    assert "no-score" in {remark["code"] for remark in content["remarks"]}
+    text = (tmp_path / "drive.csv").read_text().replace("x_m", "east_m")
+    (tmp_path / "drive.csv").write_text(text)
+    assert main(words) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_drive_of_many_rows_has_few_stretches():
+    """The field takes the cube of their number."""
+    from soilml.soil_maps.drive import MapDrive
+    from soilml.soil_maps.local_soils import MOST_STRETCHES, FollowedRows, _stretches
+
+    n = 20_000
+    x = np.linspace(0.0, 500.0, n)
+    drive = MapDrive({}, np.column_stack([x, x]), x, np.zeros(n, int), np.arange(n), "drive")
+    parts = _stretches(drive, FollowedRows(np.ones(n, bool), np.zeros(n, int), np.ones(n, int), 0))
+    assert MOST_STRETCHES - 5 <= len(parts) <= MOST_STRETCHES + 1
+    assert sum(map(len, parts)) == n
