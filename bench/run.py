@@ -27,6 +27,7 @@ import slip
 import slip_unknown
 import small_changes
 import small_files
+import soil_maps
 import soil_tests
 import streams
 import summary
@@ -222,6 +223,13 @@ PARTS = (
         "Slip without odometry",
         slip_unknown.ABOUT,
         lambda folder: slip_unknown.table(),
+    ),
+    Part(
+        "map",
+        "driving",
+        "Soil along the way",
+        soil_maps.ABOUT,
+        lambda folder: soil_maps.table(),
     ),
     Part(
         "loo", "training", "Closed-form leave-one-out", "", lambda folder: learning.leave_one_out()

@@ -48,6 +48,7 @@ _HOME = {
     "soil_catalogue": "soilml.physics.soils",
     "design": "soilml.rover_design",
     "export_soil": "soilml.soil_export",
+    "soil_map": "soilml.soil_maps",
     "Status": "soilml.row_status",
 }
 

@@ -100,6 +100,9 @@ _ALL = (
     Quantity("shear_stress", "tau", "Pa", "shear stress in a shear test"),
     Quantity("inner_radius", "r_i", "m", "inner radius of the shear ring"),
     Quantity("outer_radius", "r_o", "m", "outer radius of the shear ring"),
+    Quantity("x", "x", "m", "position on the map, to the east"),
+    Quantity("y", "y", "m", "position on the map, to the north"),
+    Quantity("heading", "psi", "rad", "direction of travel on the map, from x towards y"),
     Quantity("gear", "", "-", "which gear was driven: NAME of [gears.NAME] in the model file"),
 )
 

@@ -33,6 +33,7 @@ RUN = (
     "docs/start/board.md",
     "docs/start/research.md",
     "docs/how-to/choose-wheels.md",
+    "docs/how-to/map.md",
     "exported/README.md",
 )
 

@@ -34,6 +34,7 @@ friction angle and shear modulus, each with its uncertainty.
   from data to a model file    soilml train
   from a model file to C       soilml export-c, export-fusion
   to a graph of fixed shapes   soilml export-step
+  the slip filter for a board  soilml export-slip
   from a campaign to a file    soilml adapt
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
@@ -47,6 +48,7 @@ friction angle and shear modulus, each with its uncertainty.
                                soilml climb (from stress on the rims)
   wheels for a slope           soilml design
   slip without odometry        soilml slip
+  soil along a drive as a map  soilml map
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 
@@ -73,12 +75,14 @@ COMMANDS = {
     "export-c": "training.commands.export_c",
     "export-fusion": "training.commands.export_fusion",
     "export-step": "training.commands.export_step",
+    "export-slip": "training.commands.export_slip",
     "estimate": "soilml.cli.commands.estimate",
     "advise": "soilml.cli.commands.advise",
     "design-runs": "soilml.cli.commands.design_runs",
     "pull": "soilml.cli.commands.pull",
     "design": "soilml.cli.commands.design",
     "slip": "soilml.cli.commands.slip",
+    "map": "soilml.cli.commands.map_",
     "compare": "training.commands.compare",
     "climb": "soilml.cli.commands.climb",
     "sensor-wheel": "soilml.cli.commands.sensor_wheel",

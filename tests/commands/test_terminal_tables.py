@@ -59,8 +59,10 @@ ELSEWHERE = {
     "export-c",
     "export-fusion",
     "slip",
+    "map",
     "export-soil",  # in the units of the program that it writes for
     "export-step",
+    "export-slip",
     "adapt",
     "compare",
     "climb",
