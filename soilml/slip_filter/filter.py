@@ -25,9 +25,9 @@ MODEL_NOISE = 0.02  # Error of the model of a row, over the torque
 #: Power of the density of a row: errors of the model are alike in rows beside each other.
 POWER = 0.2
 OUTLIER, OUTLIER_STD = 0.01, 0.3  # Share of glitches, and their error over load and radius
-#: Quantiles that are the ends of the 90 % interval, and the median. Those at 5 and 95 % covered 79 %
-#: of the slips of 22 simulated drives with rims alike, these 90 %: rovers are driven to the limit
-#: of a soil more often than soils of the prior have it, and a change of soil shows late.
+#: Quantiles that are the ends of the 90 % interval, and the median. Those at 5 and 95 % covered
+#: 79 % of the slips of 22 simulated drives with rims alike, these 90 %: rovers are driven to the
+#: limit of a soil more often than soils of the prior have it, and a change of soil shows late.
 QUANTILES = np.asarray([0.02, 0.5, 0.98])
 
 

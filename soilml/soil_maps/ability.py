@@ -55,21 +55,22 @@ def map_ability(
         case, SoilDraws(names, soil_values(soils.free, draws)), slope, SLIP_LIMIT * SLIPS
     )
     climbs = found["margin"] >= 0.0
-    log = np.concatenate([
-        _log_density(draws, mean[i : i + BLOCK], root[i : i + BLOCK]) for i in range(0, n, BLOCK)
-    ])  # fmt: skip
-    log -= np.logaddexp.reduce(log, axis=0)
-    weights = np.exp(log - log.max(axis=1, keepdims=True))
-    weights /= weights.sum(axis=1, keepdims=True)
-    climbed = weights @ climbs
-    slip, energy = (
-        weights @ np.where(climbs, np.nan_to_num(values), 0.0) / np.maximum(climbed, 1e-12)
-        for values in (found["slip"], found["energy"])
-    )
-    known = climbed >= LEAST_CLIMBED
-    return MapAbility(
-        slope, climbed, np.where(known, slip, np.nan), np.where(known, energy, np.nan)
-    )
+    outcomes = [climbs * 1.0, *(np.where(climbs, np.nan_to_num(found[name]), 0.0)
+                                for name in ("slip", "energy"))]  # fmt: skip
+    parts = [slice(i, i + BLOCK) for i in range(0, n, BLOCK)]
+    proposal = np.full(DRAWS, -np.inf)
+    for part in parts:
+        own_log = _log_density(draws, mean[part], root[part])
+        proposal = np.logaddexp(proposal, np.logaddexp.reduce(own_log, axis=0))
+    climbed, slip, energy = (np.empty((n, len(slope))) for _ in range(3))
+    for part in parts:
+        log = _log_density(draws, mean[part], root[part]) - proposal
+        weights = np.exp(log - log.max(axis=1, keepdims=True))
+        weights /= weights.sum(axis=1, keepdims=True)
+        for values, outcome in zip((climbed, slip, energy), outcomes, strict=True):
+            values[part] = weights @ outcome
+    share = np.where(climbed >= LEAST_CLIMBED, climbed, np.nan)
+    return MapAbility(slope, climbed, slip / share, energy / share)
 
 
 def _log_density(draws: Floats, mean: Floats, root: Floats) -> Floats:

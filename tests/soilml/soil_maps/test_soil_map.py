@@ -349,6 +349,9 @@ def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     content = json.loads((tmp_path / "map/map.json").read_text())
     assert content["cells"] > 0 and len(content["stretches"]["station_m"]) >= 4
     assert "no-score" in {remark["code"] for remark in content["remarks"]}
+    for missing in (["--rover", "none.toml"], ["--rover", str(rover), "--from", "none.onnx"]):
+        assert main(["map", "drive.csv", *missing]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
     text = (tmp_path / "drive.csv").read_text().replace("x_m", "east_m")
     (tmp_path / "drive.csv").write_text(text)
     assert main(words) == 2

@@ -2,6 +2,7 @@
 
 import ctypes
 import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,16 @@ def test_wrong_input_is_one_line(stream, drive, tmp_path, capsys):
     model = EXAMPLE.parent / "wheel" / "model.toml"
     assert main(["export-slip", str(model), str(tmp_path / "a.onnx")]) == 2
     assert "no [rover]" in capsys.readouterr().err and not (tmp_path / "a.onnx").exists()
+
+
+def test_on_board_it_needs_numpy_and_onnxruntime_alone(folder):
+    code = "import sys; from soilml.onboard.slip_stream import SlipStream as S; "
+    code += f"s = S.load({str(folder / 'rover.onnx')!r}); s.start(); "
+    code += "print(*{m.split('.')[0] for m in sys.modules})"
+    words = [sys.executable, "-c", code]
+    loaded = set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
+    assert {"numpy", "onnxruntime", "soilml"} <= loaded
+    assert not loaded & {"scipy", "onnx", "jinja2", "matplotlib", "pyarrow", "torch", "training"}
 
 
 class Row(ctypes.Structure):
