@@ -32,6 +32,7 @@ from soilml.physics.soils import soil_catalogue as soil_catalogue
 from soilml.rover_design import design as design
 from soilml.row_status import Status as Status
 from soilml.soil_export import export_soil as export_soil
+from soilml.soil_maps import soil_map as soil_map
 from training.adaptation import adapt as adapt
 
 __version__: str

@@ -37,6 +37,7 @@ USES = {
     "scikit-learn": "train",
     "array-api-compat": "the forward model on torch tensors; train",
     "tornado": "serve",
+    "tifffile": "map",
     "threadpoolctl": "gap, generate, train",
     "dask": "generate --engine dask",
     "distributed": "generate --engine dask",
