@@ -36,7 +36,7 @@ from soilml.systems.tracked_robot import (
 from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
     implied_points,
-    predicted_pull,
+    predicted,
     simulate_group,
 )
 
@@ -242,7 +242,7 @@ def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> Re
 
 def mean_prediction(case: Case, groups: GroupFits, table: object) -> np.ndarray:
     """Pull predicted by the average of the groups, N."""
-    return predicted_pull(case, replace(groups.pooled, values=groups.mean), table)
+    return predicted(case, replace(groups.pooled, values=groups.mean), table)
 
 
 def draw(case: Case, groups: GroupFits, fresh: object, line: Regression) -> None:

@@ -40,6 +40,7 @@ friction angle and shear modulus, each with its uncertainty.
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
                                soilml wheel-leg (torque, vibration, sinkage)
+  a wheel-leg on soft ground   soilml walk
                                soilml sensor-wheel (stress on a rim)
   from soil to a simulator     soilml export-soil
   runs of your own simulator   soilml design-runs
@@ -87,6 +88,7 @@ COMMANDS = {
     "climb": "soilml.cli.commands.climb",
     "sensor-wheel": "soilml.cli.commands.sensor_wheel",
     "wheel-leg": "soilml.cli.commands.wheel_leg",
+    "walk": "soilml.cli.commands.walk",
     "papers": "soilml.cli.commands.papers",
 }
 #: Options whose value may begin with a minus sign.

@@ -124,6 +124,19 @@ def need_for_report(args: argparse.Namespace, command: str) -> None:
         need("matplotlib", f"{command} --report")
 
 
+def add_picture_option(parser: argparse.ArgumentParser, text: str) -> None:
+    """Declare `--picture`, for which `need_for_picture` asks."""
+    add_output(parser, "--picture", "FILE.png", text)
+
+
+def need_for_picture(args: argparse.Namespace, command: str) -> None:
+    """Raise `MissingLibraryError` where `--picture` is given and its library is missing."""
+    if args.picture is not None:
+        from soilml.optional_imports import need
+
+        need("matplotlib", f"{command} --picture")
+
+
 def folder_outputs(option: str, path: str | None, names: Sequence[str]) -> list[Path]:
     """The files of an output folder, where it exists; `InputError` where it is no folder."""
     if path is None:

@@ -7,29 +7,49 @@ import re
 import sys
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from soilml.cli.options import REPORT_FILES, input_files
 from soilml.errors import InputError
-from soilml.io.atomic_files import atomic_output, write_files
+from soilml.io.atomic_files import write_files
 from soilml.io.cell_text import escaped
 from soilml.io.spreadsheet import split_sheet
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
+from soilml.report.figure_style import save_png
 from soilml.report.page import Content, Provenance, Report, report_texts
 from soilml.report.terminal import rounded, shown_column
+
+if TYPE_CHECKING:
+    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.parameter_figure import ParameterIntervals
 
 _ENDING = re.compile(r"_(std|p05|p95)$")
 _MOST_TEXT = 44  # Most characters of a text cell on a terminal
 
 
-def write_columns(columns: Mapping[str, Any], out: str | None) -> None:
-    """Write the columns to the CSV file `out`; without one, print them."""
+def write_columns(
+    columns: Mapping[str, Any],
+    out: str | None,
+    picture: str | None = None,
+    panels: ColumnPanels | ParameterIntervals | None = None,
+    others: Mapping[str, Mapping[str, Any]] | None = None,
+) -> None:
+    """Write the columns to the CSV file `out`; without one, print them.
+
+    picture: PNG file of `panels`; None where the option was not given.
+    others: Columns of further CSV files.
+    """
+    files: dict[Path, Content] = {}
     if out is not None:
-        with atomic_output(out) as part:
-            save_columns(columns, part)
+        files[Path(out)] = partial(save_columns, columns)
+    files |= {Path(name): partial(save_columns, table) for name, table in (others or {}).items()}
+    if picture is not None and panels is not None:
+        files[Path(picture)] = partial(save_png, panels.plot, *panels.shape, panels.size)
+    write_files(files)
     tell_columns(columns, out)
 
 

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.io.table import Table
 from soilml.physics.contact import Force
-from soilml.physics.gears import Midstance
 from soilml.physics.operating_point import AFTER_CAMPAIGN, COVARIATES, Operating
-from soilml.physics.pull_efficiency import pull_efficiency, tractive_efficiency
+from soilml.physics.pull_efficiency import (
+    has_thrust,
+    pull_efficiency,
+    tractive_efficiency,
+    traffic_class,
+)
 from soilml.quantities import CHANNELS, column
 from soilml.row_status import Status
 
@@ -60,8 +63,8 @@ def simulate(
         Adds a column `<column>_std` for each channel that [remainder] has: the standard deviation
         of the model's error there. The mean of the remainder is in the readings anyway.
     with_efficiency
-        Adds the columns `tractive_efficiency`, of the torque and the drawbar pull of the row, and
-        `pull_efficiency`; NaN where the gear does not drive.
+        Adds the columns `tractive_efficiency`, of the torque and the drawbar pull of the row,
+        `pull_efficiency`, and its class, `traffic_class`; NaN where the gear does not drive.
 
     Returns
     -------
@@ -120,13 +123,13 @@ def simulate(
 
 def _efficiencies(
     case: Case, columns: Mapping[str, NDArray[Any]], known: Mapping[str, float | None]
-) -> dict[str, Floats]:
-    """Tractive and pull efficiency of rows (n,), NaN where the gear does not drive."""
+) -> dict[str, NDArray[Any]]:
+    """Tractive and pull efficiency of rows (n,), and its class; NaN or "" where nothing drives."""
     gear, slip = case.model.gear, columns["slip"]
-    if gear.name == Midstance.name:
+    if not has_thrust(case.model):
         raise InputError(
-            f"a gear of type {gear.name!r} does not roll: it has no tractive efficiency; use a "
-            "wheel or a track"
+            f"a gear of type {gear.name!r} has no tractive efficiency: it does not roll, or has no "
+            "stresses; use a wheel or a track"
         )
     radius = float(np.asarray(gear.radius))
     tractive = tractive_efficiency(radius, slip, columns["torque_Nm"], columns["drawbar_pull_N"])
@@ -134,4 +137,8 @@ def _efficiencies(
     if drives.any():
         at = Operating(slip=slip[drives], load=columns["load_N"][drives], **known)
         pull[drives] = np.asarray(pull_efficiency(case.model, case.soil, at))
-    return {"tractive_efficiency": np.asarray(tractive), "pull_efficiency": pull}
+    return {
+        "tractive_efficiency": np.asarray(tractive),
+        "pull_efficiency": pull,
+        "traffic_class": np.where(drives, traffic_class(pull), ""),
+    }

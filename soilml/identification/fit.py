@@ -262,7 +262,7 @@ def with_warnings(
     one_load = is_one_load(readings.row_load)
     remarks: list[Remark] = []
     for i, f in enumerate(free):
-        remarks += _identifiability(f.path, fit.remaining_fraction[f.path], one_load)
+        remarks += identifiability_remarks(f.path, fit.remaining_fraction[f.path], one_load)
         if at_prior_bound(u)[i]:
             bound = "lower" if u[i] < 0.5 else "upper"
             text = f"{f.path} is at the {bound} bound of its prior, which determines the estimate"
@@ -299,7 +299,7 @@ def with_warnings(
     return replace(fit, warnings=(*fit.warnings, *remarks))
 
 
-def _identifiability(name: str, fraction: float, one_load: bool) -> list[Remark]:
+def identifiability_remarks(name: str, fraction: float, one_load: bool = False) -> list[Remark]:
     """That a parameter is not or weakly identified, by the remaining fraction of its prior."""
     if one_load and name == "cohesion" and fraction > WEAKLY_IDENTIFIED_ABOVE:
         text = "one load only: cohesion is not identified"

@@ -22,8 +22,12 @@ from soilml.quantities import COLUMNS
 #: Required columns of a table of measured runs; a blank cell is a missing measurement.
 _OTHERS = {"drawbar_pull_N", "sinkage_m"}  # Measured quantities that need no torque beside them
 RUNS = ("run", "slip", "load_N", "torque_Nm")
-#: Columns of `soilml simulate --efficiency`, which follow from the others and are passed over.
-DERIVED = ("tractive_efficiency", "pull_efficiency")
+#: Columns that `soilml simulate` adds, which follow from the others and are passed over.
+DERIVED = (
+    *("tractive_efficiency", "pull_efficiency", "traffic_class"),
+    *("settling", "front_share", "belt_share", "rear_share"),
+    *("trim_rad", "rear_sinkage_m", "belt_tension_N", "pressure_centre_m"),
+)
 FILLED = ("run", "slip", "load_N")  # Columns in which every row must have a value
 Limits = tuple[float, float, str]  # Lower and upper bound, and what is needed in words
 #: column -> (lower, upper, what is needed); a number must lie strictly between.

@@ -9,6 +9,8 @@ from soilml.arrays import Array, Real, namespace, to_numpy
 from soilml.errors import InputError
 from soilml.physics.equilibrium import equilibrium_forces
 from soilml.physics.forces import apply_input_effects, stresses_at_sinkage
+from soilml.physics.gears.emulated import EmulatedGear
+from soilml.physics.gears.wheel_leg_foot import Midstance
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
@@ -61,6 +63,14 @@ def tractive_efficiency(radius: Real, slip: Real, torque: Real, drawbar_pull: Re
     with np.errstate(all="ignore"):
         ratio = (1.0 - slip) * radius * drawbar_pull / torque
     return xp.where((slip > 0.0) & (torque > 0.0), ratio, xp.nan)
+
+
+def has_thrust(model: Model) -> bool:
+    """Whether a gear rolls on stresses of the soil, so that it has these efficiencies.
+
+    A leg does not roll; an emulator of another program has no stresses.
+    """
+    return model.gear.name not in (Midstance.name, EmulatedGear.name)
 
 
 def traffic_class(efficiency: Real) -> NDArray[np.str_]:

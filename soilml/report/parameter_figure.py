@@ -44,6 +44,11 @@ class ParameterIntervals:
     prior_high: Floats
 
     @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of axes."""
+        return len(self.names), 1
+
+    @property
     def size(self) -> tuple[float, float]:
         """Width and height of a figure, inches."""
         lines = min(max(len(self.labels), 1), MOST_LINES)

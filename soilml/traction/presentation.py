@@ -12,6 +12,7 @@ import numpy as np
 
 from soilml.io.text_tables import format_table
 from soilml.numerics.quantiles import QuantileBand, quantile_band
+from soilml.physics.pull_efficiency import traffic_class
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.report import numbers
@@ -19,7 +20,8 @@ from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import significant
 from soilml.traction.by_load import LoadPrediction
-from soilml.traction.report import PullReport, figure_size
+from soilml.traction.pull_and_slope import Traction
+from soilml.traction.report import ROWS, PullReport, figure_size
 
 #: The printed curve has every second slip.
 PRINTED_STEP = 2
@@ -65,8 +67,11 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
         ("largest_drawbar_pull_N", known.largest_pull),
         ("best_slip", known.best_slip),
         ("steepest_slope_rad", known.steepest_slope),
+        ("tractive_efficiency", known.tractive_efficiency),
+        ("pull_efficiency", known.pull_efficiency),
     ):
         columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
+    columns |= _classes(known)
     before = quantile_band(prior.pull), quantile_band(prior.slope)
     for name, found in zip(("drawbar_pull_N", "slope_rad"), before, strict=True):
         columns[f"{name}_prior_p05"], columns[f"{name}_prior_p95"] = found.lower, found.upper
@@ -75,6 +80,15 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
     ):
         columns[f"{name}_remaining_fraction"] = np.full(count, share)
     return columns
+
+
+def _classes(known: Traction) -> dict[str, Any]:
+    """The traffic class of the median pull efficiency at each slip, and the soils that share it."""
+    middle = quantile_band(known.pull_efficiency).middle
+    usual, each = traffic_class(middle), traffic_class(known.pull_efficiency)
+    told = np.isfinite(middle)
+    probability = np.where(told, (each == usual).mean(axis=0), np.nan)
+    return {"traffic_class": np.where(told, usual, ""), "traffic_class_probability": probability}
 
 
 def band_columns(name: str, draws: Any) -> dict[str, Any]:
@@ -123,7 +137,22 @@ def _load_text(one: LoadPrediction) -> str:
     ]
     doubts = [f"! {text}" for text in one.warnings]
     table = format_table(header, lines, text_columns=0)
-    return "\n".join([f"load {known.load:.4g} N", table, *best, *doubts])
+    return "\n".join([f"load {known.load:.4g} N", table, *best, *_efficiency(known), *doubts])
+
+
+def _efficiency(known: Traction) -> list[str]:
+    """Both efficiencies, and the class, where the drive is used best."""
+    i = known.most_efficient
+    if i is None:
+        return []
+    both = [quantile_band(v[:, i]) for v in (known.tractive_efficiency, known.pull_efficiency)]
+    tractive, pull = (f"{b.middle:.2f} ({b.lower:.2f} to {b.upper:.2f})" for b in both)
+    classes = _classes(known)
+    share = f"{classes['traffic_class_probability'][i]:.0%}"
+    return [
+        f"efficiency      tractive {tractive} at slip {known.slip[i]:.2g}, its best; pull {pull}",
+        f"traffic class   {classes['traffic_class'][i]} there, as on {share} of the soils",
+    ]
 
 
 def _not_known(one: LoadPrediction) -> list[bool]:
@@ -163,7 +192,7 @@ def _slips(found: QuantileBand) -> str:
 
 def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str, str]) -> Report:
     """The page of `pull` for one gear: predictions by group; model file and table."""
-    answer, rows, known = [], [], []
+    answer, rows, use, known = [], [], [], []
     for name, report in found.items():
         for one in report.by_load:
             head = f"{by} {name}, " if by else ""
@@ -178,15 +207,16 @@ def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str,
                 f"{numbers.capitalised(head)}{significant(one.posterior.load)} N: the largest pull "
                 f"{no_pull} {pulled}, the steepest slope {no_slope} {climbed}."
             )
+            use += [([name] if by else []) + row for row in _efficiency_rows(one.posterior)]
             rows += [([name] if by else []) + row for row in _page_rows(one)]
     header = ["load, N", "slip", "pull, N", "90 %", "slope, °", "90 %", "pull before, N (90 %)"]
     first = next(iter(found.values()))
     images = [
         ReportPicture(
             f"Pull and slope over slip{f', {by} {name}' if by else ''}",
-            picture(report.plot, 2, len(report.by_load), figure_size(report), answer[0]),
+            picture(report.plot, ROWS, len(report.by_load), figure_size(report), answer[0]),
             "Lines: medians. Bands: 90 % of the soils that the rows allow (blue) and of those of "
-            "the prior (grey).",
+            "the prior (grey). Dashed: pull efficiency, with the ends of its classes (dotted).",
         )
         for name, report in list(found.items())[:MOST_PICTURES]
     ]
@@ -207,14 +237,45 @@ def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str,
         tone="named" if all(known) else "suspected",
         pictures=images,
         tables=[
-            ReportTable("Pull and slope", [*([by] if by else []), *header], rows, 1 + bool(by))
+            ReportTable(caption, [*([by] if by else []), *names], cells, 1 + bool(by))
+            for caption, names, cells in (
+                ("Pull and slope", header, rows),
+                ("Efficiency", EFFICIENCIES, use),
+            )
+            if cells
         ],
         warnings=warnings,
         next_steps=[
             "Drive a row at another load and slip: soilml advise tells which narrows the soil most."
         ],
-        notation=[("90 %", "from the 5 % to the 95 % quantile; medians before them.")],
+        notation=[
+            ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
+            ("tractive efficiency", "power at the drawbar over that of the drive."),
+            ("pull efficiency", "share of the thrust that is left as pull; class by 35, 50, 65 %."),
+        ],
     )
+
+
+EFFICIENCIES = (
+    *("load, N", "slip", "tractive efficiency", "90 %", "pull efficiency", "90 %"),
+    *("traffic class", "of the soils"),
+)
+
+
+def _efficiency_rows(known: Traction) -> list[list[str]]:
+    """Both efficiencies and the class at each printed slip; none for a leg."""
+    if known.most_efficient is None:
+        return []
+    classes = _classes(known)
+    both = [quantile_band(v) for v in (known.tractive_efficiency, known.pull_efficiency)]
+    rows = []
+    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
+        cells = [significant(known.load), f"{known.slip[i]:.3g}"]
+        for band in both:
+            cells += [f"{band.middle[i]:.2f}", f"{band.lower[i]:.2f} to {band.upper[i]:.2f}"]
+        share = f"{classes['traffic_class_probability'][i]:.0%}"
+        rows.append([c.replace("-", "−") for c in cells] + [classes["traffic_class"][i], share])
+    return rows
 
 
 #: Most pictures and sentences of a page; the table has the rest.
@@ -235,5 +296,5 @@ PRESENTATION = Presentation(
     text=pull_text,
     warnings=pull_warnings,
     page=pull_page,
-    panels=lambda report: (2, len(report.by_load), figure_size(report)),
+    panels=lambda report: (ROWS, len(report.by_load), figure_size(report)),
 )

@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.numerics.quantiles import quantile_band
 from soilml.numerics.root_finding import rising_root
+from soilml.physics.contact import Force
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
+from soilml.physics.pull_efficiency import has_thrust, pull_efficiency, tractive_efficiency
 from soilml.remarks import Remark
 from soilml.traction.draws import SoilDraws
 
@@ -36,12 +39,18 @@ class Traction:
         Drawbar pull on level ground, N (n, m); NaN where the soil does not carry the load.
     slope
         Slope that a vehicle climbs steadily, rad (n, m); negative where it only descends.
+    tractive_efficiency
+        Power at the drawbar over that of the drive on level ground, (n, m); NaN for a leg.
+    pull_efficiency
+        Share of the thrust that is left as pull, (n, m); NaN for a leg and for an emulator.
     """
 
     load: float
     slip: Floats
     pull: Floats
     slope: Floats
+    tractive_efficiency: Floats
+    pull_efficiency: Floats
 
     @property
     def largest_pull(self) -> Floats:
@@ -62,6 +71,12 @@ class Traction:
     def steepest_slip(self) -> Floats:
         """The slip at the steepest slope, (n,)."""
         return self._slip_of(self.slope)
+
+    @property
+    def most_efficient(self) -> int | None:
+        """Index of the slip of the largest median tractive efficiency; None without one."""
+        usual = quantile_band(self.tractive_efficiency).middle
+        return int(np.nanargmax(usual)) if np.isfinite(usual).any() else None
 
     @property
     def failed_fraction(self) -> float:
@@ -124,23 +139,32 @@ def predict_traction(
 
     References
     ----------
-    Wong, Theory of Ground Vehicles, chapter 3.
+    Wong, Theory of Ground Vehicles, chapter 3; the efficiencies as in
+    `soilml.physics.pull_efficiency`, without the error of the model's torque.
     """
     case = on_a_vehicle(case)
     count = len(draws.values)
     rows, columns = (grid.ravel() for grid in np.indices((count, len(slip))))
 
-    def drawbar_pull(index: NDArray[np.int64], normal_load: Floats) -> Floats:
+    def forces(index: NDArray[np.int64], normal_load: Floats) -> tuple[Operating, Force]:
         at = Operating(slip=slip[columns[index]], load=normal_load, **dict(covariates or {}))
-        return np.asarray(draws.forces(case, rows[index], at).drawbar_pull)
+        return at, draws.forces(case, rows[index], at)
 
-    level = drawbar_pull(np.arange(rows.size), np.full(rows.size, load))
+    at, force = forces(np.arange(rows.size), np.full(rows.size, load))
+    level = np.asarray(force.drawbar_pull)
+    tractive, efficiency = np.full((2, rows.size), np.nan)
+    if has_thrust(case.model):
+        soils = draws.of(case, rows)
+        radius = np.asarray(soils.model.gear.radius)
+        tractive = np.asarray(tractive_efficiency(radius, at.slip, force.torque, level))
+        efficiency = np.asarray(pull_efficiency(soils.model, soils.soil, at))
     carried = np.flatnonzero(np.isfinite(level))
 
     def excess_angle(angle: Floats) -> Floats:
         """Slope less the one that the pull on it balances."""
         normal_load = load * np.cos(angle)
-        return np.asarray(angle - np.arctan(drawbar_pull(carried, normal_load) / normal_load))
+        pull = forces(carried, normal_load)[1].drawbar_pull
+        return np.asarray(angle - np.arctan(pull / normal_load))
 
     bound = np.full(carried.size, LARGEST_SLOPE)
     guess = np.arctan(level[carried] / load)
@@ -148,7 +172,8 @@ def predict_traction(
     slope = np.full(rows.size, np.nan)
     slope[carried] = np.where(root.converged | (root.x >= LARGEST_SLOPE), root.x, np.nan)
     shape = (count, len(slip))
-    return Traction(float(load), slip, level.reshape(shape), slope.reshape(shape))
+    found = (values.reshape(shape) for values in (level, slope, tractive, efficiency))
+    return Traction(float(load), slip, *found)
 
 
 def _largest(values: Floats) -> Floats:

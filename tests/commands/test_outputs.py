@@ -196,7 +196,7 @@ def test_every_argument_that_names_an_input_file_is_declared_as_one():
     from soilml.cli.options import InputFile
 
     (commands,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
-    outputs = {"out", "picture", "limit", "json", "c"}
+    outputs = {"out", "picture", "limit", "json", "c", "over_time"}
     for name, command in commands.choices.items():
         for action in command._actions:
             is_file = "." in str(action.metavar) or action.dest == "files"

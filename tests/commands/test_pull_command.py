@@ -11,6 +11,7 @@ from conftest import MODEL
 
 from soilml import Operating, read_case
 from soilml.cli import main
+from soilml.physics.pull_efficiency import CLASSES
 
 pytestmark = pytest.mark.slow
 
@@ -50,7 +51,8 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     said = capsys.readouterr().out
     assert (folder / "pull.png").read_bytes().startswith(b"\x89PNG")
     rows = rows_of((folder / "pull.csv").read_text())
-    column = {k: np.asarray([float(r[k]) for r in rows]) for k in rows[0]}
+    names = [k for k in rows[0] if k != "traffic_class"]
+    column = {k: np.asarray([float(r[k]) for r in rows]) for k in names}
     assert column["slip"][-1] == 0.4 and set(column["load_N"]) == {60.0}
     pull = truth(folder, column["slip"]).drawbar_pull
     inside = (column["drawbar_pull_N_p05"] < pull) & (pull < column["drawbar_pull_N_p95"])
@@ -58,6 +60,14 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     for name in ("drawbar_pull_N", "slope_rad"):
         assert (column[f"{name}_prior_p05"] < column[f"{name}_p05"]).all()
         assert (column[f"{name}_p95"] < column[f"{name}_prior_p95"]).all()
+    efficiency = [column[f"tractive_efficiency{end}"] for end in ("_p05", "", "_p95")]
+    assert (efficiency[0] < efficiency[1]).all() and (efficiency[1] < efficiency[2]).all()
+    true = truth(folder, column["slip"])
+    drive = (1.0 - column["slip"]) * 0.15 * true.drawbar_pull / true.torque
+    assert ((efficiency[0] < drive) & (drive < efficiency[2])).all()
+    order = [CLASSES.index(r["traffic_class"]) for r in rows]
+    assert order == sorted(order) and order[0] < order[-1]
+    assert f"traffic class   {rows[-1]['traffic_class']}" in said
     best = f"{column['largest_drawbar_pull_N'][0]:.1f}"
     steep = f"{np.rad2deg(column['steepest_slope_rad'][0]):.1f}"
     assert f"largest pull    {best} (" in said and f"steepest slope  {steep} (" in said

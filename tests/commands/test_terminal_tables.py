@@ -46,6 +46,7 @@ WORDS = {
     "advise": ["m.toml", "runs.csv"],
     "pull": ["m.toml", "runs.csv", "--load", "60", "--slip-limit", "0.3"],
     "design": ["rover.toml", "--designs", "9", "--draws", "50", "--sweep-only"],
+    "walk": ["--ground", "SSC-1,SSC-2", "--legs", "5"],
     "papers": ["comin2017-slip"],
 }
 #: Commands whose tables have tests of their own, or that print none.

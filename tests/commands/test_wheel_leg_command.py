@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP
+from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP, VIBRATION_SLIP
+from soilml.systems.wheel_legs.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
+from soilml.systems.wheel_legs.slip_models import soil_spring
 
 HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
 
@@ -54,6 +56,40 @@ def test_a_sensor_that_tells_nothing_is_named_and_the_others_answer(tmp_path, ca
     assert "outside of the 2 to 36 mm" in said.err
 
 
+def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
+    angle, stiffness = np.deg2rad(42.77), 13100.0 + 10500.0  # SSC-2 of table I
+    a, b = TORQUE_SLIP["empirical"].line(angle, stiffness)
+    drop, spring = soil_spring(angle, stiffness)
+    c, d = VIBRATION_SLIP["planar"].line(drop, spring)
+    lines = [f"a,{s},{(s - a) / b},{(s - c) / d},\n" for s in (0.1, 0.3)]
+    file, picture = tmp_path / "strides.csv", tmp_path / "slip.png"
+    file.write_text(HEAD + "".join(lines) + f"b,,,{(0.4 - c) / d},\n")
+    command = ["wheel-leg", str(file), "--torque-model", "empirical", "--vibration-model", "planar"]
+    assert main([*command, "--known", "ssc-2", "--picture", str(picture)]) == 0
+    found = rows_of(capsys.readouterr().out)
+    for row, slip in zip(found, (0.1, 0.3, 0.4), strict=True):
+        for name in ("slip_by_torque", "slip_by_vibration", "slip"):
+            assert row[name] == "" or float(row[name]) == pytest.approx(slip, abs=2e-4)
+    assert found[2]["slip_by_torque"] == found[2]["slip_measured"] == ""
+    assert float(found[0]["slip_std"]) == pytest.approx((1 / 0.005 + 1 / 0.015) ** -0.5)  # eq. 26
+    assert float(found[2]["slip_std"]) == pytest.approx(0.015**0.5)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main([*command, "--known", "42.77,23600"]) == 0
+    again = rows_of(capsys.readouterr().out)
+    assert float(again[1]["slip"]) == pytest.approx(float(found[1]["slip"]), abs=1e-3)
+
+
+def test_relations_fitted_to_walks_answer_in_place_of_the_printed_ones(tmp_path, capsys):
+    file, picture = tmp_path / "strides.csv", tmp_path / "soil.png"
+    file.write_text("run,slip,sinkage_m\na,0.2,0.05\n")
+    command = ["wheel-leg", str(file), "--sinkage-model", "walks", "--picture", str(picture)]
+    assert main(command) == 0
+    (row,) = rows_of(capsys.readouterr().out)
+    expected = fit_simulated_sinkage(simulate_sinkage())(0.05)
+    assert float(row["normal_stiffness_Pa"]) == pytest.approx(float(expected.normal_stiffness))
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(
     ("text", "options", "expected"),
     [
@@ -62,6 +98,10 @@ def test_a_sensor_that_tells_nothing_is_named_and_the_others_answer(tmp_path, ca
         ("run,slip,torque_Nm\na,0.2,\n", [], "nothing was measured"),
         ("run,slip,sinkage_m\na,0.2,-0.01\n", [], "a midstance sinkage must be above 0 m"),
         ("run,slip,torque_Nm\na,0.2,1.1\n", ["--torque-std", "-1"], "torque_std is -1"),
+        ("run,torque_Nm\na,1.1\n", ["--known", "mud"], "needed is one of SSC-1, SSC-2"),
+        ("run,torque_Nm\na,1.1\n", ["--known", "95,2e4"], "needed is one of SSC-1, SSC-2"),
+        ("run,torque_Nm\na,1.1\n", ["--known", "es-3", "--by", "run"], "--by asks for a soil"),
+        ("run,sinkage_m\na,0.01\n", ["--known", "es-3"], "give torque or vibration"),
     ],
 )
 def test_bad_strides_are_refused_in_one_line(text, options, expected, tmp_path, capsys):

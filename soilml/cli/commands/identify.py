@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
+    InputFile,
     add_by_option,
     add_effects_option,
     add_model_and_runs,
@@ -14,10 +17,14 @@ from soilml.cli.options import (
     add_row_options,
     need_for_report,
 )
+from soilml.errors import InputError
 
 if TYPE_CHECKING:
+    from soilml.config.case import Case
     from soilml.identification.presentation import Identification
     from soilml.io.table import Table
+    from soilml.report.page import Report
+    from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
 HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
@@ -53,6 +60,12 @@ only where model and sensors were verified on a known soil. It and `posterior`
 report which parameters the rows do not determine, and the next measurement
 that would help most.
 
+--mean averages the groups of --by, with the errors that they share. --fresh
+predicts other rows by the mean, and gives the regression of measured on
+predicted values:
+
+  soilml identify MODEL.toml RUNS.csv --by run --mean --fresh MORE.csv
+
 The result is JSON in SI units, in the file of --out or in a pipe; a terminal
 shows a table. --report writes a page to read and print. `posterior/prior`
 (remaining_fraction in the file) is the width of the estimate divided by that of the
@@ -73,6 +86,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_effects_option(parser)
     add_by_option(parser)
+    parser.add_argument("--mean", action="store_true", help="with --by: the mean of the groups too")
+    parser.add_argument(
+        "--fresh",
+        type=InputFile,
+        metavar="MORE.csv",
+        help="with --mean: other rows, measured against what the mean predicts",
+    )
     add_row_options(parser)
     add_output(parser, "--out", "FILE.json", "write the result to this file")
     add_report_option(parser)
@@ -96,6 +116,10 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
     from soilml.report.page import json_text
 
+    if args.mean and args.by is None:
+        raise InputError("--mean averages groups: name their column, such as --by run")
+    if args.fresh is not None and not args.mean:
+        raise InputError("--fresh predicts rows by the mean of groups: add --mean")
     need("scipy", "identify")
     need_for_report(args, "identify")
     from soilml.experiment_design.advice_after_results import advice_after_fit
@@ -105,6 +129,11 @@ def run(args: argparse.Namespace) -> int:
         Identification,
         identify_report,
         soil_entries,
+    )
+    from soilml.systems.tracked_robot.regression_presentation import (
+        regression_picture,
+        regression_text,
+        regressions_as_json,
     )
 
     table = read_rows(args, RUNS)
@@ -128,16 +157,51 @@ def run(args: argparse.Namespace) -> int:
     found, failed = result_by_group(args, table, "identifying", solve)
     runs = {name: result.as_json() for name, result in found.items()}
     content = runs[""] if args.by is None else {"by": args.by, "runs": runs, "failed": failed}
+    shown, lines = dict(found), None
+    if args.mean:
+        mean, lines = _mean(args, case, found, free)
+        shown[f"mean of {len(found)}"] = mean
+        content["mean"] = mean.as_json()
+        if lines is not None:
+            content["mean"]["regression"] = regressions_as_json(lines)
     text, files = json_text(content), (args.model, args.runs)
-    write_with_report(
-        args,
-        {args.out: text},
-        lambda: (identify_report(case, found, failed, args.by, files), content),
-    )
+
+    def page() -> Report:
+        report = identify_report(case, shown, failed, args.by, files)
+        if lines is None:
+            return report
+        extra = regression_picture(lines, Path(args.fresh).name)
+        return replace(report, pictures=[*report.pictures, extra])
+
+    write_with_report(args, {args.out: text}, lambda: (page(), content))
     if args.out is not None or args.report is not None or is_terminal():
-        heads = {name: f"{args.by} {name}: " if name else "" for name in found}
-        show("\n\n".join(heads[name] + result.text() for name, result in found.items()))
+        heads = {name: f"{args.by} {name}: " if name else "" for name in shown}
+        parts = [heads[name] + result.text() for name, result in shown.items()]
+        if lines is not None:
+            parts.append(regression_text(lines, Path(args.fresh).name))
+        show("\n\n".join(parts))
     else:
         write_stdout(json_text({key: content[key] for key in content if key != "draws"}))
     tell_failures(args.by, failed)
     return 0
+
+
+def _mean(
+    args: argparse.Namespace,
+    case: Case,
+    found: Mapping[str, Identification],
+    free: Sequence[str] | None,
+) -> tuple[Identification, dict[str, ChannelRegression] | None]:
+    """The mean of the groups, and the regressions of the rows of --fresh on what it predicts."""
+    from soilml.identification.presentation import Identification, soil_entries
+    from soilml.io.read_table import read_table
+    from soilml.systems.tracked_robot.group_identification import GroupFits, regressions
+
+    fit = GroupFits(tuple(one.fit for one in found.values())).average
+    mean = Identification(fit, soil=soil_entries(case, fit, free, with_draws=False))
+    if args.fresh is None:
+        return mean, None
+    if case.gears:
+        raise InputError("--fresh predicts rows of one gear: name it by --gear")
+    rows = read_table(args.fresh, ("slip", "load_N"), ignore_extra=args.ignore_extra)
+    return mean, regressions(case, fit, rows.rows(rows.answered))

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import InputFile, add_gear_option, add_output
+from soilml.cli.options import (
+    InputFile,
+    add_gear_option,
+    add_output,
+    add_picture_option,
+    need_for_picture,
+    number,
+)
 from soilml.errors import InputError, TableError
 
 HELP = "shear modulus and pull of a wheel from the stress on its rim"
@@ -22,8 +29,10 @@ weight on the wheel), slope_rad (0 if absent), and optionally slip_std,
 load_N_std and slope_rad_std, from which the standard deviation of k_x follows.
 STRESS.csv has run, angle_rad (from straight down, positive forward) and
 normal_Pa. The reference is the run of least slope. One k_x serves up to a slip
-of about 0.5. pull_on_slope_N is the pull that the slope requires. A whole rover
-with two such wheels: soilml climb.
+of about 0.5. pull_on_slope_N is the pull that the slope requires. --diameter
+removes what a round sensor averages over its disc (0.0095 m in the source):
+uncorrected, the arc appears longer and k_x too large. A whole rover with two
+such wheels: soilml climb.
 """
 
 
@@ -38,19 +47,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--reference", metavar="RUN", help="run whose k_x predicts the pulls")
     add_gear_option(parser)
+    parser.add_argument(
+        "--diameter",
+        type=number,
+        metavar="M",
+        help="diameter of round sensors, whose averaging over the disc is removed",
+    )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_picture_option(parser, "draw k_x and pull against slip")
 
 
 def run(args: argparse.Namespace) -> int:
     """Solve the balances and write the table."""
+    from dataclasses import replace
+
     from soilml.cli.output import tell, write_columns
     from soilml.config.case import read_case_of_one_gear
     from soilml.io.read_table import read_table
     from soilml.physics.effects import EFFECTS
     from soilml.physics.gears import Wheel
+    from soilml.report.column_panels import ColumnPanels
     from soilml.systems.force_sensor_wheel import MohrCoulomb, SensingWheel, SteadyRun
     from soilml.systems.force_sensor_wheel.runs_on_slopes import read_profiles, solve_runs
 
+    need_for_picture(args, "sensor-wheel")
     case = read_case_of_one_gear(args.model, EFFECTS, args.gear)
     gear, soil = case.model.gear, case.soil
     if not isinstance(gear, Wheel):
@@ -74,10 +94,12 @@ def run(args: argparse.Namespace) -> int:
         }
         runs[name] = SteadyRun(**values)
     need = ("run", "angle_rad", "normal_Pa")
+    wheel = SensingWheel(radius=float(gear.radius), width=float(gear.width))
+    discs = None if args.diameter is None else replace(wheel, diameter=args.diameter)
     found = solve_runs(
         runs,
-        read_profiles(read_table(args.stress, need, filled=need)),
-        SensingWheel(radius=float(gear.radius), width=float(gear.width)),
+        read_profiles(read_table(args.stress, need, filled=need), discs),
+        wheel,
         MohrCoulomb(friction_angle=soil.friction_angle, cohesion=soil.cohesion),
         args.reference,
     )
@@ -90,7 +112,8 @@ def run(args: argparse.Namespace) -> int:
         "drawbar_pull_N": found.drawbar_pull,
         "pull_on_slope_N": found.required,
     }
-    write_columns(columns, args.out)
+    panels = [("shear_modulus_m",), ("drawbar_pull_N", "pull_on_slope_N")]
+    write_columns(columns, args.out, args.picture, ColumnPanels(columns, "slip", panels))
     tell(f"drawbar_pull_N is predicted by k_x of run {found.reference}")
     for name, why in found.why.items():
         tell(f"run {name} has no k_x: {why}")

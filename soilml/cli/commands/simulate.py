@@ -4,9 +4,22 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output, number
+from soilml.cli.options import (
+    InputFile,
+    add_effects_option,
+    add_gear_option,
+    add_output,
+    add_picture_option,
+    need_for_picture,
+    number,
+)
 from soilml.errors import InputError
+
+if TYPE_CHECKING:
+    from soilml.io.table import Table
+    from soilml.report.column_panels import ColumnPanels
 
 HELP = "forces and sinkage against slip and load, from a model"
 DESCRIPTION = """\
@@ -21,10 +34,16 @@ identify` can read the table. A row without equilibrium has blank values and
 the reason in the column `status`; it is an error if no row has an equilibrium.
 The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
 --efficiency adds the power at the drawbar over that of the drive, (1 - s) r DP/T,
-and the share of the thrust that is left as pull (Comin and Saaj 2017, eq. 32).
+and the share of the thrust that is left as pull (Comin and Saaj 2017, eq. 32),
+with its class: non-trafficable, unsafe from 35 %, safe from 50 %, trafficable
+from 65 %. --balance adds how a track stands: shares of the load, trim, sinkage of
+the rear wheel, tension, centre of pressure. By default its trim is that of
+MODEL.toml; with --hitch and --behind it follows from the moments of the pull.
 Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
+
+MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,7 +78,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--efficiency", action="store_true", help="add tractive efficiency and pull efficiency"
     )
+    parser.add_argument(
+        "--balance", action="store_true", help="add how a track stands: shares of the load, trim"
+    )
+    parser.add_argument(
+        "--hitch",
+        type=number,
+        metavar="M",
+        help="with --balance: height of the pull above the belt",
+    )
+    parser.add_argument(
+        "--behind",
+        type=number,
+        metavar="M",
+        help="with --balance: centre of mass behind the middle of the track",
+    )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_picture_option(parser, "draw the columns against slip")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -75,31 +110,35 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
+    from soilml.systems.tracked_robot.robot import UNBALANCED, balanced_rows, settled_rows
 
+    need_for_picture(args, "simulate")
+    if not args.balance and (args.hitch is not None or args.behind is not None):
+        raise InputError("--hitch and --behind balance the moments of a track: add --balance")
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
-    if slips.size * loads.size > MAX_ROWS:
+    most = MOST_BALANCED if args.balance else MAX_ROWS
+    if slips.size * loads.size > most:
         raise InputError(
             f"{slips.size} slips and {loads.size} loads are {slips.size * loads.size} rows; "
-            f"at most {MAX_ROWS} are possible"
+            f"at most {most} are possible{' with --balance' if args.balance else ''}"
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
     known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
+    options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
+    options["with_efficiency"], settling = args.efficiency, None
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        rows = simulate(
-            case,
-            slip,
-            load,
-            **known,
-            run=args.label,
-            on_rows=done,
-            with_std=args.std,
-            with_efficiency=args.efficiency,
-        )
+        if args.hitch is not None or args.behind is not None:
+            behind, hitch = args.behind or 0.0, args.hitch or 0.0
+            rows, settling = settled_rows(case, slip, load, behind=behind, hitch=hitch, **options)
+            if np.isnan(settling).all():
+                raise InputError(f"{UNBALANCED}; change --hitch or --behind")
+        else:
+            rows = simulate(case, slip, load, on_rows=done, **options)
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))
@@ -108,7 +147,9 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(
             f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
         )
-    write_columns(rows.columns, args.out)
+    if args.balance:
+        rows = balanced_rows(case, rows, settling)
+    write_columns(rows.columns, args.out, args.picture, _panels(rows, loads.size))
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
     if failed:
@@ -117,3 +158,14 @@ def run(args: argparse.Namespace) -> int:
             file=sys.stderr,
         )
     return 0
+
+
+def _panels(rows: Table, loads: int) -> ColumnPanels:
+    """Forces, sinkage, and what was asked for beside them, against slip, a line for each load."""
+    from soilml.report.column_panels import ColumnPanels
+
+    panels: list[tuple[str, ...]] = [("torque_Nm",), ("drawbar_pull_N",), ("sinkage_m",)]
+    panels += [(name,) for name in ("tractive_efficiency", "pull_efficiency") if name in rows]
+    if "trim_rad" in rows:
+        panels += [("front_share", "belt_share", "rear_share"), ("trim_rad",), ("rear_sinkage_m",)]
+    return ColumnPanels(rows.columns, "slip", panels, ("load_N",) if loads > 1 else ())

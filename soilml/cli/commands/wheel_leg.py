@@ -3,10 +3,24 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_by_option, add_output, number
+from soilml.cli.options import (
+    InputFile,
+    add_by_option,
+    add_output,
+    add_picture_option,
+    need_for_picture,
+    number,
+)
+from soilml.errors import InputError
 
-HELP = "soil from torque, vibration and sinkage of a wheel-leg"
+if TYPE_CHECKING:
+    from soilml.io.table import Table
+    from soilml.report.parameter_figure import ParameterIntervals
+
+HELP = "soil, or slip, from torque, vibration and sinkage of a wheel-leg"
 DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil
 from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print.
@@ -21,8 +35,18 @@ standard deviation, and `fused` is that of all by eq. 30. It takes the errors of
 sensors as independent. Those of torque and sinkage are not: its standard
 deviations are then too small.
 
+On a known soil the same relations give the slip of each stride:
+
+  soilml wheel-leg STRIDES.csv --known SSC-2
+  soilml wheel-leg STRIDES.csv --known 35.8,22000     degrees and Pa, 1 cm deep
+
+with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
+STRIDES.csv is then passed on as slip_measured.
+
 The relations are of one wheel-leg: five legs, load testing feet, 3.75 kg. For
-another train a file on its strides: soilml train slip_torque.
+another train a file on its strides: soilml train slip_torque. --sinkage-model
+walks fits those of the sinkage to simulated walks (soilml walk), which the
+printed ones do not agree with.
 """
 QUANTITIES = ("friction_angle_rad", "normal_stiffness_Pa")
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
@@ -45,6 +69,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="planar, or linear (default), which needs one stride",
     )
+    parser.add_argument(
+        "--sinkage-model",
+        choices=("printed", "walks"),
+        default="printed",
+        help="relations as printed (default), or fitted to simulated walks",
+    )
+    parser.add_argument(
+        "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
+    )
     parser.add_argument("--torque-std", type=number, default=0.0, metavar="NM", help="std, N m")
     parser.add_argument(
         "--vibration-std", type=number, default=0.0, metavar="M_S2", help="std, m/s^2"
@@ -54,27 +87,92 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--ignore-extra", action="store_true", help="ignore columns whose names are not known"
     )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_picture_option(parser, "draw the soil by sensor, or the slip by stride")
 
 
 def run(args: argparse.Namespace) -> int:
     """Estimate and write the table."""
+    from soilml.io.read_table import read_table
+
+    need_for_picture(args, "wheel-leg")
+    known = args.known is not None
+    if known and args.by is not None:
+        raise InputError("--by asks for a soil of each group; --known gives the slip of each row")
+    need = ("run",) if known else ("run", "slip")
+    table = read_table(args.runs, need, filled=need, ignore_extra=args.ignore_extra)
+    return _slip(args, table) if known else _soil(args, table)
+
+
+def _options(args: argparse.Namespace) -> dict[str, Any]:
+    """The options that soil and slip share."""
+    names = ("torque_model", "vibration_model", "torque_std", "vibration_std")
+    return {name: getattr(args, name) for name in names}
+
+
+def _slip(args: argparse.Namespace, table: Table) -> int:
+    """The slip of each stride on a known soil."""
+    import numpy as np
+
+    from soilml.cli.output import tell, write_columns
+    from soilml.report.column_panels import ColumnPanels
+    from soilml.systems.wheel_legs.slip_of_strides import slip_of_strides
+
+    sensors = {
+        SENSORS[name]: table[name] for name in ("torque_Nm", "vibration_m_s2") if name in table
+    }
+    found = slip_of_strides(sensors, *_known_soil(args.known), **_options(args))
+    columns = {"run": table["run"]} | ({"slip_measured": table["slip"]} if "slip" in table else {})
+    for name, values in found.by_sensor.items():
+        columns |= {f"slip_by_{name}": values, f"slip_by_{name}_std": found.std[name]}
+    columns |= {"slip": found.fused, "slip_std": found.fused_std, "in_range": found.in_range}
+    numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
+    panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
+    write_columns(columns, args.out, args.picture, ColumnPanels(numbered, "stride", [panel]))
+    outside = int(np.count_nonzero(~found.in_range & np.isfinite(found.fused)))
+    if outside:
+        tell(f"{outside} of {len(table)} slips are outside of the 0 to 0.5 of the relations")
+    return 0
+
+
+def _known_soil(text: str) -> tuple[float, float]:
+    """Friction angle (rad) and stiffness 1 cm deep (Pa) of `--known`."""
+    import math
+
+    from soilml.cli.options import parse_numbers
+    from soilml.systems.wheel_legs.resistive_force import GROUNDS
+
+    if text.upper() in GROUNDS:
+        ground = GROUNDS[text.upper()]
+        return ground.friction_angle, ground.normal_stiffness
+    try:
+        angle, stiffness = parse_numbers("--known", text).tolist()
+    except (InputError, ValueError):
+        angle = stiffness = math.nan
+    if not (0.0 < angle < 90.0 and stiffness > 0.0):
+        raise InputError(
+            f"--known is {text!r}; needed is one of {', '.join(GROUNDS)}, or the friction angle in "
+            "degrees and the stress 1 cm deep in Pa, such as 35.8,22000"
+        )
+    return math.radians(angle), stiffness
+
+
+def _soil(args: argparse.Namespace, table: Table) -> int:
+    """The soil by each sensor, and fused."""
     from soilml.cli.output import tell, write_columns
     from soilml.cli.tables import result_by_group, tell_failures
-    from soilml.io.read_table import read_table
-    from soilml.io.table import Table
+    from soilml.systems.wheel_legs.sinkage_fit import (
+        PRINTED_SINKAGE,
+        fit_simulated_sinkage,
+        simulate_sinkage,
+    )
     from soilml.systems.wheel_legs.soil_of_strides import StrideSoil, soil_of_strides
 
-    table = read_table(args.runs, ("run", "slip"), ignore_extra=args.ignore_extra)
+    walks = args.sinkage_model == "walks"
+    relations = fit_simulated_sinkage(simulate_sinkage()) if walks else PRINTED_SINKAGE
 
     def estimate(rows: Table) -> StrideSoil:
-        return soil_of_strides(
-            rows["slip"],
-            {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows},
-            torque_model=args.torque_model,
-            vibration_model=args.vibration_model,
-            torque_std=args.torque_std,
-            vibration_std=args.vibration_std,
-        )
+        readings = {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows}
+        return soil_of_strides(rows["slip"], readings, sinkage_model=relations, **_options(args))
 
     found, failed = result_by_group(args, table, "estimating", estimate)
     columns: dict[str, list[object]] = {args.by: []} if args.by else {}
@@ -90,7 +188,30 @@ def run(args: argparse.Namespace) -> int:
         for sensor, why in one.unused.items():
             tell(f"{head}no estimate from {sensor}: {why}")
         if not one.in_range:
-            tell(f"{head}the mean sinkage is outside of the 2 to 36 mm of its relation")
-    write_columns(columns, args.out)
+            ends = f"{1e3 * relations.shallowest:.0f} to {1e3 * relations.deepest:.0f} mm"
+            tell(f"{head}the mean sinkage is outside of the {ends} of its relation")
+    write_columns(columns, args.out, args.picture, _intervals(args.by, columns))
     tell_failures(args.by, failed)
     return 0
+
+
+def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> ParameterIntervals:
+    """Angle and stiffness by sensor, with their 90 % intervals."""
+    import numpy as np
+
+    from soilml.quantities import Z_90
+    from soilml.report.parameter_figure import ParameterIntervals
+
+    groups = [f"{name}: " for name in columns[by]] if by else [""] * len(columns["sensor"])
+    value, std = (np.stack([columns[f"{n}{end}"] for n in QUANTITIES], -1) for end in ("", "_std"))
+    unknown = np.full(2, np.nan)
+    return ParameterIntervals(
+        names=("friction_angle", "normal_stiffness"),
+        units=("rad", "Pa"),
+        labels=[head + sensor for head, sensor in zip(groups, columns["sensor"], strict=True)],
+        values=value,
+        low=value - Z_90 * std,
+        high=value + Z_90 * std,
+        prior_low=unknown,
+        prior_high=unknown,
+    )

@@ -10,13 +10,14 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError, TableError
 from soilml.io.table import Table
+from soilml.systems.force_sensor_wheel.deconvolution import deconvolve
 from soilml.systems.force_sensor_wheel.force_balance import (
     MohrCoulomb,
     SteadyRun,
     solve_force_balance,
     solve_vertical_balance,
 )
-from soilml.systems.force_sensor_wheel.sensor_readings import SensingWheel
+from soilml.systems.force_sensor_wheel.sensor_readings import BinnedStress, SensingWheel
 from soilml.systems.force_sensor_wheel.shear_modulus import delta_method_covariance
 from soilml.systems.force_sensor_wheel.stress_profile import StressProfile
 
@@ -43,19 +44,27 @@ class RunsOnSlopes:
     why: Mapping[str, str]
 
 
-def read_profiles(stresses: Table) -> dict[str, StressProfile]:
+def read_profiles(stresses: Table, discs: SensingWheel | None = None) -> dict[str, StressProfile]:
     """The stress of each run from rows of `run`, `angle_rad`, `normal_Pa`, in any order.
 
-    Raises `TableError` for a run whose rows are no profile.
+    `discs` is the wheel whose round sensors averaged the stress; the averaging is then removed.
+    Raises `TableError` for a run whose rows are no profile, or too few for that.
     """
     found: dict[str, StressProfile] = {}
     for name, rows in stresses.groups():
         order = np.argsort(rows["angle_rad"], kind="stable")
         try:
-            found[name] = StressProfile(rows["angle_rad"][order], rows["normal_Pa"][order])
-        except InputError as error:
+            profile = StressProfile(rows["angle_rad"][order], rows["normal_Pa"][order])
+            found[name] = profile if discs is None else deconvolve(_as_bins(profile, discs), discs)
+        except (FitError, InputError) as error:
             raise TableError(f"{stresses.source}: run {name}: {error}") from None
     return found
+
+
+def _as_bins(profile: StressProfile, wheel: SensingWheel) -> BinnedStress:
+    """Means over discs; of one below twice the deadband, some samples may have read nothing."""
+    inside = profile.normal * wheel.area > 2.0 * float(wheel.deadband)
+    return BinnedStress(profile.angle, profile.normal, inside, saturated_fraction=0.0)
 
 
 def solve_runs(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,10 +12,13 @@ from numpy.typing import ArrayLike
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
+from soilml.fitting.operating_points import operating_points
+from soilml.fitting.predictions import forces_of_one_gear
 from soilml.identification import Fit, identify
+from soilml.identification.fit import identifiability_remarks
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
-from soilml.quantities import WEAKLY_IDENTIFIED_ABOVE, column
+from soilml.quantities import CHANNELS, WEAKLY_IDENTIFIED_ABOVE, Z_90, column
 
 #: Parameters that the source identifies from the pull alone, in its order.
 PARAMETERS = ("n", "friction_angle", "kphi", "shear_modulus", "cohesion")
@@ -23,15 +26,21 @@ PARAMETERS = ("n", "friction_angle", "kphi", "shear_modulus", "cohesion")
 
 @dataclass(frozen=True)
 class GroupFits:
-    """One fit for each group of data, their average, and one fit of all rows pooled."""
+    """One fit for each group of data, their average, and one of all rows where it was made.
+
+    Raises `InputError` for fewer than two groups.
+    """
 
     fits: tuple[Fit, ...]
-    pooled: Fit
+    pooled: Fit | None = None
+
+    def __post_init__(self) -> None:
+        _refuse_one(len(self.fits))
 
     @property
     def names(self) -> tuple[str, ...]:
         """The parameters that were free."""
-        return self.pooled.names
+        return self.fits[0].names
 
     @property
     def values(self) -> Floats:
@@ -60,9 +69,9 @@ class GroupFits:
     @property
     def remaining_fraction(self) -> dict[str, float]:
         """Remaining fraction of each prior's width, averaged over the groups."""
-        return {
-            n: float(np.mean([fit.remaining_fraction[n] for fit in self.fits])) for n in self.names
-        }
+        each = [fit.remaining_fraction for fit in self.fits]
+        names = (n for n in self.names if all(n in left for left in each))
+        return {n: float(np.mean([left[n] for left in each])) for n in names}
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -71,6 +80,32 @@ class GroupFits:
             name
             for name, share in self.remaining_fraction.items()
             if share > WEAKLY_IDENTIFIED_ABOVE
+        )
+
+    @property
+    def average(self) -> Fit:
+        """The average as a fit: its errors, what is left of the priors, and warnings by that.
+
+        Its interval reaches no further than those of the groups, which know their priors.
+        """
+        first, left = self.fits[0], self.remaining_fraction
+        low, high = (
+            np.asarray(ends) for ends in zip(*(f.interval for f in self.fits), strict=True)
+        )
+        return Fit(
+            method=f"mean of {len(self.fits)} fits, {first.method}",
+            names=self.names,
+            units=first.units,
+            values=self.mean,
+            covariance=np.diag(self.std**2),
+            warnings=tuple(
+                r for n, share in left.items() for r in identifiability_remarks(n, share)
+            ),
+            rows_used=sum(fit.rows_used for fit in self.fits),
+            remaining_fraction=left,
+            channels=first.channels,
+            low=np.maximum(self.mean - Z_90 * self.std, low.min(axis=0)),
+            high=np.minimum(self.mean + Z_90 * self.std, high.max(axis=0)),
         )
 
 
@@ -83,12 +118,16 @@ def identify_groups(
     fewer than two groups, `FitError` for rows that cannot be fitted. References: Wang et al. 2018,
     section 4.2.
     """
-    if len(tables) < 2:
-        raise InputError(f"{len(tables)} groups of data are given; an average needs two or more")
-    fits = tuple(identify(case, table, free, method) for table in tables)
+    _refuse_one(len(tables))
+    groups = GroupFits(tuple(identify(case, table, free, method) for table in tables))
     names = [name for name in tables[0].columns if all(name in table for table in tables)]
     rows = {name: np.concatenate([table[name] for table in tables]) for name in names}
-    return GroupFits(fits, identify(case, Table(rows), free, method))
+    return replace(groups, pooled=identify(case, Table(rows), free, method))
+
+
+def _refuse_one(count: int) -> None:
+    if count < 2:
+        raise InputError(f"{count} groups of data are given; an average needs two or more")
 
 
 def simulate_group(case: Case, slips: Floats, load: float, rng: np.random.Generator) -> Table:
@@ -104,11 +143,10 @@ def simulate_group(case: Case, slips: Floats, load: float, rng: np.random.Genera
     return Table({"slip": slips, "load_N": np.full(len(slips), load), key: noisy})
 
 
-def predicted_pull(case: Case, fit: Fit, table: Table) -> Floats:
-    """Pull (N) predicted with the fitted values for the rows of a table, (n,)."""
+def predicted(case: Case, fit: Fit, table: Table, channel: str = "drawbar_pull") -> Floats:
+    """A channel (SI units) predicted with the fitted values for the rows of a table, (n,)."""
     fitted = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
-    at = Operating(slip=table["slip"], load=table["load_N"])
-    return np.asarray(fitted.model(fitted.soil, at).drawbar_pull)
+    return np.asarray(getattr(forces_of_one_gear(fitted, operating_points(table)), channel))
 
 
 @dataclass(frozen=True)
@@ -162,6 +200,36 @@ def linear_regression(x: ArrayLike, y: ArrayLike) -> Regression:
         f=r2 / unexplained * freedom if unexplained > 0.0 else math.inf,
         points=len(a),
     )
+
+
+@dataclass(frozen=True)
+class ChannelRegression:
+    """Measured on predicted values (n,) of a channel, in SI units, and their regression line."""
+
+    predicted: Floats
+    measured: Floats
+    line: Regression
+
+
+def regressions(case: Case, fit: Fit, table: Table) -> dict[str, ChannelRegression]:
+    """Regression of each channel that the rows measured on what a fit predicts, by column.
+
+    The rows should be others than those of the fit: the line of its own rows tests nothing.
+    Raises `InputError` for fewer than three readings of a channel, and where none was measured.
+    References: Wang et al. 2018, section 4.2.2.
+    """
+    found = {}
+    for channel in CHANNELS:
+        key = column(channel)
+        if key not in table or not np.isfinite(table[key]).any():
+            continue
+        value = predicted(case, fit, table, channel)
+        read = np.isfinite(value) & np.isfinite(table[key])
+        x, y = value[read], np.asarray(table[key][read], dtype=np.float64)
+        found[key] = ChannelRegression(x, y, linear_regression(x, y))
+    if not found:
+        raise InputError(f"{table.source} has no readings to compare with predictions")
+    return found
 
 
 def implied_points(r2: float, f: float) -> float:

@@ -9,7 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from soilml.arrays import Floats
+from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.operating_points import operating_points
+from soilml.fitting.simulation import simulate
+from soilml.io.table import Table
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
 from soilml.physics.gears.track_belt import FRONT, MIDDLE, REAR, distance_along
@@ -173,6 +177,67 @@ def settling_from_moments(
         too_low = excess(middle) < 0.0
         low, high = np.where(too_low, middle, low), np.where(too_low, high, middle)
     return np.where(solvable, 0.5 * (low + high), np.nan)
+
+
+#: Status of a row at whose moments no settling between 0 and 0.5 balances.
+UNBALANCED = "no trim balances the moments: the front sinks, or the tail beyond the model"
+
+
+def settled_rows(
+    case: Case, slip: Floats, load: Floats, *, behind: float, hitch: float, **options: Any
+) -> tuple[Table, Floats]:
+    """Rows that a case with a track predicts at the settling that the moments of each require.
+
+    slip, load: (n,), load in N.
+    behind, hitch: As in `settling_from_moments`, whose settling (n,) is returned with the table.
+    options: Of `soilml.simulate`.
+
+    Rows without a settling are blank, with `UNBALANCED` as status.
+    """
+    at = Operating(slip=slip, load=load)
+    settling = settling_from_moments(case.model, case.soil, at, behind=behind, hitch=hitch)
+    parts = []
+    for one, s, w in zip(np.nan_to_num(settling), slip, load, strict=True):
+        gear = replace(_track(case.model), settling=float(one))
+        own = replace(case, model=replace(case.model, gear=gear))
+        parts.append(simulate(own, s, w, **options).columns)
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    stands = np.isfinite(settling)
+    for name, values in columns.items():
+        if name not in ("run", "slip", "load_N", "status", "traffic_class"):
+            columns[name] = np.where(stands, values, np.nan)
+    columns["status"] = np.where(stands, columns["status"], UNBALANCED)
+    return Table(columns, source="simulated rows"), settling
+
+
+def balanced_rows(case: Case, table: Table, settling: Floats | None = None) -> Table:
+    """Simulated rows with how the track stands in the soil.
+
+    Added are the shares of the load under front wheel, belt and rear wheel, the trim (rad), the
+    sinkage of the rear wheel (m), the tension of the belt (N), and the centre of pressure behind
+    the middle (m); `settling` (n,) too, where it is not the track's own. Raises `InputError` for
+    another gear.
+    """
+    track, at = _track(case.model), operating_points(table)
+    columns = dict(table.columns)
+    if settling is not None:
+        track = replace(track, settling=np.nan_to_num(settling))
+        columns["settling"] = settling
+    balance = track_balance(replace(case.model, gear=track), case.soil, at)
+    belt = track.contact_geometry(columns["sinkage_m"], case.soil, at)
+    own = {
+        "front_share": balance.front,
+        "belt_share": balance.middle,
+        "rear_share": balance.rear,
+        "trim_rad": balance.trim,
+        "rear_sinkage_m": belt.rear,
+        "belt_tension_N": balance.tension,
+        "pressure_centre_m": balance.centre,
+    }
+    answered = np.isfinite(columns["sinkage_m"])
+    columns |= {name: np.where(answered, value, np.nan) for name, value in own.items()}
+    columns["status"] = columns.pop("status")  # the last, as in every table
+    return replace(table, columns=columns)
 
 
 def _track(model: Model) -> Track:

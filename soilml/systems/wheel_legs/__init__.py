@@ -17,6 +17,7 @@ from soilml.systems.wheel_legs.slip_models import (
     TorqueSlip,
     VibrationSlip,
 )
+from soilml.systems.wheel_legs.slip_of_strides import StrideSlip, slip_of_strides
 from soilml.systems.wheel_legs.soil_from_slip import LegSoil, soil_from_torque, soil_from_vibration
 from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
 from soilml.systems.wheel_legs.walk import Walk, walk
@@ -32,6 +33,7 @@ __all__ = [
     "LinearGround",
     "SinkageFit",
     "SpringLeg",
+    "StrideSlip",
     "TorqueSlip",
     "VibrationSlip",
     "Walk",
@@ -40,6 +42,7 @@ __all__ = [
     "fit_sinkage",
     "gait_metrics",
     "simulate_stance",
+    "slip_of_strides",
     "soil_from_torque",
     "soil_from_vibration",
     "vibration_amplitude",

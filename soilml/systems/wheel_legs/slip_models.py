@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Generic, TypeVar, final
 
@@ -177,6 +178,15 @@ VIBRATION_SLIP: dict[str, VibrationSlip] = {
 
 
 Law = TypeVar("Law", TorqueSlip, VibrationSlip)
+
+
+def find_slip_model(model: str | Law, catalogue: Mapping[str, Law]) -> Law:
+    """A model as it is, or the one of this name; raises `InputError` for an unknown name."""
+    if not isinstance(model, str):
+        return model
+    if model not in catalogue:
+        raise InputError(f"no slip model {model!r}; there are: {', '.join(catalogue)}")
+    return catalogue[model]
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TypeVar
 
 import numpy as np
 
@@ -16,13 +14,12 @@ from soilml.systems.wheel_legs.slip_models import (
     VIBRATION_SLIP,
     TorqueSlip,
     VibrationSlip,
+    find_slip_model,
     spring_soil,
 )
 
 MIN_RANGE = 1.0  # Smallest range of slips for a regression, in standard deviations of the slip
 MAX_EXCESS = 3.0  # Standard deviations from the physical range at which an estimate is refused
-
-Law = TypeVar("Law", TorqueSlip, VibrationSlip)
 
 
 @dataclass(frozen=True)
@@ -78,7 +75,7 @@ def soil_from_torque(
     >>> [round(float(np.rad2deg(v))) for v in (found.friction_angle, found.std[0])]  # degrees
     [40, 4]
     """
-    law = _find_model(model, TORQUE_SLIP)
+    law = find_slip_model(model, TORQUE_SLIP)
     torque, slip = _check_pairs(torque, slip, "torque", torque_std)
     if law.intercept is None:
         a, b, covariance = _line(torque, slip, law.slip_std, torque_std, "simplified")
@@ -106,7 +103,7 @@ def soil_from_vibration(
     The linear model needs one pair, the planar one two or more with different slips. Errors as
     `soil_from_torque`. References: Comin and Saaj 2017, eqs. 27 and 28.
     """
-    law = _find_model(model, VIBRATION_SLIP)
+    law = find_slip_model(model, VIBRATION_SLIP)
     vibration, slip = _check_pairs(vibration, slip, "vibration", vibration_std)
     if law.assumed is None:
         a, b, covariance = _line(vibration, slip, law.slip_std, vibration_std, "linear")
@@ -134,14 +131,6 @@ def soil_from_vibration(
     return _check_physical(
         LegSoil(float(value[0]), float(value[1]), jacobian @ covariance @ jacobian.T)
     )
-
-
-def _find_model(model: str | Law, catalogue: Mapping[str, Law]) -> Law:
-    if not isinstance(model, str):
-        return model
-    if model not in catalogue:
-        raise InputError(f"no slip model {model!r}; there are: {', '.join(catalogue)}")
-    return catalogue[model]
 
 
 def _check_pairs(reading: Floats, slip: Floats, name: str, std: float) -> tuple[Floats, Floats]:

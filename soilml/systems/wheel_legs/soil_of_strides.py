@@ -10,7 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.onboard.fusion_rules import pairwise
-from soilml.systems.wheel_legs.sinkage_fit import PRINTED_SINKAGE
+from soilml.systems.wheel_legs.sinkage_fit import PRINTED_SINKAGE, SinkageFit
 from soilml.systems.wheel_legs.soil_from_slip import LegSoil, soil_from_torque, soil_from_vibration
 
 
@@ -41,6 +41,7 @@ def soil_of_strides(
     vibration_model: str = "linear",
     torque_std: float = 0.0,
     vibration_std: float = 0.0,
+    sinkage_model: SinkageFit = PRINTED_SINKAGE,
 ) -> StrideSoil:
     """Estimate one soil from slip and torque, vibration and sinkage at midstance.
 
@@ -58,6 +59,8 @@ def soil_of_strides(
         Names in `TORQUE_SLIP` and `VIBRATION_SLIP`.
     torque_std, vibration_std
         Standard deviations of the sensors, N m and m/s^2.
+    sinkage_model
+        Relations of the sinkage: the printed ones, or a `SinkageFit` of one's own.
 
     Raises
     ------
@@ -80,7 +83,7 @@ def soil_of_strides(
     solve: dict[str, Callable[[Floats, Floats], LegSoil]] = {
         "torque": lambda value, at: soil_from_torque(value, at, torque_model, torque_std),
         "vibration": lambda v, at: soil_from_vibration(v, at, vibration_model, vibration_std),
-        "sinkage": lambda value, _: _from_sinkage(value),
+        "sinkage": lambda value, _: _from_sinkage(value, sinkage_model),
     }
     found: dict[str, LegSoil] = {}
     strides: list[int] = []
@@ -104,7 +107,7 @@ def soil_of_strides(
             continue
         strides.append(int(read.sum()))
         if sensor == "sinkage":
-            in_range = bool(PRINTED_SINKAGE(value[read].mean()).in_range)
+            in_range = bool(sinkage_model(value[read].mean()).in_range)
     if not found and not unused:
         raise InputError("nothing was measured: give torque, vibration or sinkage of each stride")
     if not found:
@@ -119,9 +122,9 @@ def soil_of_strides(
     return StrideSoil(names, mean, std, tuple(strides), unused, in_range)
 
 
-def _from_sinkage(sinkage: Floats) -> LegSoil:
-    """By the printed relations, whose error is of the soil: more strides do not lessen it."""
-    found = PRINTED_SINKAGE(sinkage.mean())
+def _from_sinkage(sinkage: Floats, relations: SinkageFit) -> LegSoil:
+    """By relations whose error is of the soil: more strides do not lessen it."""
+    found = relations(sinkage.mean())
     std = np.asarray([found.friction_angle_std, found.normal_stiffness_std])
     return LegSoil(
         float(found.friction_angle), float(found.normal_stiffness), np.diag(std.astype(float) ** 2)

@@ -142,7 +142,7 @@ def of_plates_and_shear(case):
         (fit, (3,), "cohesion c (kPa)"),
         (estimate, (3,), "friction angle φ (°)"),
         (gap, (), "Fitted rows"),
-        (pull, (2, 1), "60 N on the wheel"),
+        (pull, (3, 1), "60 N on the wheel"),
         (rover, (2, 2), "steepest slope, degrees"),
         (imported, (1,), "torque / (load × radius)"),
         (comparison, (2, 2), "friction angle"),

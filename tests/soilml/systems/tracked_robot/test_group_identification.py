@@ -13,7 +13,7 @@ from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
     identify_groups,
     linear_regression,
-    predicted_pull,
+    predicted,
     simulate_group,
 )
 from soilml.systems.tracked_robot.robot import WANG2018
@@ -74,7 +74,7 @@ def test_a_fit_predicts_new_runs(groups):
     fresh = simulate_group(
         CASE, np.linspace(0.08, 0.8, 12), WANG2018.load, np.random.default_rng(9)
     )
-    line = linear_regression(predicted_pull(CASE, groups.pooled, fresh), fresh["drawbar_pull_N"])
+    line = linear_regression(predicted(CASE, groups.pooled, fresh), fresh["drawbar_pull_N"])
     assert line.r2 > 0.95 and abs(line.slope - 1.0) < 4.0 * line.slope_std
 
 

@@ -1,0 +1,103 @@
+"""`soilml walk`: a wheel-leg walking over soft ground, by resistive-force theory."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING
+
+from soilml.cli.options import (
+    add_output,
+    add_picture_option,
+    need_for_picture,
+    number,
+)
+from soilml.errors import InputError
+
+if TYPE_CHECKING:
+    from soilml.systems.wheel_legs.resistive_force import LinearGround
+
+HELP = "a wheel-leg walking over soft ground: slip, sinkage, torque"
+DESCRIPTION = """\
+Simulate wheel-legs by resistive-force theory (Li, Zhang and Goldman 2013; Comin
+and Saaj 2017, eqs. 4 to 11), at every combination of feet, numbers of legs,
+grounds and commanded slips.
+
+  soilml walk --foot LTF,CIF --stiffness 0.4e6:1e6:4 --picture feet.png
+  soilml walk --foot none --legs 1:6:6 --stiffness 0.7e6
+  soilml walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --over-time turn.csv
+
+Feet are none, LTF, SRF and CIF (table III); grounds SSC-1, SSC-2, SSC-3 and ES-3
+(table I), or --stiffness, the stress in N/m^3 of depth under a flat plate. A row
+has means, root mean squares and largest values over the last full turn, and the
+sinkage at midstance. Without --slip the wheel rolls freely. --over-time has the
+motion of that turn. The picture shows it, or, where legs, stiffness or slip have
+three values or more, the row's values against them.
+
+The stress is proportional to the depth: --offset adds the stress at the surface.
+Neighbouring legs do not act on each other, and the body is a plate below the hub.
+"""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument("--foot", default="LTF", metavar="A,B,...", help="feet (default: LTF)")
+    parser.add_argument("--legs", default="5", help="numbers of legs, 1 to 6 (default: 5)")
+    parser.add_argument("--ground", metavar="A,B,...", help="soils of table I (default: all four)")
+    parser.add_argument("--stiffness", help="stiffnesses in N/m^3, in place of --ground")
+    parser.add_argument("--slip", help="commanded slips; without it the wheel rolls freely")
+    parser.add_argument("--offset", action="store_true", help="with the stress at the surface")
+    parser.add_argument("--mass", type=number, metavar="KG", help="carried (default: 3.75 kg)")
+    parser.add_argument("--speed", type=number, metavar="RAD_S", help="default: 0.3 rad/s")
+    add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
+    add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_picture_option(parser, "draw the walks, or their values against legs, stiffness or slip")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Simulate the walks and write the tables."""
+    import numpy as np
+
+    from soilml.cli.options import parse_names, parse_numbers
+    from soilml.cli.output import tell, write_columns
+    from soilml.cli.progress import working
+    from soilml.systems.wheel_legs.walk_tables import walk_tables
+
+    need_for_picture(args, "walk")
+    feet = parse_names(args.foot) or []
+    counts = parse_numbers("--legs", args.legs)
+    if np.any(counts != counts.round()):
+        raise InputError(f"--legs is {args.legs!r}; needed are whole numbers")
+    slips = [np.nan] if args.slip is None else parse_numbers("--slip", args.slip).tolist()
+    given = {"mass": args.mass, "speed": args.speed}
+    changes = {name: value for name, value in given.items() if value is not None}
+    with working("simulating the walks"):
+        found = walk_tables(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)
+    panels = None if args.picture is None else found.panels
+    more = {} if args.over_time is None else {args.over_time: found.motion}
+    write_columns(found.columns, args.out, args.picture, panels, more)
+    status = np.asarray(found.columns["status"])
+    for reason in dict.fromkeys(status[status != "ok"].tolist()):
+        tell(f"{np.sum(status == reason)} of {status.size} walks: {reason}")
+    return 0
+
+
+def _grounds(args: argparse.Namespace) -> dict[str, LinearGround]:
+    """The grounds of --ground or --stiffness, by name."""
+    from dataclasses import replace
+
+    from soilml.cli.options import parse_names, parse_numbers
+    from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
+
+    if args.stiffness is not None:
+        if args.ground is not None or args.offset:
+            raise InputError(
+                "--stiffness is in place of --ground, and has no stress at the surface"
+            )
+        values = parse_numbers("--stiffness", args.stiffness).tolist()
+        return {f"{value:g}": LinearGround(stiffness=value) for value in values}
+    names = [name.upper() for name in parse_names(args.ground) or GROUNDS]
+    if unknown := [name for name in names if name not in GROUNDS]:
+        raise InputError(f"no ground {unknown[0]!r}; there are: {', '.join(GROUNDS)}")
+    return {
+        name: GROUNDS[name] if args.offset else replace(GROUNDS[name], offset=0.0) for name in names
+    }

@@ -1,0 +1,126 @@
+"""Walks of several wheel-legs, grounds and slips as tables, and as a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from soilml.errors import InputError
+from soilml.report.column_panels import ColumnPanels
+from soilml.systems.wheel_legs.gait_metrics import TURN, gait_metrics
+from soilml.systems.wheel_legs.geometry import wheel_leg
+from soilml.systems.wheel_legs.integrator import WalkStatus
+from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.walk import walk
+
+#: Columns of the metrics of a turn, by the attribute of `GaitMetrics`.
+METRICS = {
+    "mean_slip": "slip_mean",
+    "rms_slip": "slip_rms",
+    "mean_sinkage": "sinkage_mean_m",
+    "rms_sinkage": "sinkage_rms_m",
+    "max_sinkage": "sinkage_largest_m",
+    "midstance_sinkage": "sinkage_midstance_m",
+    "mean_torque": "torque_mean_Nm",
+}
+MOST = 400  # Walks at once
+MOST_DRAWN = 8  # Walks of one picture over a turn
+SWEPT = 3  # Values of a quantity from which on a picture has it along its axis
+
+
+@dataclass(frozen=True)
+class WalkTables:
+    """Walks as columns by name, in SI units.
+
+    columns: A row for each walk: its keys, the metrics of its last full turn, and its status.
+    motion: A row for each instant of that turn of each walk that goes on.
+    keys: Columns of both that tell the walks apart, of those that vary.
+    """
+
+    columns: Mapping[str, Any]
+    motion: Mapping[str, Any]
+    keys: tuple[str, ...]
+
+    @property
+    def panels(self) -> ColumnPanels:
+        """Metrics against the first quantity of three values or more; else the turns themselves.
+
+        Raises `InputError` for more turns than a picture shows.
+        """
+        swept = [
+            name
+            for name in self.keys
+            if name in ("stiffness_N_m3", "legs", "slip_commanded")
+            and np.unique(self.columns[name]).size >= SWEPT
+        ]
+        if swept:
+            slip = ("slip_mean", "slip_rms")
+            sinkage = ("sinkage_mean_m", "sinkage_largest_m")
+            others = tuple(name for name in self.keys if name != swept[0])
+            return ColumnPanels(
+                self.columns, swept[0], [slip, sinkage, ("torque_mean_Nm",)], others
+            )
+        if len(self.columns["foot"]) > MOST_DRAWN:
+            raise InputError(
+                f"{len(self.columns['foot'])} walks; a picture shows the turns of {MOST_DRAWN} or "
+                "fewer: ask for fewer, or for three or more values of legs, stiffness or slip"
+            )
+        shown = [("slip",), ("sinkage_m",), ("torque_Nm",), ("hub_height_m",)]
+        return ColumnPanels(self.motion, "turned_rad", shown, self.keys)
+
+
+def walk_tables(
+    feet: Sequence[str],
+    legs: Sequence[int],
+    grounds: Mapping[str, LinearGround],
+    slips: Sequence[float],
+    **changes: float,
+) -> WalkTables:
+    """Walk with every combination of foot, legs, ground and commanded slip (NaN: free).
+
+    `grounds` are by name; one that is named by its stiffness has no other name. `changes` are
+    further fields of `WheelLeg`, such as its mass. Raises `InputError` for an unknown foot, an
+    invalid wheel-leg, and too many walks.
+    """
+    cases = list(product(feet, legs, grounds, slips))
+    if len(cases) > MOST:
+        raise InputError(f"{len(cases)} walks; at most {MOST} are possible at once")
+    walked = walk(
+        [wheel_leg(foot, legs=count, **changes) for foot, count, _, _ in cases],
+        [grounds[name] for _, _, name, _ in cases],
+        slip=np.asarray([slip for *_, slip in cases]),
+    )
+    found = gait_metrics(walked)
+    numbers = {name for name, ground in grounds.items() if name == f"{ground.stiffness:g}"}
+    asked: dict[str, Any] = {
+        "foot": np.asarray([foot for foot, *_ in cases]),
+        "legs": np.asarray([count for _, count, _, _ in cases]),
+        "ground": np.asarray(["" if name in numbers else name for _, _, name, _ in cases]),
+        "stiffness_N_m3": np.asarray([grounds[name].stiffness for _, _, name, _ in cases]),
+        "slip_commanded": np.asarray([slip for *_, slip in cases]),
+    }
+    metrics = {column: getattr(found, name) for name, column in METRICS.items()}
+    status = np.asarray([WalkStatus(int(code)).reason for code in found.status])
+    last = walked.after(float(walked.angle[-1]) - TURN)
+    goes_on = np.flatnonzero(found.status == WalkStatus.OK)
+    count = last.angle.size
+    motion = {name: np.repeat(values[goes_on], count) for name, values in asked.items()}
+    motion["turned_rad"] = np.tile(last.angle - last.angle[0], goes_on.size)
+    over_time = {
+        "time_s": last.time - last.time[:1],
+        "slip": last.slip,
+        "sinkage_m": last.sinkage,
+        "torque_Nm": last.torque,
+        "hub_height_m": last.z,
+        "hub_x_m": last.x - last.x[:1],
+    }
+    motion |= {name: values[:, goes_on].T.ravel() for name, values in over_time.items()}
+    soil = "stiffness_N_m3" if numbers else "ground"
+    keys = tuple(
+        name for name in ("foot", "legs", soil, "slip_commanded") if np.unique(asked[name]).size > 1
+    )
+    return WalkTables({**asked, **metrics, "status": status}, motion, keys)

@@ -1,0 +1,138 @@
+"""A tracked robot from the shell: how it stands in the soil, and its soil as a mean of groups."""
+
+import csv
+import io
+import json
+
+import numpy as np
+import pytest
+
+from soilml import read_case, simulate
+from soilml.cli import main
+
+MODEL = """\
+[gear]
+type = "track"
+radius = 0.1
+width = 0.08
+base = 0.6
+[soil]
+name = "wang2018/sand"
+[soil.prior]
+friction_angle = [0.349, 0.698]
+shear_modulus = [0.01, 0.08]
+[noise]
+drawbar_pull_N = "3 % + 5"
+"""
+SIMULATE = ["simulate", "m.toml", "--slip", "0.02,0.1,0.3", "--load", "638", "--balance"]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    (tmp_path / "m.toml").write_text(MODEL)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def columns_of(text):
+    rows = list(csv.DictReader(io.StringIO(text)))
+    return {name: [row[name] for row in rows] for name in rows[0]}
+
+
+def numbers(column):
+    return np.asarray([float(cell) for cell in column])
+
+
+def test_the_shares_carry_the_load_and_moments_sink_the_tail(folder, capsys):
+    assert main([*SIMULATE, "--efficiency"]) == 0
+    level = columns_of(capsys.readouterr().out)
+    parts = [numbers(level[f"{part}_share"]) for part in ("front", "belt", "rear")]
+    np.testing.assert_allclose(sum(parts), 1.0, atol=1e-9)
+    rear = numbers(level["rear_sinkage_m"])
+    np.testing.assert_allclose(rear, 1.2 * numbers(level["sinkage_m"]))  # R_1f of the default
+    assert (np.diff(rear) < 0.0).all()
+    moved = [*SIMULATE, "--efficiency", "--hitch", "0.1", "--picture", "t.png"]
+    assert main(moved) == 0
+    trimmed = columns_of(capsys.readouterr().out)
+    pull, centre = numbers(trimmed["drawbar_pull_N"]), numbers(trimmed["pressure_centre_m"])
+    np.testing.assert_allclose(centre, 0.1 * pull / 638.0, atol=2e-5)  # W x = h DP
+    assert (np.diff(numbers(trimmed["rear_sinkage_m"])) > 0.0).all()
+    ratio = (1.0 - numbers(trimmed["slip"])) * 0.1 * pull / numbers(trimmed["torque_Nm"])
+    np.testing.assert_allclose(numbers(trimmed["tractive_efficiency"]), ratio)
+    assert (folder / "t.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_table_with_the_balance_can_be_identified(folder, capsys):
+    assert main([*SIMULATE, "--efficiency", "--run", "a", "--out", "rows.csv"]) == 0
+    command = ["identify", "m.toml", "rows.csv", "--method", "nonlinear"]
+    assert main(command) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]
+    assert found["friction_angle"]["value"] == pytest.approx(0.4363, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--hitch", "0.1"], "add --balance"),
+        (["--balance", "--behind", "-0.2"], "no trim balances the moments"),
+        (["--balance", "--slip", "0:0.5:3000"], "at most 2000 are possible with --balance"),
+        (["--balance", "--hitch", "x"], "needed is a number"),
+    ],
+)
+def test_bad_requests_are_refused_in_one_line(options, expected, folder, capsys):
+    command = ["simulate", "m.toml", "--slip", "0.1", "--load", "638", *options, "--out", "o.csv"]
+    assert main(command) == 2
+    assert expected in capsys.readouterr().err.strip().splitlines()[-1]
+    assert not (folder / "o.csv").exists()
+
+
+def test_only_a_track_has_a_balance(folder, capsys):
+    (folder / "m.toml").write_text(MODEL.replace('"track"', '"wheel"').replace("base = 0.6\n", ""))
+    assert main(SIMULATE) == 2
+    assert "this needs a track" in capsys.readouterr().err
+
+
+@pytest.fixture
+def groups(folder):
+    """Four groups of eight pulls, and twelve further rows."""
+    case, slips = read_case("m.toml"), np.linspace(0.05, 0.85, 8)
+    for name, seeds, slip in (("runs.csv", range(4), slips), ("more.csv", [9], slips + 0.03)):
+        text = "run,slip,load_N,drawbar_pull_N\n"
+        for seed in seeds:
+            pull = simulate(case, slip, 638.0, seed=seed)["drawbar_pull_N"]
+            text += "".join(f"g{seed},{s},638,{p}\n" for s, p in zip(slip, pull, strict=True))
+        (folder / name).write_text(text)
+
+
+MEAN = ["identify", "m.toml", "runs.csv", "--method", "nonlinear", "--by", "run", "--mean"]
+
+
+@pytest.mark.slow
+def test_the_mean_of_groups_and_the_regression_of_fresh_rows(groups, folder, capsys):
+    assert main([*MEAN, "--fresh", "more.csv", "--report", "found"]) == 0
+    said = capsys.readouterr().out
+    content = json.loads((folder / "found" / "report.json").read_text())
+    each = [run["parameters"]["friction_angle"]["value"] for run in content["runs"].values()]
+    own = content["mean"]["parameters"]["friction_angle"]
+    assert len(each) == 4 and own["value"] == pytest.approx(np.mean(each))
+    assert abs(own["value"] - 0.4363) < 3.0 * own["std"]
+    line = content["mean"]["regression"]["drawbar_pull_N"]
+    assert line["points"] == 8 and abs(line["slope"] - 1.0) < 4.0 * line["slope_std"]
+    assert f"r2 {line['r2']:.3f}" in said and "run mean of 4" in said
+    page = (folder / "found" / "report.html").read_text()
+    assert "against predictions by the mean" in page and "run mean of 4" in page
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--mean"], "name their column, such as --by run"),
+        (["--fresh", "more.csv"], "add --mean"),
+        (["--by", "run", "--mean", "--where", "run=g1"], "an average needs two or more"),
+        (["--by", "run", "--mean", "--fresh", "none.csv"], "there is no such file"),
+    ],
+)
+def test_a_mean_without_groups_is_refused_in_one_line(options, expected, groups, capsys):
+    command = ["identify", "m.toml", "runs.csv", "--method", "nonlinear", *options]
+    assert main([*command, "--out", "o.json"]) == 2
+    assert expected in capsys.readouterr().err.strip().splitlines()[-1]

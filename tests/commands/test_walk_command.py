@@ -1,0 +1,78 @@
+"""`soilml walk`: wheel-legs on soft ground, as tables and pictures."""
+
+import csv
+import io
+
+import numpy as np
+import pytest
+
+from soilml.cli import main
+
+SOFT, FIRM = "0.4e6", "1e6"
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, capsys):
+    picture = tmp_path / "feet.png"
+    command = ["walk", "--foot", "LTF,CIF", "--stiffness", f"{SOFT},0.7e6,{FIRM}"]
+    assert main([*command, "--picture", str(picture)]) == 0
+    found = rows_of(capsys.readouterr().out)
+    assert [(row["foot"], float(row["stiffness_N_m3"])) for row in found] == [
+        (foot, stiffness) for foot in ("LTF", "CIF") for stiffness in (4e5, 7e5, 1e6)
+    ]
+    sunk = np.asarray([float(row["sinkage_mean_m"]) for row in found]).reshape(2, 3)
+    assert (np.diff(sunk, axis=1) < 0.0).all()  # firmer ground
+    assert (sunk[1] < sunk[0]).all()  # a larger foot
+    for row in found:
+        assert float(row["sinkage_mean_m"]) < float(row["sinkage_largest_m"])
+        assert row["status"] == "ok" and row["slip_commanded"] == ""
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_motion_of_a_turn_has_the_commanded_slip(tmp_path, capsys):
+    over_time, picture = tmp_path / "turn.csv", tmp_path / "turn.png"
+    command = ["walk", "--ground", "ssc-2", "--slip", "0,0.25", "--over-time", str(over_time)]
+    assert main([*command, "--picture", str(picture), "--out", str(tmp_path / "walks.csv")]) == 0
+    walks = rows_of((tmp_path / "walks.csv").read_text())
+    assert [float(row["slip_mean"]) for row in walks] == pytest.approx([0.0, 0.25], abs=1e-9)
+    rows = rows_of(over_time.read_text())
+    for commanded in ("0", "0.25"):
+        turn = [row for row in rows if row["slip_commanded"] == commanded]
+        column = {name: np.asarray([float(row[name]) for row in turn]) for name in (
+            "turned_rad", "time_s", "hub_x_m", "hub_height_m", "sinkage_m")}  # fmt: skip
+        assert column["turned_rad"][-1] == pytest.approx(2.0 * np.pi)
+        assert column["time_s"][-1] == pytest.approx(2.0 * np.pi / 0.3)
+        # five legs of 18 cm roll 10 l sin(36 deg) in a turn, less the slip
+        whole = 10.0 * 0.18 * np.sin(np.pi / 5.0)
+        assert column["hub_x_m"][-1] == pytest.approx((1.0 - float(commanded)) * whole, rel=2e-3)
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_ground_that_carries_nothing_is_said(capsys):
+    assert main(["walk", "--stiffness", "1e3"]) == 0
+    said = capsys.readouterr()
+    assert "too soft" in rows_of(said.out)[0]["status"]
+    assert "1 of 1 walks: stopped: the ground is too soft" in said.err
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        (["--foot", "XYZ"], "no foot 'XYZ'; there are: none, LTF, SRF, CIF"),
+        (["--ground", "mud"], "no ground 'MUD'; there are: SSC-1"),
+        (["--legs", "2.5"], "needed are whole numbers"),
+        (["--legs", "9"], "9 legs; the model is for 1 to 6"),
+        (["--mass", "-1"], "a mass of -1 kg"),
+        (["--stiffness", "1e6", "--offset"], "has no stress at the surface"),
+        (["--stiffness", "1e5:1e6:200", "--legs", "3:6:4"], "800 walks; at most 400"),
+        (["--legs", "4,5", "--foot", "none,LTF,SRF"], "a picture shows the turns of 8 or fewer"),
+    ],
+)
+def test_bad_requests_are_refused_in_one_line(options, expected, tmp_path, capsys):
+    out, picture = tmp_path / "walks.csv", tmp_path / "walks.png"
+    assert main(["walk", *options, "--out", str(out), "--picture", str(picture)]) == 2
+    assert expected in capsys.readouterr().err.strip().splitlines()[-1]
+    assert not out.exists() and not picture.exists()
