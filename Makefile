@@ -56,7 +56,7 @@ check: $(VENV)/.ready ## formatting, types and layers
 	@$(BIN)/ruff format --check --quiet . && $(BIN)/ruff check --quiet . && $(BIN)/mypy \
 	  && $(BIN)/lint-imports > /dev/null && echo "format, types and layers hold"
 
-pages: $(VENV)/.ready ## write the blocks of pages that commands print; `tools/pages.py --check` compares them, `--ages` names those older than their code
+pages: $(VENV)/.ready ## write the blocks of pages that commands print; `tools/pages.py --check` compares them, `--quick` in a minute
 	@OMP_NUM_THREADS=1 $(BIN)/python tools/pages.py
 
 models: $(VENV)/.ready ## train the released models again, into exported/

@@ -7,9 +7,15 @@ paragraph of its output. Further paragraphs follow where a number says so:
     ...
     <!-- end of output -->
 
+A picture follows a comment with the file that such a command draws, from which it is copied:
+
+    <!-- drawn: demo/papers/climbing.png -->
+    ![climbing](climbing.png)
+
 python tools/pages.py                          write the blocks of all pages
 python tools/pages.py --check docs/papers/x.md   compare those of one; status 1 if one is stale
-python tools/pages.py --ages                   name those older than a change of their code
+python tools/pages.py --quick                  compare those of quick commands, and small runs of
+                                               the others with their records (page_probes.py)
 """
 
 from __future__ import annotations
@@ -17,14 +23,15 @@ from __future__ import annotations
 import argparse
 import re
 import shlex
+import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from page_ages import changed_rooms, read_states, state_of, write_states
+from page_probes import PROBES, record, script_of, small_run
 
 ROOT = Path(__file__).parents[1]
 FOLDERS = ("README.md", "docs/**/*.md", "examples/**/*.md")
@@ -33,10 +40,14 @@ BLOCK = re.compile(
     r"(?P<text>.*?)<!-- end of output -->",
     re.DOTALL,
 )
+#: A picture of a page, and where the script that draws it puts it.
+PICTURE = re.compile(r"<!-- drawn: (?P<source>\S+) -->\n!\[[^\]]*\]\((?P<target>[^)]+)\)")
 NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 #: Numbers agree within this fraction, or within so many units of their last digit: libraries and
 #: processors round sums in another order.
 FRACTION, UNITS = 0.02, 1.5
+#: Mean difference of pixels, 0 to 1, from which on a picture is another one and not another font.
+OTHER_PICTURE = 0.003
 
 
 def pages() -> list[Path]:
@@ -90,6 +101,27 @@ def with_blocks(text: str, output: Callable[[str], str]) -> str:
     return BLOCK.sub(block, text)
 
 
+def same_picture(one: Path, other: Path) -> bool:
+    """Whether two PNG files show the same, up to how another version draws letters and lines."""
+    from matplotlib.image import imread
+
+    if not (one.exists() and other.exists()):
+        return False
+    a, b = imread(one)[..., :3], imread(other)[..., :3]
+    return a.shape == b.shape and float(abs(a - b).mean()) < OTHER_PICTURE
+
+
+def update_pictures(page: Path) -> list[str]:
+    """Copy what the scripts of a page have drawn beside it, where it shows something else."""
+    changed = []
+    for match in PICTURE.finditer(page.read_text(encoding="utf-8")):
+        source, target = ROOT / match["source"], page.parent / match["target"]
+        if source.exists() and not same_picture(source, target):
+            shutil.copyfile(source, target)
+            changed.append(str(target))
+    return changed
+
+
 def agree(page: str, now: str) -> bool:
     """Whether two texts have the same words, and numbers that differ by no more than rounding."""
     if NUMBER.sub("#", _spaced(page)) != NUMBER.sub("#", _spaced(now)):
@@ -115,21 +147,6 @@ def commands_of(page: Path) -> list[str]:
     return list(dict.fromkeys(match["command"] for match in found))
 
 
-def tell_ages(some: Sequence[Path]) -> None:
-    """Print each command whose code has changed since its blocks were written, or says nothing."""
-    states, old = read_states(), 0
-    for command in dict.fromkeys(c for page in some for c in commands_of(page)):
-        rooms = changed_rooms(states.get(command, {}), state_of(command))
-        if not rooms:
-            continue
-        old += 1
-        more = f" and {len(rooms) - 4} more" if len(rooms) > 4 else ""
-        since = ", ".join(rooms[:4]) + more if command in states else "unknown since when"
-        print(f"! older than a change of its code: {command} ({since})")
-    print(f"{old} commands may have other figures; run python tools/pages.py PAGE" if old
-          else "no code of a page has changed since its blocks were written")  # fmt: skip
-
-
 def run(arguments: Sequence[str] | None = None) -> int:
     """Write the blocks, or compare them; the exit status."""
     parser = argparse.ArgumentParser(
@@ -137,11 +154,11 @@ def run(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("pages", nargs="*", type=Path, help="default: all that have a block")
     parser.add_argument("--check", action="store_true", help="write nothing")
-    parser.add_argument("--ages", action="store_true", help="run nothing, name those that are old")
+    parser.add_argument("--quick", action="store_true", help="compare in a minute; write nothing")
     args = parser.parse_args(arguments)
-    if args.ages:
-        tell_ages(args.pages or pages())
-        return 0
+    some = args.pages or pages()
+    if args.quick:
+        return tell(stale_commands(c for page in some for c in commands_of(page)), "stale")
     outputs: dict[str, str] = {}
 
     def output(command: str) -> str:
@@ -151,22 +168,57 @@ def run(arguments: Sequence[str] | None = None) -> int:
         return outputs[command]
 
     stale = []
-    for page in args.pages or pages():
+    for page in some:
         before = page.read_text(encoding="utf-8")
         now = with_blocks(before, output)
-        if agree(before, now):
-            continue
-        stale.append(page)
+        if not agree(before, now):
+            stale.append(str(page))
+            if not args.check:
+                page.write_text(now, encoding="utf-8")
         if not args.check:
-            page.write_text(now, encoding="utf-8")
-    # what was run just now is as the code is: written, or found in agreement
-    if not (args.check and stale):
-        own = [page for page in args.pages or pages() if page.resolve().is_relative_to(ROOT)]
-        ran = {c for page in own for c in commands_of(page) if c in outputs}
-        write_states(read_states() | {command: state_of(command) for command in sorted(ran)})
-    said = "stale" if args.check else "written"
-    print("\n".join(f"{said}: {page}" for page in stale) or "all pages agree with their commands")
-    return int(args.check and bool(stale))
+            stale += update_pictures(page)
+    if not args.check:
+        record_small_runs(page for page in some if page.resolve().is_relative_to(ROOT))
+    return tell(stale, "stale" if args.check else "written") and int(args.check)
+
+
+def tell(found: Sequence[str], said: str) -> int:
+    """Name what was found, and return whether there is something."""
+    print("\n".join(f"{said}: {one}" for one in found) or "all pages agree with their commands")
+    return int(bool(found))
+
+
+def stale_commands(commands: Iterable[str]) -> list[str]:
+    """Commands whose small run, or whose blocks where they are quick, differ from what is kept."""
+    return [command for command in dict.fromkeys(commands) if not is_fresh(command)]
+
+
+def is_fresh(command: str) -> bool:
+    """Whether the small run of a command gives what it gave when its blocks were written.
+
+    A command without a small run is quick: it is run, and compared with its blocks.
+    """
+    script = script_of(command)
+    if script in PROBES:
+        kept = record(script)
+        return kept.exists() and agree(kept.read_text(encoding="utf-8"), small_run(script))
+    now = printed(command)
+    blocks = (b for page in pages() for b in BLOCK.finditer(page.read_text(encoding="utf-8")))
+    own = [block[0] for block in blocks if block["command"] == command]
+    return all(agree(block, with_blocks(block, lambda _: now)) for block in own)
+
+
+def record_small_runs(some: Iterable[Path]) -> None:
+    """Keep what the small runs of these pages' scripts print, where it has changed."""
+    scripts = dict.fromkeys(script_of(command) for page in some for command in commands_of(page))
+    for script in scripts:
+        if script not in PROBES:
+            continue
+        print(f"small run of {script} ...", flush=True)
+        kept, now = record(script), small_run(script)
+        if not kept.exists() or not agree(kept.read_text(encoding="utf-8"), now):
+            kept.parent.mkdir(exist_ok=True)
+            kept.write_text(now, encoding="utf-8")
 
 
 if __name__ == "__main__":

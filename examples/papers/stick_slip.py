@@ -224,7 +224,10 @@ def informed() -> None:
 
 def draw(chosen: dict[str, float]) -> None:
     """Printed lines, and both springs on each soil."""
-    figure, axes = plt.subplots(1, 4, figsize=(13, 3.6), sharey=True, constrained_layout=True)
+    figure, axes = plt.subplots(1, 4, figsize=(13, 3.8), sharey=True, constrained_layout=True)
+    figure.suptitle(
+        "Vibration of the hub against slip at 0.3 rad/s: printed lines, and two springs"
+    )
     slip = np.linspace(0.0, 0.5, 26)[:, None]
     sudden = {key: value for key, value in chosen.items() if key != "softening"}
     at_once, gradual = simulated(sudden, slip), simulated(chosen, slip)  # (slips, soils)

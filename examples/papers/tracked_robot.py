@@ -71,6 +71,7 @@ def main() -> None:
         )
     at = Operating(slip=0.2, load=WANG2018.load)
     sensitivity_to_assumptions()
+    strength_of_clay()
     print("\nDistribution of the load at slip 0.2")
     print("soil  front wheel  belt between  rear wheel  sinkage mm  tension kN")
     for ground in COLOURS:
@@ -81,6 +82,11 @@ def main() -> None:
             f"{ground}  {balance.front:11.0%}  {balance.middle:12.0%}  {balance.rear:10.0%}"
             f"  {sunk:10.1f}  {1e-3 * balance.tension:10.1f}"
         )
+    track = replace(WANG2018.track, leaving=0.2)
+    balance = track_balance(Model(track), soil("wang2018/sand"), at)
+    print(f"sand with a slack belt, A_12 = 0.2: front wheel {balance.front:.0%}, belt between "
+          f"{balance.middle:.0%}, tension {1e-3 * balance.tension:.1f} kN")  # fmt: skip
+    mean_of_the_groups()
     grouser_gains()
     trim_by_moments()
     sinkage_under_pull()
@@ -159,6 +165,29 @@ def sensitivity_to_assumptions() -> None:
         print(f"{name:29s}" + "{:4.0f}  {:8.0f}  {:4.0f}  {:8.0f}".format(*found))
 
 
+def strength_of_clay() -> None:
+    """What friction and cohesion of clay would carry without a hump, and on which area."""
+    clay, track, weight = soil("wang2018/clay"), WANG2018.track, 2.0 * WANG2018.load
+    area = 2.0 * track.base * track.width
+    friction, cohesion = weight * np.tan(clay.friction_angle), area * clay.cohesion
+    lost, resistance, limit = 0.05, 60.0, 920.0  # N; 15 % above the printed 800 N
+    allowed = ((limit + resistance) / (1.0 - lost) - friction) / clay.cohesion
+    print("\nStrength of clay under both tracks: ", end="")
+    print(f"friction {friction:.0f} N, cohesion {cohesion:.0f} N on {area:.3f} m2.")
+    print(
+        f"Without a hump, with {lost:.0%} of it not mobilised and {resistance:g} N of resistance,"
+    )
+    print(f"a pull below {limit:g} N needs an area below {allowed:.3f} m2.")
+
+
+def mean_of_the_groups() -> None:
+    """The printed mean of k_p, and that of the likely number in place of a misprint."""
+    groups = [v for key, v in printed().items() if key.startswith("table1_") and key[-3:] == "_kp"]
+    others = np.sum(groups) - 117.08
+    means = [f"{(others + one) / 8.0:.1f} with {one:g}" for one in (117.08, 1170.8)]
+    print(f"\nMean of k_p over the eight groups, kPa/m^n: {', '.join(means)}")
+
+
 def grouser_gains() -> None:
     """What grousers add, and the largest pull, by where soil between them yields."""
     slips = np.linspace(0.01, 0.9, 90)
@@ -178,6 +207,9 @@ def grouser_gains() -> None:
     )  # both sides of the blocks of two tracks
     sides = [area * float(soil(f"wang2018/{ground}").cohesion) for ground in COLOURS]
     print("sides    {:5.0f}  {:5.0f}   cohesion on both sides of the sheared block".format(*sides))
+    residual = BEYOND_PEAK["clay"][0].residual
+    hump = residual * (1.0 + (1.0 / (residual * (1.0 - np.exp(-1.0))) - 1.0) * np.e)
+    print(f"hump             {hump:5.1f}   times the shear at small displacement, by eq. 6")
 
 
 def sinkage_under_pull() -> None:

@@ -19,6 +19,7 @@ from soilml.gap import gap
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.papers import comin2017_slip as chapter
+from soilml.physics.gears.wheel_leg_foot import Midstance
 from soilml.physics.pull_efficiency import CLASSES, THRESHOLDS, pull_efficiency, traffic_class
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import GROUNDS
@@ -68,6 +69,7 @@ def run() -> None:
     fusion(axes[1, 0])
     mobility(axes[1, 1])
     own_gap()
+    what_is_assumed()
     OUT.mkdir(parents=True, exist_ok=True)
     figure.savefig(OUT / "wheel_leg_slip.png", dpi=110)
     print(f"\nfigure: {OUT / 'wheel_leg_slip.png'}")
@@ -121,6 +123,35 @@ def torque_slip(axes: plt.Axes) -> None:
     axes.legend(fontsize=8, loc="upper left", ncols=2)
 
 
+def what_is_assumed() -> None:
+    """Print what the foot carries, and what follows from printed coefficients alone."""
+    chord, rise, length = 0.04, 0.0055, 0.18
+    half = 0.5 * chord
+    middle = (half**2 + rise**2) / (2.0 * rise)
+    feet = {
+        "all of it ahead of the leg": FOOT,
+        "centred on the leg": Midstance(
+            radius=middle, width=0.029, arc=np.arcsin(half / middle), leg_length=length,
+            tip_height=rise,
+        ),
+    }  # fmt: skip
+    print("\nThe foot of 4 cm, and the largest load (N) that each soil carries at any slip")
+    head = "".join(f"{name:>8}" for name in NAMES)
+    print(f"  {'arc':28s}{'R cm':>6}{'theta_1w deg':>14}{head}")
+    for name, foot in feet.items():
+        at = Operating(slip=SLIPS[:, None], load=1e4)
+        most = Model(foot)(four_soils().soil, at).load.max(axis=0)
+        cells = "".join(f"{value:8.0f}" for value in np.asarray(most))
+        print(f"  {name:28s}{100 * foot.radius:6.1f}{np.rad2deg(foot.arc):14.1f}{cells}")
+    known = four_soils()
+    a, _ = TORQUE_SLIP["empirical"].line(known.soil.friction_angle, known.normal_stiffness)
+    told = ", ".join(f"{value:.2f} on {name}" for value, name in zip(a, NAMES, strict=True))
+    planar, linear = VIBRATION_SLIP["planar"], VIBRATION_SLIP["linear"]
+    print(f"\nPrinted coefficients: intercepts of the empirical torque model {told};\n"
+          f"c_I of the linear vibration model is the planar one's at "
+          f"{(linear.c_i - planar.c_i) / planar.c_k:.2f} kN/m")  # fmt: skip
+
+
 def vibration_slip(axes: plt.Axes) -> None:
     """One stance of the rotating spring, and its amplitude against slip."""
     friction = chapter.FRICTION
@@ -164,7 +195,7 @@ def fusion(axes: plt.Axes) -> None:
     print("\nOne stance on each of 400 simulated test soils")
     names = (*SENSORS, *RULES)
     for k, name in enumerate(PROPERTIES):
-        unit, scale = (("degrees", 180.0 / np.pi), ("N/cm^2", 1e-4))[k]
+        unit, scale = (("degrees", 180.0 / np.pi), ("N/cm²", 1e-4))[k]
         estimators = fit_estimators(train, name)
         found = score_estimators(estimators, test)
         print(f"  {name.replace('_', ' '):<24} {'RMSE':>8} {'std':>8} {'in 95 %':>8}  {unit}")

@@ -7,6 +7,7 @@ prints slip and sinkage by legs and feet, and draws demo/papers/wheel_legs.png.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import matplotlib
@@ -16,9 +17,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.collections import LineCollection
 
-from soilml.systems.wheel_legs.gait_metrics import compare_feet, compare_legs
-from soilml.systems.wheel_legs.geometry import wheel_leg
-from soilml.systems.wheel_legs.resistive_force import LinearGround
+from soilml.systems.wheel_legs.gait_metrics import compare_feet, compare_legs, gait_metrics
+from soilml.systems.wheel_legs.geometry import MAX_LEGS, wheel_leg
+from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 from soilml.systems.wheel_legs.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
 from soilml.systems.wheel_legs.walk import plate_stresses, walk
 
@@ -29,6 +30,7 @@ STATE_MARKS = {"loose": "v", "medium": "o", "dense": "^"}
 SOIL_COLOURS = ("#d1495b", "#edae49", "#2e86ab", "#3a7d44")
 SOIL, EDGE = "#efe6d5", "#b9a37e"
 CM = 100.0
+LEGS = range(1, MAX_LEGS + 1)
 
 
 def figures(legs, feet, soils, fit):
@@ -72,6 +74,32 @@ def figures(legs, feet, soils, fit):
         f"{estimate.friction_angle_std:.2f} rad, "
         f"standard deviation of the soils {np.std(soils.friction_angle):.2f}"
     )
+
+
+def unprinted():
+    """How figure 5 depends on ground and body, and what eq. 29 says of SSC-1."""
+    print("\nWhat is not printed: number of legs at which the largest sinkage first drops by 5 %")
+    cases = {
+        "as assumed: 0.7 N/cm3, body 2 cm below the hub": (0.7e6, {}),
+        "ground of 0.4 N/cm3": (0.4e6, {}),
+        "ground of 1.0 N/cm3": (1.0e6, {}),
+        "body 5 cm below the hub": (0.7e6, {"clearance": 0.05}),
+        "body of twice the area": (0.7e6, {"body_area": 0.08}),
+        "legs bent forwards": (0.7e6, {"leg": replace(wheel_leg().leg, arc=-0.03)}),
+    }
+    walkers = [wheel_leg("none", legs=n, **change) for _, change in cases.values() for n in LEGS]
+    grounds = [LinearGround(stiffness=a) for a, _ in cases.values() for _ in LEGS]
+    deepest = gait_metrics(walk(walkers, grounds)).max_sinkage.reshape(len(cases), -1)
+    for name, sunk in zip(cases, deepest, strict=True):
+        drops = np.flatnonzero(1.0 - sunk[1:] / sunk[:-1] >= 0.05)
+        print(f"  {name:48s} {2 + drops[0] if drops.size else 'none'}")
+    soil, tip = GROUNDS["SSC-1"], wheel_leg("LTF").plates()
+    area = np.sum(tip.area[10:30])  # of the foot of one leg
+    pressed = (3.75 * 9.81 / area - soil.offset) / soil.stiffness
+    by_angle, by_stress = (soil.friction_angle - 0.76) / -0.07, 3.39e4 / soil.normal_stiffness
+    print(f"\nSinkage on SSC-1, cm: {by_angle:.1f} by s_I and s_Z of eq. 29, ", end="")
+    print(f"{by_stress:.1f} by s_sigma,")
+    print(f"{pressed * CM:.1f} where 3.75 kg stand on the {area * 1e4:.1f} cm2 of one LTF")
 
 
 def strip(axes):
@@ -218,6 +246,7 @@ def main():
     soils = simulate_sinkage()
     fit = fit_simulated_sinkage(soils)
     figures(legs, feet, soils, fit)
+    unprinted()
     figure = plt.figure(figsize=(13, 8.2), layout="constrained")
     grid = figure.add_gridspec(2, 3, height_ratios=[0.95, 1.0])
     strip(figure.add_subplot(grid[0, :]))

@@ -7,9 +7,12 @@ when it slips, at the four slips above zero. Pull efficiency: a wheel 0.18 m wid
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache, partial
+from importlib import resources
 
 import numpy as np
 
@@ -39,6 +42,7 @@ from soilml.systems.wheel_legs.stances import (
 )
 
 WIDTH, SLIP = 0.18, 0.2  # Width (m) and slip of the rover's wheel, neither printed
+WHEEL, AT = Model(Wheel(radius=0.15, width=WIDTH)), Operating(slip=SLIP, load=50.0 * GRAVITY)
 #: Springs to which the vibration-slip models are fitted: N/m, rad, and the friction angle.
 STIFFNESSES = np.linspace(3000.0, 6000.0, 7)
 DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))
@@ -89,9 +93,7 @@ def fused_soil(name: str) -> FusedEstimate:
 @cache
 def efficiency(name: str) -> float:
     """Pull efficiency (%) of a wheel of the 300 kg rover, one of six, on a soil of table I."""
-    at = Operating(slip=SLIP, load=50.0 * GRAVITY)
-    wheel = Model(Wheel(radius=0.15, width=WIDTH))
-    return 100.0 * float(pull_efficiency(wheel, soil(f"comin2017/{name}"), at))
+    return 100.0 * float(pull_efficiency(WHEEL, soil(f"comin2017/{name}"), AT))
 
 
 def constant_intercept() -> float:
@@ -134,6 +136,54 @@ def _goodness(
     return fit().goodness[part]
 
 
+@cache
+def printed() -> dict[str, float]:
+    """The numbers of this chapter's table of numbers, by key."""
+    text = resources.files("soilml.papers").joinpath("comin2017_slip.csv").read_text("utf-8")
+    return {row["key"]: float(row["published"]) for row in csv.DictReader(text.splitlines())}
+
+
+#: Models of table VIII of which table IX fuses the estimates, in the order of its weights.
+FUSED = ("ts", "vl", "s")
+
+
+def fused_error(ground: str, part: str, name: str) -> float:
+    """Mean error (%) of a property on a soil: the weights of table IX on errors of table VIII."""
+    weights = (printed()[f"t9_{sense}_{name}_weight"] for sense in "tvs")
+    errors = (printed()[f"t8_{model}_{ground}_{part}_mean"] for model in FUSED)
+    return sum(w * e for w, e in zip(weights, errors, strict=True))
+
+
+def _error_gain(sense: int, part: str, name: str) -> float:
+    """Change of the size of the mean error (%) by fusion, over all soils."""
+    alone = printed()[f"t8_{FUSED[sense]}_all_soils_{part}_mean"]
+    return abs(fused_error("all_soils", part, name)) - abs(alone)
+
+
+@cache
+def characterised_efficiency(name: str) -> float:
+    """Pull efficiency (%) on a soil of table I with the fused mean errors of its properties."""
+    known = soil(f"comin2017/{name}")
+    angle = 1.0 + fused_error(name, "phi", "friction") / 100.0
+    stiffness = 1.0 + fused_error(name, "sigma", "stiffness") / 100.0
+    found = replace(known, friction_angle=known.friction_angle * angle, kphi=known.kphi * stiffness)
+    return 100.0 * float(pull_efficiency(WHEEL, found, AT))
+
+
+def _mean_by_others(torque: str) -> float:
+    """Change of the mean error of vibration, linear, from the printed ones of other pairs.
+
+    The change of torque less that of vibration is the difference of their own mean errors, which
+    the empirical model shows for both models of vibration.
+    """
+
+    def apart(pair: str) -> float:
+        return printed()[f"t6_{pair}_mean_t"] - printed()[f"t6_{pair}_mean_v"]
+
+    between = apart("el") - apart("ep")
+    return printed()[f"t6_{torque}l_mean_t"] - (apart(f"{torque}p") + between)
+
+
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "t4_tt_c_tau": partial(_torque, "friction", 0),
@@ -164,5 +214,11 @@ for _name in STD:
     for _index, _sense in enumerate("tvs"):
         COMPUTED[f"t9_{_sense}_{_name}_weight"] = partial(_soil_weight, _name, _index)
         COMPUTED[f"t9_{_sense}_{_name}_std"] = partial(_soil_gain, _name, _index)
+        COMPUTED[f"t9_{_sense}_{_name}_mean"] = partial(
+            _error_gain, _index, "phi" if _name == "friction" else "sigma", _name
+        )
 for _soil in ("ssc-1", "ssc-2", "ssc-3", "es-3"):
     COMPUTED[f"t10_true_{_soil}"] = partial(efficiency, _soil)
+    COMPUTED[f"t10_mean_{_soil}"] = partial(characterised_efficiency, _soil)
+for _torque_name in "ts":
+    COMPUTED[f"t6_{_torque_name}l_mean_v"] = partial(_mean_by_others, _torque_name)

@@ -1,5 +1,7 @@
 """Blocks of pages are what their commands print."""
 
+import os
+import subprocess
 import sys
 from pathlib import Path
 
@@ -8,13 +10,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
-import page_ages  # noqa: E402
+import page_probes  # noqa: E402
 import pages  # noqa: E402
 
 OUTPUT = "Title\n\nRates by soil, %\n\n soil  rate\n ----  ----\n sand  12.3\n\nEnd\n"
 PAGE = "Text.\n\n<!-- output: python x.py | Rates | 2 -->\nold\n<!-- end of output -->\n\nMore.\n"
-#: Pages whose commands take seconds; `python tools/pages.py --check` compares all.
-QUICK = ("docs/papers/nagatani2009.md",)
 
 
 def test_a_block_becomes_the_paragraphs_that_its_command_prints():
@@ -50,59 +50,82 @@ def test_a_stale_page_is_told_and_written(tmp_path, capsys):
     page.write_text(f"<!-- output: {command} | Rates -->\nRates: 5\n<!-- end of output -->\n")
     assert pages.run(["--check", str(page)]) == 1
     assert "stale" in capsys.readouterr().out
-    before = page_ages.read_states()
     assert pages.run([str(page)]) == 0
-    assert page_ages.read_states() == before  # of another repository
     assert "Rates: 7" in page.read_text()
     assert pages.run(["--check", str(page)]) == 0
 
 
-def write(root, name, text):
-    path = root / name
-    path.parent.mkdir(parents=True, exist_ok=True)
+SCRIPT = """\
+G = 9.81
+COUNT = 1000
+
+
+def weight(mass):
+    return mass * G
+
+
+def run():
+    print(f"weight of {COUNT} kg: {weight(COUNT):.1f} N")
+"""
+
+
+def smaller(script):
+    script.COUNT = 2
+
+
+def ran_small(path, text, capsys):
     path.write_text(text)
+    page_probes.run_small(path, smaller)
+    return capsys.readouterr().out
 
 
-def state_after(root, name="soilml/physics/model.py", text=None):
-    """The state of a script once a file of a small repository has a new text."""
-    if text is not None:
-        write(root, name, text)
-    for cached in (
-        page_ages._imported,
-        page_ages._tree,
-        page_ages._code_hash,
-        page_ages._data_hash,
-    ):
-        cached.cache_clear()
-    return page_ages.state_of("python examples/show.py", root)
+def test_a_small_run_tells_another_number_and_no_new_arrangement(tmp_path, capsys):
+    path = tmp_path / "script.py"
+    kept = ran_small(path, SCRIPT, capsys)
+    assert kept == "weight of 2 kg: 19.6 N\n"
+    arranged = SCRIPT.replace("mass * G", "G * (mass + mass) / 2.0").replace("weight(", "force(")
+    assert pages.agree(kept, ran_small(path, arranged, capsys))
+    assert not pages.agree(kept, ran_small(path, SCRIPT.replace("9.81", "1.62"), capsys))
 
 
-def test_a_command_is_as_old_as_the_rooms_that_it_reaches(tmp_path):
-    write(tmp_path, "examples/show.py", "def run():\n    from soilml.cli import main\n")
-    write(tmp_path, "soilml/cli/__init__.py", "from soilml.physics import model\n")
-    write(tmp_path, "soilml/physics/model.py", '"""Old."""\nG = 9.81  # m/s^2\n')
-    write(tmp_path, "soilml/physics/soils.csv", "c\n1\n")
-    write(tmp_path, "soilml/gap/other.py", "x = 1\n")
-    then = state_after(tmp_path)
-    assert set(then) == {"examples/show.py", "soilml/cli", "soilml/physics"}
-    # words, comments and rooms out of reach do not count
-    assert state_after(tmp_path, text='"""New."""\n\nG = 9.81\n') == then
-    assert state_after(tmp_path, "soilml/gap/other.py", "x = 2\n") == then
-    for name, text in (
-        ("soilml/physics/model.py", "G = 1.62\n"),
-        ("soilml/physics/soils.csv", "2"),
-    ):
-        now = state_after(tmp_path, name, text)
-        assert page_ages.changed_rooms(then, now) == ["soilml/physics"]
-        then = now
+CHANGED = """\
+import page_probes
+from soilml.physics import contact
 
-
-def test_each_recorded_state_is_of_a_command_of_a_page():
-    commands = {c for page in pages.pages() for c in pages.commands_of(page)}
-    assert set(page_ages.read_states()) <= commands
+whole = contact.mobilised_fraction
+contact.mobilised_fraction = lambda displacement, soil: {factor} * whole(displacement, soil)
+path = "{script}"
+page_probes.run_small(page_probes.ROOT / path, page_probes.PROBES[path])
+"""
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("page", QUICK)
-def test_pages_of_quick_commands_are_not_stale(page):
-    assert pages.run(["--check", str(ROOT / page)]) == 0
+@pytest.mark.parametrize(("factor", "same"), [(1.0, True), (0.95, False)])
+def test_other_physics_changes_what_a_small_run_prints(factor, same):
+    """A shear stress 5 % smaller, in the logs of a wheel-leg."""
+    script = "examples/import/wheel_leg.py"
+    text = CHANGED.format(factor=factor, script=script)
+    done = subprocess.run(
+        [sys.executable, "-c", text], cwd=ROOT, capture_output=True, text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT / "tools")}, check=True,
+    )  # fmt: skip
+    now = page_probes.without_folders(done.stdout)
+    assert pages.agree(page_probes.record(script).read_text(), now) is same
+
+
+def commands():
+    return list(dict.fromkeys(c for page in pages.pages() for c in pages.commands_of(page)))
+
+
+def test_each_small_run_is_of_a_script_of_a_page_and_is_recorded():
+    scripts = {page_probes.script_of(command) for command in commands()}
+    assert set(page_probes.PROBES) <= scripts
+    records = {page_probes.record(script) for script in page_probes.PROBES}
+    assert set(page_probes.RECORDS.iterdir()) == records
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", commands())
+def test_no_page_is_stale(command):
+    """`python tools/pages.py PAGE` runs the whole command, and writes block and record."""
+    assert pages.is_fresh(command), f"run again, with its page: {command}"

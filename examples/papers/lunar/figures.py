@@ -101,10 +101,8 @@ def _parameter(axis: Any, sweep: Sweep, k: int) -> None:
 
 
 def _pulls(axis: Any, sweep: Sweep) -> None:
-    mean, low, high = sweep.pulls["prior"]
+    prior, low, high = sweep.pulls["prior"]
     axis.fill_between(sweep.slip, low, high, color=GREY, lw=0)
-    axis.plot(sweep.slip, mean, color="0.55", lw=1.2)
-    mean_of_prior = mean[-1]
     mean, low, high = sweep.pulls["one"]
     axis.fill_between(sweep.slip, low, high, color=ONE, alpha=0.25, lw=0)
     axis.plot(sweep.slip, mean, color=ONE, lw=1.2)
@@ -115,9 +113,14 @@ def _pulls(axis: Any, sweep: Sweep) -> None:
         _, low, high = sweep.pulls[name]
         axis.fill_between(sweep.slip, low, high, color=color, lw=0, alpha=0.6)
     axis.plot(sweep.slip, sweep.pull, color=TRUTH, lw=1.4, ls="--")
-    axis.annotate("prior's mean", (sweep.slip[-1], mean_of_prior), (6, -3), color="0.4",
-                  textcoords="offset points", fontsize=9)  # fmt: skip
-    axis.set_title("drawbar pull predicted from these, N (bands and lines: 90 %)")
+    axis.plot(sweep.slip, prior, color="0.3", lw=1.2, ls=":")
+    for said, height, color in (
+        ("prior's mean", prior[-1], "0.3"),
+        ("set posterior,\nboth ends", sweep.pulls["all"][2][-1], ALL),
+    ):
+        axis.annotate(said, (sweep.slip[-1], height), (6, 0), color=color, va="center",
+                      textcoords="offset points", fontsize=9)  # fmt: skip
+    axis.set_title("drawbar pull predicted from these, N (bands: 90 %)")
     axis.set_xlim(0.19, 0.68)
 
 

@@ -1,0 +1,207 @@
+"""Small runs of the scripts whose figures stand in pages, beside what they printed when these were.
+
+A script that takes long is run here with fewer rows, soils or seeds, in seconds. `tools/pages.py`
+records what that prints whenever it writes or confirms the blocks of the script, and a test prints
+it again: other numbers mean that the page may be stale, a new arrangement of the code does not.
+
+python tools/page_probes.py examples/papers/slip_models.py    print the small run of a script
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+ROOT = Path(__file__).parents[1]
+RECORDS = ROOT / "tools" / "page_probes"
+
+
+#: Makes a script small; gives what is called in place of its own beginning, where that is needed.
+Shrink = Callable[[ModuleType], Callable[[], object] | None]
+_MARK = "page_probe_"  # In names of folders, which differ from run to run, and so do their lines
+
+
+def _folder() -> Path:
+    return Path(tempfile.mkdtemp(prefix=_MARK))
+
+
+def _nothing(*_: Any, **__: Any) -> None:
+    """In place of a function that draws."""
+
+
+def _lunar(script: ModuleType) -> None:
+    import lunar.bearing
+    import lunar.evaluation
+
+    whole, folder = script.command, _folder()
+
+    def command(*words: str) -> None:
+        """Few rows and centres, and no set posterior, which alone trains for minutes."""
+        if words[0] == "generate":
+            return whole(*words, "--rows", "1200")
+        text = Path(words[1]).read_text(encoding="utf-8").partition("[set_posterior]")[0]
+        (folder / "spec.toml").write_text(text.replace("150", "30"), encoding="utf-8")
+        return whole("train", str(folder / "spec.toml"), *words[2:])
+
+    script.command, script.OUT, script.SLIPS = command, folder, 9
+    lunar.evaluation.SOILS, lunar.evaluation.FITTED, lunar.bearing.SOILS = 6, 2, 4
+    lunar.bearing.FACTORS = {"half": 0.5}
+    script.Estimator.on = lambda file, **_: file
+    script.draw_sweep = script.draw_posteriors = script.show_information = _nothing
+
+
+def _slip_models(script: ModuleType) -> Callable[[], object]:
+    whole, folder = script.smaller, _folder()
+
+    def smaller(name: str) -> Any:
+        spec = whole(name)
+        for reader in spec.regressors:
+            if "centres" in reader.model.get_params():
+                reader.model.set_params(centres=15)
+        return spec
+
+    def start() -> None:
+        for cells in script.slip_of(folder, script.UNKNOWN)[0]:
+            print(*cells)
+        for name, values in script.soil_of(folder, script.UNKNOWN).items():
+            print(name, values.round(3))
+
+    script.smaller, script.ROWS, script.TEST_ROWS = smaller, 450, 200
+    return start
+
+
+def _springs(script: ModuleType) -> None:
+    """Nine springs in place of 63."""
+    chapter = script.chapter
+    chapter.STIFFNESSES, chapter.DROPS = chapter.STIFFNESSES[::3], chapter.DROPS[::4]
+
+
+def _stick_slip(script: ModuleType) -> None:
+    _springs(script)
+    script.STIFFNESSES, script.DROPS, script.ROWS, script.STRAIGHT = (4000.0,), (0.15, 0.3), 300, 0
+    script.MECHANISMS = {"gradual": {"softening": (0.03,)}}
+    script.draw = _nothing
+
+
+def _wheel_leg_slip(script: ModuleType) -> Callable[[], object]:
+    _springs(script)
+    script.REALISATIONS = 1
+    stances, soils = script.simulate_stances, script.sample_soils
+    script.simulate_stances = lambda count, seed: stances(40, seed)
+    script.sample_soils = lambda count, seed: soils(20, seed)
+    script.OUT = _folder()
+    return script.run  # type: ignore[no-any-return]
+
+
+def _wheel_legs(script: ModuleType) -> None:
+    from functools import partial
+
+    script.compare_feet = partial(script.compare_feet, (4e5, 7e5, 1e6), ("LTF", "SRF"))
+    script.compare_legs = partial(script.compare_legs, turns=1.0)
+    script.strip, script.OUT = _nothing, _folder() / "picture.png"
+
+
+def _import_wheel_leg(script: ModuleType) -> None:
+    script.FOLDER, script.picture = _folder(), _nothing
+    script.STANCES, script.SLIPS, script.SEEDS = 5, (0.2,), (2,)
+
+
+def _slip_compare(script: ModuleType) -> Callable[[], object]:
+    import numpy as np
+
+    whole, count = script.read_table, 6
+    script.PARTS = {"equal rim speeds": count}
+
+    def read_table(*words: Any) -> Any:
+        table = whole(*words)
+        return table.rows(np.arange(count * len(set(table["wheel"]))))
+
+    script.read_table = read_table
+    return script.compare  # type: ignore[no-any-return]
+
+
+def _c_review(script: ModuleType) -> None:
+    """Memory alone: the others need a compiler, an emulator, or half a minute."""
+    script.SETS = ("wheel_small",)
+    script.stack = script.instructions = script.precision = lambda folder: ""
+
+
+def _coupled(script: ModuleType) -> Callable[[], object]:
+    script.SIZES, script.TEST = (30,), 300
+    return lambda: script.run(2)
+
+
+def _stream_order(script: ModuleType) -> None:
+    script.CASES = ((0, 6, 3), (4, 8, 2))
+
+
+def _few_rows(script: ModuleType) -> Callable[[], object]:
+    script.SIZES, script.ROWS_OF_THE_TEST = ((20, 1),), 200
+    whole = script.read_recipe
+    script.read_recipe = lambda name: whole(name).sized(1500, 4)
+    script.SOILS = {"unknown": script.SOILS["unknown"]}
+    return lambda: script.run(1)
+
+
+#: What makes a script small, by its path.
+PROBES: dict[str, Shrink] = {
+    "examples/papers/lunar_lssvm.py": _lunar,
+    "examples/papers/slip_models.py": _slip_models,
+    "examples/papers/stick_slip.py": _stick_slip,
+    "examples/papers/wheel_leg_slip.py": _wheel_leg_slip,
+    "examples/papers/wheel_legs.py": _wheel_legs,
+    "examples/import/wheel_leg.py": _import_wheel_leg,
+    "examples/slip/compare.py": _slip_compare,
+    "bench/c_review.py": _c_review,
+    "bench/coupled.py": _coupled,
+    "bench/few_rows.py": _few_rows,
+    "bench/stream_order.py": _stream_order,
+}
+
+
+def script_of(command: str) -> str:
+    """The script that a command of a block runs; "" for a command of soilml."""
+    return next((word for word in shlex.split(command) if word.endswith(".py")), "")
+
+
+def small_run(script: str) -> str:
+    """What the small run of a script prints, in a process of its own, without names of folders."""
+    done = subprocess.run(
+        [sys.executable, __file__, script], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        sys.exit(f"the small run of {script} failed:\n{done.stderr}")
+    return without_folders(done.stdout)
+
+
+def without_folders(output: str) -> str:
+    """An output without the lines that name a folder of one run."""
+    return "\n".join(line for line in output.splitlines() if _MARK not in line) + "\n"
+
+
+def record(script: str) -> Path:
+    """The file with what the small run printed when the blocks of the script were written."""
+    return RECORDS / f"{script.removesuffix('.py').replace('/', '_')}.txt"
+
+
+def run_small(path: Path, shrink: Shrink) -> None:
+    """Run a script that `shrink` has made small."""
+    sys.path.insert(0, str(path.parent))
+    spec = importlib.util.spec_from_file_location("probed", path)
+    assert spec is not None and spec.loader is not None
+    script = sys.modules["probed"] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    own = "run" if hasattr(script, "run") else "main"
+    start = shrink(script) or getattr(script, own)
+    start()
+
+
+if __name__ == "__main__":
+    run_small(ROOT / sys.argv[1], PROBES[sys.argv[1]])
