@@ -48,6 +48,7 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 FRACTION, UNITS = 0.02, 1.5
 #: Mean difference of pixels, 0 to 1, from which on a picture is another one and not another font.
 OTHER_PICTURE = 0.003
+SKIPPED = 77  # Exit status of a command that needs what is not installed here
 
 
 def pages() -> list[Path]:
@@ -56,8 +57,10 @@ def pages() -> list[Path]:
     return sorted(page for page in found if BLOCK.search(page.read_text(encoding="utf-8")))
 
 
-def printed(command: str) -> str:
+def printed(command: str) -> str | None:
     """The output of a command, run in the repository by this interpreter.
+
+    None where something that it needs is not installed here: its blocks stay as they are.
 
     Raises
     ------
@@ -68,6 +71,8 @@ def printed(command: str) -> str:
     if words[0] == "python":
         words[0] = sys.executable
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode == SKIPPED:
+        return print(f"left as it is: {command}: {done.stderr.strip()}")
     if done.returncode:
         sys.exit(f"{command} failed:\n{done.stderr}")
     return done.stdout
@@ -89,12 +94,14 @@ def paragraphs(output: str, start: str, count: int) -> str:
     sys.exit(f"no paragraph of the output begins with {start!r}")
 
 
-def with_blocks(text: str, output: Callable[[str], str]) -> str:
+def with_blocks(text: str, output: Callable[[str], str | None]) -> str:
     """The text of a page with each block as `output` of its command has it now."""
 
     def block(match: re.Match[str]) -> str:
-        count = int(match["count"] or 1)
-        now = paragraphs(output(match["command"]), match["start"], count)
+        said = output(match["command"])
+        if said is None:
+            return match[0]
+        now = paragraphs(said, match["start"], int(match["count"] or 1))
         head = match[0].partition("\n")[0]
         return f"{head}\n```text\n{now}\n```\n<!-- end of output -->"
 
@@ -159,9 +166,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     some = args.pages or pages()
     if args.quick:
         return tell(stale_commands(c for page in some for c in commands_of(page)), "stale")
-    outputs: dict[str, str] = {}
+    outputs: dict[str, str | None] = {}
 
-    def output(command: str) -> str:
+    def output(command: str) -> str | None:
         if command not in outputs:
             print(f"{command} ...", flush=True)
             outputs[command] = printed(command)
@@ -193,16 +200,21 @@ def stale_commands(commands: Iterable[str]) -> list[str]:
     return [command for command in dict.fromkeys(commands) if not is_fresh(command)]
 
 
+def has_small_run(command: str) -> bool:
+    """Whether the script of a command is judged by a small run."""
+    return script_of(command) in PROBES
+
+
 def is_fresh(command: str) -> bool:
     """Whether the small run of a command gives what it gave when its blocks were written.
 
     A command without a small run is quick: it is run, and compared with its blocks.
     """
-    script = script_of(command)
-    if script in PROBES:
+    if has_small_run(command):
+        script = script_of(command)
         kept = record(script)
         return kept.exists() and agree(kept.read_text(encoding="utf-8"), small_run(script))
-    now = printed(command)
+    now = printed(command)  # None, and all blocks fresh, where something is not installed
     blocks = (b for page in pages() for b in BLOCK.finditer(page.read_text(encoding="utf-8")))
     own = [block[0] for block in blocks if block["command"] == command]
     return all(agree(block, with_blocks(block, lambda _: now)) for block in own)

@@ -85,3 +85,15 @@ def test_the_five_parameters_are_those_of_the_paper_and_one_group_is_refused():
         identify_groups(CASE, [table])
     with pytest.raises(InputError, match="must carry"):
         simulate_group(CASE, np.asarray([0.3]), 1e6, np.random.default_rng(0))
+
+
+def test_the_average_as_a_fit_says_what_is_not_known_and_stays_within_the_groups(groups):
+    fit = groups.average
+    np.testing.assert_array_equal(fit.values, groups.mean)
+    np.testing.assert_allclose(fit.std, groups.std)
+    assert fit.rows_used == sum(one.rows_used for one in groups.fits)
+    assert ("not-identified", ("cohesion",)) in [(w.code, w.about) for w in fit.warnings]
+    low, high = fit.interval
+    ends = np.asarray([one.interval for one in groups.fits])
+    assert (low >= ends[:, 0].min(axis=0)).all() and (high <= ends[:, 1].max(axis=0)).all()
+    assert (low < fit.values).all() and (fit.values < high).all()
