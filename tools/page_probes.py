@@ -29,7 +29,7 @@ _MARK = "page_probe_"  # In names of folders, which differ from run to run, and 
 
 
 def _folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix=_MARK))
+    return Path(tempfile.mkdtemp())
 
 
 def _nothing(*_: Any, **__: Any) -> None:
@@ -192,6 +192,7 @@ def record(script: str) -> Path:
 
 def run_small(path: Path, shrink: Shrink) -> None:
     """Run a script that `shrink` has made small."""
+    tempfile.template = _MARK
     sys.path.insert(0, str(path.parent))
     spec = importlib.util.spec_from_file_location("probed", path)
     assert spec is not None and spec.loader is not None
