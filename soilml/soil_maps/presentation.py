@@ -18,7 +18,9 @@ from soilml.report.terminal import shown_column, significant
 from soilml.soil_maps.raster import geotiff, nav2_files
 from soilml.soil_maps.workflow import SoilMap, parameter_moments
 
-SIZE = (11.0, 8.5)  # Width and height of the figure, inches
+#: Rows and columns of panels, and width and height in inches, of maps of which ways: a map that is
+#: higher than wide by this factor has its panels beside each other.
+WIDE, TALL, TALL_FROM = (2, 2, (11.0, 8.5)), (1, 4, (14.0, 5.5)), 1.3
 FILES = ("map.tif", "headings.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 
 
@@ -134,12 +136,18 @@ def map_files(
     return {folder / name: content for name, content in files.items()}
 
 
+def map_panels(found: SoilMap) -> tuple[int, int, tuple[float, float]]:
+    """Rows and columns of the panels of `plot_map`, and the size of the figure in inches."""
+    height, width = found.grid.shape
+    return TALL if height > TALL_FROM * width else WIDE
+
+
 def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
     """Draw friction angle and its uncertainty, the probability of climbing and the slip needed.
 
     Without a rover, cohesion and its uncertainty are in the place of the last two. See `take_axes`.
     """
-    panels = take_axes(ax, 2, 2, SIZE)
+    panels = take_axes(ax, *map_panels(found))
     mean, std = found.moments
     shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
     for i in (1, 0)[: 1 if found.ability is not None else 2]:

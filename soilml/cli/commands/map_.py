@@ -89,7 +89,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
     from soilml.report.figure_style import save_png
     from soilml.soil_maps.drive import NEEDED
-    from soilml.soil_maps.presentation import FILES, SIZE, map_files, map_text, plot_map
+    from soilml.soil_maps.presentation import FILES, map_files, map_panels, map_text, plot_map
     from soilml.soil_maps.raster import read_elevation
     from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
 
@@ -113,7 +113,7 @@ def run(args: argparse.Namespace) -> int:
     if args.out is not None:
 
         def draw(path: Path) -> None:
-            save_png(lambda ax: plot_map(found, ax), 2, 2, SIZE, path)
+            save_png(lambda ax: plot_map(found, ax), *map_panels(found), path)
 
         folder = Path(args.out)
         files = map_files(found, folder, args.epsg, draw)
