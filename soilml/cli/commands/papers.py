@@ -120,8 +120,8 @@ def _summary(found: list[Comparison], counts: dict[str, dict[str, int]]) -> str:
     if not orders:
         return table
     return f"{table}\n" + _wrap(
-        f"Of the {len(orders)} reproduced, {sum(orders)} are an order or a count that a text or a "
-        f"figure states, and {len(orders) - sum(orders)} a quantity."
+        f"Of those reproduced, {sum(orders)} are an order or a count that a text or a figure "
+        f"states, and {len(orders) - sum(orders) or 'none'} a quantity."
     )
 
 
