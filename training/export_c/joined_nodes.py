@@ -34,11 +34,33 @@ def joined(nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str
     known: Constants by name, to which new ones are added.
     outputs: Names that are needed in the end.
     """
-    found = with_errors_integrated_out(nodes, known, outputs)
+    kept = frozenset(outputs)
+    found = with_errors_integrated_out(_with_sums_of_squares(nodes, kept), known, outputs)
     found = _with_gauss_newton_sums(_with_products_of_rows(found, known), known)
     found = _with_factors(_with_errors_apart(found, known), known)
-    found = _without_zeros(_without_repeats(found, frozenset(outputs)), known)
+    found = _without_zeros(_without_repeats(found, kept), known)
     return needed_nodes(found, list(outputs))[0]
+
+
+def _with_sums_of_squares(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]:
+    """The nodes, with sums of a value times itself as one node each, which needs no product."""
+    from onnx import helper
+
+    users, makers = users_of(nodes), makers_of(nodes)
+    new: dict[str, list[Any]] = {}
+    for node in nodes:
+        product: Any = makers.get(node.input[0]) if node.op_type == "ReduceSum" else None
+        if product is None or product.op_type != "Mul" or len(set(product.input)) > 1:
+            continue
+        name = product.output[0]
+        if name in outputs or len(users[name]) != 1:
+            continue
+        squares = helper.make_node(
+            "ReduceSumSquare", [product.input[0], *node.input[1:]], node.output
+        )
+        squares.attribute.extend(node.attribute)
+        new[name], new[node.output[0]] = [], [squares]
+    return [made for node in nodes for made in new.get(node.output[0], [node])]
 
 
 def _without_repeats(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]:

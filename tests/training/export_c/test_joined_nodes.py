@@ -41,6 +41,15 @@ def test_rows_of_two_matrices_stay_apart():
     assert kinds(made) == ["Gather", "Gather", "Mul"]
 
 
+def test_a_sum_of_squares_needs_no_product():
+    nodes = [node("Mul", ["x", "x"], ["p"]), node("ReduceSum", ["p", "axis"], ["y"], keepdims=0)]
+    (made,) = joined(nodes, known_of(axis=[1]), ["y"])
+    assert (made.op_type, list(made.input)) == ("ReduceSumSquare", ["x", "axis"])
+    assert [one.name for one in made.attribute] == ["keepdims"]
+    both = joined(nodes, known_of(axis=[1]), ["y", "p"])
+    assert "Mul" in kinds(both)  # a product that is an output stays
+
+
 def gauss_newton(basis, slope_basis):
     return [
         node("Gather", ["a", "picked"], ["columns"], axis=1),
