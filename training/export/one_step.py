@@ -93,8 +93,8 @@ def _without_branches(nodes: Iterable[Any]) -> tuple[list[Any], list[Any], dict[
         inside, of_branch, names = _without_branches(branch.node)
         found += inside
         constants += [*branch.initializer, *of_branch]
-        renamed |= names
-        renamed |= dict(zip([value.name for value in branch.output], node.output, strict=True))
+        results = dict(zip([value.name for value in branch.output], node.output, strict=True))
+        renamed |= {name: results.get(new, new) for name, new in names.items()} | results
     return found, constants, renamed
 
 

@@ -7,7 +7,7 @@ For files whose response stays as it is while the rest of the graph of a set pos
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -151,7 +151,7 @@ def read_response(
 
 def _read_contact(graph: Any, response: Response) -> Response:
     """The surface of the changes by another contact, in the branch of a model with errors."""
-    for branch in (a.g for node in graph.node if node.op_type == "If" for a in node.attribute):
+    for branch in _branches(graph):
         constants = _constants(branch)
         layers, mean = _layers(branch.node, constants)
         if len(layers) == 2:
@@ -171,6 +171,13 @@ def _read_contact(graph: Any, response: Response) -> Response:
     whole = (first.T, bias, second.T, second_bias, flat[:-1], flat[-1])
     scaling = Standardisation(mean, np.ones_like(mean))
     return replace(response, scaling=scaling, layers=whole, error=np.zeros(CHANNELS))
+
+
+def _branches(graph: Any) -> Iterator[Any]:
+    """All branches of a graph, and the branches of these."""
+    for branch in (a.g for node in graph.node if node.op_type == "If" for a in node.attribute):
+        yield branch
+        yield from _branches(branch)
 
 
 def _constants(graph: Any) -> dict[str, Floats]:

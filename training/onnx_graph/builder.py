@@ -49,7 +49,10 @@ class Graph:
         self._branches = 0
 
     def constant(self, value: Any, exact: bool = False) -> str:
-        """The name of a constant array; floating-point numbers become float64 unless `exact`."""
+        """The name of a constant array; floating-point numbers become float64 unless `exact`.
+
+        A floating-point number is one of an array of one element.
+        """
         from onnx import numpy_helper
 
         array = np.asarray(value)
@@ -58,7 +61,9 @@ class Graph:
         key = (array.dtype.str, array.shape, array.tobytes())
         if key not in self._names_of_constants:
             name = f"{self._prefix}c{len(self._constants)}"
-            self._constants.append(numpy_helper.from_array(np.ascontiguousarray(array), name))
+            if array.ndim or array.dtype.kind == "f":
+                array = np.ascontiguousarray(array)
+            self._constants.append(numpy_helper.from_array(array, name))
             self._names_of_constants[key] = name
         return self._names_of_constants[key]
 
@@ -98,14 +103,15 @@ class Graph:
         return self._parts.get((tuple(names), axis))
 
     def rename_last(self, name: str, new: str) -> None:
-        """Rename the output of the node that was added last, which nothing reads yet.
+        """Rename an output of the node that was added last, which nothing reads yet.
 
-        Raises `ValueError` if `name` is not the first output of that node.
+        Raises `ValueError` if `name` is not an output of that node.
         """
-        if not self._nodes or self._nodes[-1].output[0] != name:
-            raise ValueError(f"{name} is not the output of the last node; name it right away")
-        self._nodes[-1].output[0] = new
-        self._names_of_nodes = {k: v for k, v in self._names_of_nodes.items() if v[0] != name}
+        if not self._nodes or name not in self._nodes[-1].output:
+            raise ValueError(f"{name} is not an output of the last node; name it right away")
+        last = self._nodes[-1]
+        last.output[list(last.output).index(name)] = new
+        self._names_of_nodes = {k: v for k, v in self._names_of_nodes.items() if name not in v}
 
     def double(self, name: str) -> str:
         """A value cast to float64."""
@@ -174,25 +180,35 @@ class Graph:
         self._branches += 1
         return Graph(f"{self._prefix}b{self._branches}_")
 
-    def shortcut(self, condition: str, quick: tuple[Graph, str], general: tuple[Graph, str]) -> str:
-        """Add an If node that takes a quicker way to the same float32 value where it exists.
+    def shortcut(
+        self,
+        condition: str,
+        quick: tuple[Graph, Sequence[str]],
+        general: tuple[Graph, Sequence[str]],
+    ) -> list[str]:
+        """Add an If node that takes a quicker way to the same float32 values where it exists.
 
-        Each way is a branch and the name of its result. The general way is right whether the
+        Each way is a branch and the names of its results. The general way is right whether the
         condition is true or not: a caller that cannot branch takes it always.
         """
-        then, otherwise = (graph._result(name) for graph, name in (quick, general))
+        then, otherwise = (graph._results(names) for graph, names in (quick, general))
         attributes = {"then_branch": then, "else_branch": otherwise, "doc_string": SHORTCUT}
-        return self.ops("If", 1, condition, **attributes)[0]
+        return self.ops("If", len(quick[1]), condition, **attributes)
 
-    def _result(self, name: str) -> Any:
-        """This graph as a branch with one float32 output, which may be a value that it captures."""
+    def _results(self, names: Sequence[str]) -> Any:
+        """This graph as a branch with float32 outputs, which may be values that it captures.
+
+        Raises `ValueError` for one value as two outputs: onnxruntime would overwrite it.
+        """
         from onnx import helper
 
-        if not any(name in node.output for node in self._nodes):
-            name = self.op("Identity", name)
-        nodes, constants = self._needed([name])
-        info = helper.make_tensor_value_info(name, FLOAT, None)
-        return helper.make_graph(nodes, f"{self._prefix}branch", [], [info], constants)
+        made = {name for node in self._nodes for name in node.output}
+        own = [name if name in made else self.op("Identity", name) for name in names]
+        if len(set(own)) < len(own):
+            raise ValueError("a branch has the same value as two of its outputs")
+        nodes, constants = self._needed(own)
+        infos = [helper.make_tensor_value_info(name, FLOAT, None) for name in own]
+        return helper.make_graph(nodes, f"{self._prefix}branch", [], infos, constants)
 
     def as_branch(self, outputs: Mapping[str, Output]) -> Any:
         """This graph as a branch whose outputs are named `<prefix><output>`; others are empty."""

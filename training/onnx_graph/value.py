@@ -9,7 +9,7 @@ evaluation fixes the bytes of the file.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,10 @@ class Value:
         """A constant of whole numbers (int64), as ONNX takes indices, axes and shapes."""
         return self._output(self.graph.constant(np.asarray(numbers, dtype=np.int64)))
 
+    def number(self, number: int) -> Value:
+        """A constant whole number (int64) without axes, as an index that leaves out an axis."""
+        return self._output(self.graph.constant(np.asarray(number, dtype=np.int64)))
+
     def astype(self, dtype: type) -> Value:
         """The value cast to another element type."""
         name = self.graph.op("Cast", self.name, to=_ELEMENT_TYPES[dtype])
@@ -155,10 +159,6 @@ class Value:
         """
         axes = [] if axis is None else [self.indices([axis])]
         return self.node(kind, *axes, **({} if keepdims is None else {"keepdims": int(keepdims)}))
-
-    def within(self, branch: Graph) -> Value:
-        """The value as a branch of its graph reads it."""
-        return Value(branch, self.name, self.dtype)
 
     def named(self, name: str) -> Value:
         """The value under the name of a graph output; only for the output of the last node."""
@@ -223,12 +223,10 @@ def concat(values: Sequence[Value], axis: int) -> Value:
 
 
 def stack_rows(values: Sequence[Value]) -> Value:
-    """Values (n,) or (1, n) as the rows of a matrix; parts of a matrix become that matrix again."""
+    """Values (1, n) as the rows of a matrix; parts of a matrix become that matrix again."""
     first = values[0]
     whole = first.graph.whole_of([value.name for value in values], 0)
-    if whole is not None:
-        return Value(first.graph, whole, first.dtype)
-    return concat(values, axis=0).reshape(len(values), -1)
+    return concat(values, axis=0) if whole is None else Value(first.graph, whole, first.dtype)
 
 
 def gemm(
@@ -251,18 +249,49 @@ def gemm(
     return a.node("Gemm", *([b] if c is None else [b, c]), **attributes)
 
 
-def shortcut(
-    condition: Value, quick: Callable[..., Value], general: Callable[..., Value], *values: Value
-) -> Value:
-    """The general function of float32 values, or where a condition (1,) is true, a quicker one.
+def within(given: Any, branch: Graph) -> Any:
+    """What a branch of a graph reads: values, and collections and dataclasses that have some."""
+    if isinstance(given, Value):
+        return Value(branch, given.name, given.dtype)
+    if isinstance(given, dict):
+        return {name: within(value, branch) for name, value in given.items()}
+    if isinstance(given, tuple | list):
+        return type(given)(within(value, branch) for value in given)
+    if not is_dataclass(given) or isinstance(given, type):
+        return given
+    inside = {field.name: getattr(given, field.name) for field in fields(given)}
+    read = within(inside, branch)
+    changed = {name: value for name, value in read.items() if value is not inside[name]}
+    return replace(given, **changed) if changed else given
 
-    Only one of both is run. Both must give the same where the condition is true.
+
+def shortcuts(
+    condition: Value,
+    quick: Callable[..., Sequence[Value]],
+    general: Callable[..., Sequence[Value]],
+    *given: Any,
+) -> list[Value]:
+    """Values of a general function, or where a condition (1,) is true, those of a quicker one.
+
+    Only one of both is run. Both must give the same float32 values where the condition is true.
     """
     ways = []
     for way in (quick, general):
         branch = condition.graph.branch()
-        ways.append((branch, way(*(value.within(branch) for value in values)).name))
-    return Value(condition.graph, condition.graph.shortcut(condition.name, *ways))
+        ways.append((branch, [value.name for value in way(*within(given, branch))]))
+    names = condition.graph.shortcut(condition.name, *ways)
+    return [Value(condition.graph, name) for name in names]
+
+
+def shortcut(
+    condition: Value, quick: Callable[..., Value], general: Callable[..., Value], *given: Any
+) -> Value:
+    """The one value of two functions, as `shortcuts`."""
+
+    def alone(way: Callable[..., Value]) -> Callable[..., Sequence[Value]]:
+        return lambda *read: [way(*read)]
+
+    return shortcuts(condition, alone(quick), alone(general), *given)[0]
 
 
 def cholesky_columns(matrix: Value, count: int) -> Value:

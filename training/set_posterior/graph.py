@@ -12,6 +12,7 @@ from soilml.onboard.set_contract import (
     ERROR_COLUMNS,
     MEMORY_INPUTS,
     MEMORY_OUTPUTS,
+    MODEL_ERROR_COLUMNS,
     MODEL_ERROR_INPUT,
     OPERATING_STD_INPUTS,
     READING_INPUTS,
@@ -25,14 +26,14 @@ from training.onnx_graph.value import Value
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.importance_sampler import add_importance_sampler
-from training.set_posterior.likelihood import SetReadings, add_likelihood
+from training.set_posterior.likelihood import Likelihood, SetReadings
 from training.set_posterior.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
 from training.set_posterior.sampling_rounds import SIZES_SMALL, sample_sizes
-from training.set_posterior.small_likelihood import add_small_likelihood
+from training.set_posterior.small_likelihood import SmallLikelihood
 
 #: Inputs of the graph with a value for each row.
 ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
@@ -124,10 +125,12 @@ class SetPosteriorGraph:
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
-        grown = SetReadings(rows, state, inputs[MODEL_ERROR_INPUT], self.scales, outputs[0])
-        add = add_small_likelihood if self.small else add_likelihood
-        likelihood = add(self.family, self.response, context, grown)
-        consistency = add_consistency(counts, self.limits, self.family.targets)
+        usual = self.family.model_errors()
+        present = tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS)
+        readings = SetReadings(rows, state, inputs[MODEL_ERROR_INPUT], self.scales, present)
+        kind = SmallLikelihood if self.small else Likelihood
+        likelihood = kind.of(self.family, self.response, context, readings)
+        consistency = add_consistency(counts, self.limits)
         sizes = SIZES_SMALL if self.small else sample_sizes(len(self.family.axes))
-        sample = add_importance_sampler(likelihood, consistency, sizes)
+        sample = add_importance_sampler(likelihood, consistency, sizes, outputs[0])
         add_posterior_outputs(likelihood.family, context, sample, consistency, prefix)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +19,7 @@ from training.onnx_graph.value import (
     log,
     maximum,
     minimum,
-    shortcut,
+    shortcuts,
     softmax,
     sqrt,
     tanh,
@@ -40,9 +41,9 @@ from training.set_posterior.sampling_rounds import (
     adapted_draws,
     prior_draws,
     sample_round,
-    weights_by_effective_size,
 )
-from training.set_posterior.scale_mixture import ScaledMisfit, ScaleMixture
+from training.set_posterior.scale_mixture import OneSystem, ScaleMixture
+from training.set_posterior.small_likelihood import SmallLikelihood
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
 #: the other coordinates in adapted rounds, which is closer.
@@ -67,8 +68,23 @@ class WeightedSample:
     order: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class FirstRound:
+    """What the adapted rounds begin with."""
+
+    likelihood: Likelihood | SmallLikelihood
+    nearly_known: NearlyKnown | None
+    limit: Value  # (1,) largest misfit of sound sets
+    rows: Value  # of new readings, as `Likelihood.start` takes them
+    residuals: PolynomialResiduals  # of readings that have noise alone
+    samples: WeightedRound
+
+
 def add_importance_sampler(
-    likelihood: Likelihood, consistency: Consistency, sizes: SampleSizes
+    likelihood: Likelihood | SmallLikelihood,
+    consistency: Consistency,
+    sizes: SampleSizes,
+    grown: str,
 ) -> WeightedSample:
     r"""Weighted samples of the posterior of residuals that are averaged over scales k.
 
@@ -80,8 +96,8 @@ def add_importance_sampler(
     angle, is solved for: Gauss-Newton steps move it onto the sheet, and it is drawn around this
     conditional mode with the width of its conditional posterior.
 
-    1. In the first round the other unknowns are drawn from the prior, and the model is taken as
-       right: it is but a start. Its mean is the soil at which errors are linear.
+    1. In the first round the other unknowns are drawn from the prior, and readings are taken as
+       having their noise alone: it is but a start. Its mean is the soil at which errors are linear.
     2. In each adapted round their inverse hyperbolic tangents, which are unbounded, are drawn from
        a t distribution with the mean and covariance of the previous round. These moments are those
        of the highest power of the density that enough samples share (`tempering_power`). Before
@@ -91,65 +107,102 @@ def add_importance_sampler(
     3. Rounds are pooled in proportion to their effective sample sizes.
 
     All draws are constants of the graph that are shifted and scaled: the same set gives the same
-    answer.
+    answer. Readings that do have noise alone need no errors to be integrated out in the rounds.
 
     likelihood: Of the readings, and the unknowns with their priors.
     consistency: Limits of the set's misfit.
     sizes: Points of each round.
+    grown: Name of the output for the state with the new rows.
 
     References: Cornuet et al., Scandinavian J. Statistics 39(4), 2012 (adaptive rounds); Robert and
     Casella, Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the
     others); Kish, Survey Sampling, 1965 (effective sample size).
     """
-    family, response, start = likelihood.family, likelihood.response, likelihood.start()
-    unknowns = len(family.axes)
-    nearly_known = NearlyKnown.of(family, response, likelihood.context)
-    residuals = PolynomialResiduals.of(family, response, nearly_known, start)
-    graph = residuals.system.graph
-    draws = adapted_draws(unknowns, sizes.adapted)
-    prior = prior_draws(family, residuals.order, sizes.prior)
-    current = _prior_round(family, residuals, prior)
-    basis = _mean_basis(residuals, current)
-    soil = basis if nearly_known is None else basis * nearly_known.factors.node("Transpose")
-    mixture = likelihood.mixture_at(soil).standardised(nearly_known)
-    current = current.reweighed(mixture)
-    bounded = np.clip(prior.others[:-1], -LARGEST_TANH, LARGEST_TANH)
-    unbounded = constant(graph, np.arctanh(bounded))
-    rounds, count = [current], sizes.prior
-    least = np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
-    variance = one = constant(graph, np.ones(1))
-    samples = first_samples = _with_ones(unbounded, current, unknowns, count)
-    for number in range(sizes.rounds):
-        weights = rounds[-1].tempered_weights()[0]
-        moments = _moments(samples, weights, least)
-        residuals = mixture.proposal(residuals, found_at(rounds[-1]), weights)
-        if number == sizes.rounds - 1:
-            variance = excess_variance(least_misfit(rounds), consistency, family.targets)
-            mixture = mixture.divided_by(sqrt(variance))
-            residuals = residuals.with_system(residuals.system / sqrt(variance))
-            moments = shortcut(
-                variance <= 1.0,
-                lambda found, *_: found,
-                partial(_moments_of_likelihood, least=least),
-                *(moments, first_samples, found_at(rounds[0]).least, variance),
-            )
-        proposal = cholesky_columns(moments, unknowns) @ draws.others
-        unbounded, current = _adapted_round(family, residuals, mixture, proposal, draws)
-        rounds.append(current)
-        samples = _with_ones(unbounded, current, unknowns, sizes.adapted)
-        count += sizes.adapted
-    points = concat([r.points for r in rounds], axis=1)
-    misfit = minimum(least_misfit(rounds[:-1]), least_misfit(rounds[-1:]) * variance)
-    # the rounds before the last are samples of the posterior with the noise as it was given
-    weights = pooled_weights(rounds, floor(one / variance))
+    family, rows = likelihood.family, likelihood.first_rows()
+    nearly_known = NearlyKnown.of(family, likelihood.response, likelihood.context)
+    residuals = PolynomialResiduals.of(
+        family, likelihood.response, nearly_known, likelihood.start(rows)
+    )
+    samples = _prior_round(family, residuals, prior_draws(family, residuals.order, sizes.prior))
+    first = FirstRound(likelihood, nearly_known, consistency.limit, rows, residuals, samples)
+    with_errors = partial(_with_errors, sizes)
+    if likelihood.noise_alone is None:
+        state, points, weights, misfit = with_errors(first)
+        state.node("Identity").named(grown)
+    else:
+        state, points, weights, misfit = shortcuts(
+            likelihood.noise_alone, partial(_with_noise_alone, sizes), with_errors, first
+        )
+        state.named(grown)
+    count = sizes.prior + sizes.rounds * sizes.adapted
     return WeightedSample(points, weights, misfit, count, residuals.order)
 
 
-def _with_ones(unbounded: Value, current: WeightedRound, unknowns: int, count: int) -> Value:
-    """1, the unbounded other coordinates and the solved one of a round, (1 + p, n)."""
-    solved = current.points.take([unknowns], axis=0)
-    ones = constant(unbounded.graph, np.ones((1, count)))
-    return concat([ones, unbounded, solved], axis=0)
+def _with_errors(sizes: SampleSizes, first: FirstRound) -> list[Value]:
+    """The state with new rows, points, weights and misfit, errors linear at the first mean."""
+    likelihood, samples = first.likelihood, first.samples
+    weights, _ = samples.tempered_weights()
+    soil = first.residuals.basis(gemm(samples.points, weights, transpose_b=True))
+    if first.nearly_known is not None:
+        soil = soil * first.nearly_known.factors.node("Transpose")
+    mixture, state = likelihood.mixture_at(soil)
+    mixture = mixture.standardised(first.nearly_known)
+    misfit = mixture.misfit(samples.basis)
+    change = samples.misfit.least * 0.5 + misfit.log_likelihood
+    samples = replace(
+        samples,
+        boxed_log_weight=samples.boxed_log_weight + change,
+        log_weight=samples.log_weight + change,
+        misfit=misfit,
+    )
+    return [state, *_adapted_rounds(sizes, replace(first, samples=samples), mixture)]
+
+
+def _with_noise_alone(sizes: SampleSizes, first: FirstRound) -> list[Value]:
+    """The same of readings that have noise alone."""
+    assert isinstance(first.likelihood, Likelihood)
+    state = first.likelihood.grown(first.rows)
+    return [state, *_adapted_rounds(sizes, first, OneSystem(first.residuals.system))]
+
+
+def _adapted_rounds(
+    sizes: SampleSizes, first: FirstRound, posterior: OneSystem | ScaleMixture
+) -> list[Value]:
+    """Points (1 + p, n), weights (1, n) and least misfit (1,) of all rounds."""
+    family, residuals, limit = first.likelihood.family, first.residuals, first.limit
+    unknowns, graph = len(family.axes), limit.graph
+    draws = adapted_draws(unknowns, sizes.adapted)
+    least = np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
+    rounds, samples = [first.samples], _prior_samples(family, residuals, sizes, first.samples)
+    first_samples, variance = samples, constant(graph, np.ones(1))
+    for number in range(sizes.rounds):
+        weights = rounds[-1].tempered_weights()[0]
+        moments = _moments(samples, weights, least)
+        residuals = posterior.proposal(residuals, rounds[-1].misfit, weights)
+        if number == sizes.rounds - 1:
+            variance = excess_variance(least_misfit(rounds), limit, family.targets)
+            std = sqrt(variance)
+            posterior, residuals = posterior.divided_by(std), residuals.divided_by(std)
+            enlarged = softmax(first.samples.misfit.least * -0.5 / variance, axis=1)
+            again = _moments(first_samples, enlarged, least)
+            moments = where(variance > 1.0, again, moments)
+        points = cholesky_columns(moments, unknowns) @ draws.others
+        samples, current = _adapted_round(family, residuals, posterior, points, draws)
+        rounds.append(current)
+    misfit = minimum(least_misfit(rounds[:-1]), least_misfit(rounds[-1:]) * variance)
+    # the rounds before the last are samples of the posterior with the noise as it was given
+    weights = pooled_weights(rounds, floor(1.0 / variance))
+    return [concat([r.points for r in rounds], axis=1), weights, misfit]
+
+
+def _prior_samples(
+    family: WheelFamily, residuals: PolynomialResiduals, sizes: SampleSizes, first: WeightedRound
+) -> Value:
+    """1, the unbounded other coordinates and the solved one (1 + p, n) of the prior round."""
+    others = prior_draws(family, residuals.order, sizes.prior).others[:-1]
+    unbounded = np.arctanh(np.clip(others, -LARGEST_TANH, LARGEST_TANH))
+    drawn = np.concatenate([np.ones((1, sizes.prior)), unbounded])
+    return concat([constant(first.solved.graph, drawn), first.solved], axis=0)
 
 
 def _moments(samples: Value, weights: Value, floor: Floats) -> Value:
@@ -157,42 +210,33 @@ def _moments(samples: Value, weights: Value, floor: Floats) -> Value:
     return gemm(samples * weights, samples, floor, transpose_b=True)
 
 
-def _moments_of_likelihood(
-    moments: Value, samples: Value, misfit: Value, variance: Value, least: Floats
-) -> Value:
-    """Moments of samples with this misfit, if the noise has to be enlarged by a variance."""
-    enlarged = _moments(samples, softmax(misfit * -0.5 / variance, axis=1), least)
-    return where(variance > 1.0, enlarged, moments)
+def pooled_weights(rounds: Sequence[WeightedRound], of_earlier: Value) -> Value:
+    r"""Weights (1, n) of the points of all rounds, in proportion to effective sample sizes, sum 1.
 
+    .. math:: n_{eff} = \frac{1}{\sum_i w_i^2}
 
-def pooled_weights(rounds: list[WeightedRound], of_earlier: Value) -> Value:
-    """Weights (1, n) of the points of all rounds, in proportion to effective sample sizes, sum 1.
-
-    The last round keeps its weight even if it had to be tempered: too wide an interval is safer
-    than one that rests on a few samples. Weights of the others are multiplied by `of_earlier`.
+    (Kish). A round that had to be tempered (power below 1) gets the weight 0: its samples are those
+    of another distribution. The last round keeps its weight even if it had to be tempered: too wide
+    an interval is safer than one that rests on a few samples. Weights of the others are multiplied
+    by `of_earlier`.
     """
-    parts = []
-    for earlier in rounds[:-1]:
-        weights, power = earlier.tempered_weights()
-        parts.append(weights_by_effective_size(weights, power) * of_earlier)
-    parts.append(weights_by_effective_size(rounds[-1].tempered_weights()[0]))
-    pooled = concat(parts, axis=1)
-    return pooled / pooled.sum(keepdims=True)
+    weights, powers = zip(*(r.tempered_weights() for r in rounds), strict=True)
+    squares = concat([own.sum_of_squares(keepdims=True) for own in weights], axis=1)
+    earlier = floor(concat(powers[:-1], axis=1)) * of_earlier
+    used = concat([earlier, constant(earlier.graph, np.ones((1, 1)))], axis=1)
+    sizes = used / squares  # (1, rounds)
+    shares = sizes / sizes.sum(keepdims=True)
+    parts = zip(weights, shares.split(len(rounds), axis=1), strict=True)
+    return concat([own * share for own, share in parts], axis=1)
 
 
-def found_at(weighted: WeightedRound) -> ScaledMisfit:
-    """The misfits of a round that a mixture has weighed."""
-    assert weighted.misfit is not None
-    return weighted.misfit
-
-
-def least_misfit(rounds: list[WeightedRound]) -> Value:
+def least_misfit(rounds: Sequence[WeightedRound]) -> Value:
     """The least sum of squared residuals of all points, (1,)."""
-    misfits = concat([found_at(r).least for r in rounds], axis=1)
+    misfits = concat([r.misfit.least for r in rounds], axis=1)
     return misfits.reduce("ReduceMin", keepdims=False).reshape(1)
 
 
-def excess_variance(misfit: Value, consistency: Consistency, unknowns: int) -> Value:
+def excess_variance(misfit: Value, limit: Value, unknowns: int) -> Value:
     r"""Variance of the residuals over that of the noise: 1 if the misfit is within its limit, (1,).
 
     .. math:: \tau = \chi^2 / q
@@ -202,7 +246,7 @@ def excess_variance(misfit: Value, consistency: Consistency, unknowns: int) -> V
     soil did explain, in q directions, is assumed to be as large as the one that is left.
     """
     one = constant(misfit.graph, np.ones(1))
-    return where(misfit > consistency.limit, misfit / float(unknowns), one)
+    return where(misfit > limit, misfit / float(unknowns), one)
 
 
 def _prior_round(
@@ -215,23 +259,18 @@ def _prior_round(
     mode, precision = gauss_newton(constant(residual.graph, 0.0), residual, slope)
     for _ in range(PRIOR_STEPS - 1):
         mode, precision = residuals.step(concat([others, mode], axis=0), mode)
-    return sample_round(residuals, family.axes, others, (mode, precision), draws)
-
-
-def _mean_basis(residuals: PolynomialResiduals, first: WeightedRound) -> Value:
-    """Monomials (terms, 1) of the mean of a round, in standardised coordinates."""
-    weights, _ = first.tempered_weights()
-    return residuals.basis(gemm(first.points, weights, transpose_b=True))
+    one = OneSystem(residuals.system)
+    return sample_round(residuals, family.axes, [others], (mode, precision), draws, one)
 
 
 def _adapted_round(
     family: WheelFamily,
     residuals: PolynomialResiduals,
-    mixture: ScaleMixture,
+    posterior: OneSystem | ScaleMixture,
     proposal: Value,
     draws: ProposalDraws,
 ) -> tuple[Value, WeightedRound]:
-    """The unbounded other coordinates (p - 1, n), and the round drawn from them.
+    """Samples (1 + p, n) as 1 and their unbounded coordinates, and the round drawn from them.
 
     `proposal` (1 + p, n) has 1, the unbounded coordinates, and the solved one by linear regression.
     """
@@ -239,10 +278,9 @@ def _adapted_round(
     bounded = tanh(unbounded)
     log_jacobian = log(maximum(1.0 - bounded * bounded, 1.0 - LARGEST_TANH**2))
     ones = constant(bounded.graph, np.ones((1, len(draws.t))))
-    others = concat([ones, bounded], axis=0)
     for _ in range(ADAPTED_STEPS):
-        mode, precision = residuals.step(concat([others, within_box(mode)], axis=0), mode)
-    current = sample_round(
-        residuals, family.axes, others, (mode, precision), draws, log_jacobian, mixture
-    )
-    return unbounded, current
+        points = concat([ones, bounded, within_box(mode)], axis=0)
+        mode, precision = residuals.step(points, mode)
+    others, solved = [ones, bounded], (mode, precision)
+    current = sample_round(residuals, family.axes, others, solved, draws, posterior, log_jacobian)
+    return concat([ones, unbounded, current.solved], axis=0), current

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+
+import numpy as np
 
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
 from training.onnx_graph.value import Value, concat
@@ -16,20 +17,21 @@ from training.set_posterior.sensor_errors import integrate_out_sensor_errors
 
 #: Columns of errors in the residual system: of the sensors, and of the model.
 OF_SENSORS, OF_MODEL = len(SENSOR_ERROR_COLUMNS), len(MODEL_ERROR_COLUMNS)
-#: The likelihood whose errors of sensors and model are linear at a soil, given by its monomials
-#: (terms, 1).
-MixtureAt = Callable[[Value], ScaleMixture]
 
 
 @dataclass(frozen=True)
 class SetReadings:
-    """SetReadings of a set: those of earlier calls, and new ones."""
+    """Readings of a set: those of earlier calls, and new ones."""
 
     rows: ResidualRows
     state: Value  # residual system (kept, terms + errors) of earlier readings
     size: Value  # size of the errors of the model, (1,)
     scales: ErrorScales  # their sizes where that is inferred
-    grown: str  # name of the output for the state with the new rows
+    present: tuple[bool, ...]  # which of `MODEL_ERROR_COLUMNS` the model can have
+
+    def mixture_of(self, system: Value, terms: int) -> ScaleMixture:
+        """The likelihood of a system (m, terms + errors) with the model's errors integrated out."""
+        return add_scale_mixture(system, self.size, terms, self.scales, self.present)
 
 
 @dataclass(frozen=True)
@@ -39,27 +41,51 @@ class Likelihood:
     family: WheelFamily
     response: Response
     context: ContextValues
-    #: adds the residuals (m, terms) of a model without errors, those of sensors integrated out
-    start: Callable[[], Value]
-    mixture_at: MixtureAt
+    readings: SetReadings
 
+    @staticmethod
+    def of(
+        family: WheelFamily, response: Response, context: ContextValues, readings: SetReadings
+    ) -> Likelihood:
+        """With all unknowns of a family of wheels, and all terms of its response."""
+        return Likelihood(family, response, context, readings)
 
-def add_likelihood(
-    family: WheelFamily, response: Response, context: ContextValues, readings: SetReadings
-) -> Likelihood:
-    """The likelihood with all unknowns of the family and all terms of the response."""
-    terms = len(response.terms)
-    earlier, _ = readings.state.split([terms + OF_SENSORS, OF_MODEL], axis=1)
-    start = concat([earlier, readings.rows.system_at(None)], axis=0)
+    @property
+    def noise_alone(self) -> Value:
+        """Whether the readings, those of earlier calls as well, have noise alone, (1, 1).
 
-    def mixture_at(basis: Value) -> ScaleMixture:
-        new = readings.rows.system_at(basis)
-        system = concat([readings.state, new], axis=0).named(readings.grown)
-        whole, sensors, model = system.split([terms, OF_SENSORS, OF_MODEL], axis=1)
+        Errors of the model, of slip and load, and those that readings share change with the soil.
+        """
+        _, of_sensors, _ = self._state()
+        sizes = [of_sensors.sum_of_squares(), self.readings.size * self.readings.size]
+        return self.readings.rows.sensor_errors.size.node("Sum", *sizes) <= 0.0
+
+    def first_rows(self) -> Value:
+        """Rows (m, terms) of new readings that have noise alone."""
+        return self.readings.rows.of_noise_alone()
+
+    def start(self, first_rows: Value) -> Value:
+        """Residuals (m, terms) of readings that have noise alone."""
+        return concat([self._state()[0], first_rows], axis=0)
+
+    def grown(self, first_rows: Value) -> Value:
+        """The state with these rows, which have no errors."""
+        errors = first_rows.take([0], axis=1) * np.zeros((1, OF_SENSORS + OF_MODEL))
+        return concat([self.readings.state, concat([first_rows, errors], axis=1)], axis=0)
+
+    def mixture_at(self, basis: Value) -> tuple[ScaleMixture, Value]:
+        """The likelihood with errors linear at a soil, and the state with the new rows.
+
+        basis: Monomials (terms, 1) of the soil.
+        """
+        terms = len(self.response.terms)
+        new = self.readings.rows.system_at(basis)
+        grown = concat([self.readings.state, new], axis=0)
+        whole, sensors, model = grown.split([terms, OF_SENSORS, OF_MODEL], axis=1)
         system = concat([whole, model, sensors], axis=1)
         system = integrate_out_sensor_errors(system, terms + OF_MODEL)
-        return add_scale_mixture(system, readings.size, terms, readings.scales)
+        return self.readings.mixture_of(system, terms), grown
 
-    return Likelihood(
-        family, response, context, lambda: integrate_out_sensor_errors(start, terms), mixture_at
-    )
+    def _state(self) -> list[Value]:
+        """Columns of earlier readings: of monomials, errors of sensors and of the model."""
+        return self.readings.state.split([len(self.response.terms), OF_SENSORS, OF_MODEL], axis=1)

@@ -64,9 +64,9 @@ class PolynomialResiduals:
         """The residuals of another system (m, terms)."""
         return PolynomialResiduals.solved_last(system, self.terms, self.order)
 
-    def squared_norm(self, basis: Value) -> Value:
-        """The misfit |A b|^2 (1, n), which is -2 log likelihood up to a constant."""
-        return (self.system @ basis).sum_of_squares(axis=0, keepdims=True)
+    def divided_by(self, std: Value) -> PolynomialResiduals:
+        """For noise whose standard deviation is larger by a factor (1,)."""
+        return self.with_system(self.system / std)
 
     def at_fixed_points(self, points: Floats) -> tuple[Value, Value]:
         """Residuals and their derivative (m, n) at fixed coordinates (p, n), in this order."""

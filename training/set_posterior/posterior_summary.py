@@ -8,7 +8,17 @@ from soilml.arrays import Floats
 from soilml.onboard.estimate import EDGE_STDS
 from soilml.onboard.set_contract import SET_PREFIX
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
-from training.onnx_graph.value import Value, concat, constant, exp, gemm, maximum, sqrt, where
+from training.onnx_graph.value import (
+    Value,
+    absolute,
+    concat,
+    constant,
+    exp,
+    gemm,
+    maximum,
+    sqrt,
+    where,
+)
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
 from training.set_posterior.importance_sampler import WeightedSample
 from training.set_posterior.misfit_test import Consistency
@@ -54,7 +64,6 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
     relative = (deviations / spacing).reshape(0, 1, -1)
     below = ((grid + 0.5)[:, None] - relative).clip(0.0, 1.0)
     flat = below.reshape(-1, count)  # (q * grid points, n)
-    # onnxruntime takes half the time for one row times a matrix than for a matrix times one column
     distribution = gemm(weights, flat, transpose_b=True).reshape(-1, len(grid))
     # columns of these matrices are the segments: of the lower half of the grid for the lower
     # quantile, then of the upper half for the upper quantile
@@ -93,15 +102,17 @@ def add_posterior_outputs(
     is that with the noise that explains it, and the flag is false.
     """
     q = family.targets
+    # onnxruntime takes half the time for one row times a matrix than for a matrix times one column
     value = _parameters(family, sample)
-    mean = gemm(value, sample.weights, transpose_b=True)
+    mean = gemm(sample.weights, value, transpose_b=True).reshape(q, 1)
     deviation = value - mean
     covariance = gemm(deviation * sample.weights, deviation, transpose_b=True)
     variance = (covariance * np.eye(q)).sum(axis=1, keepdims=True)
     std = sqrt(variance)
     interval = mean + add_quantiles(deviation, std, sample.weights, sample.count)
-    enough = consistency.enough.reshape(1, 1)
-    consistent = enough & (sample.misfit <= consistency.limit).reshape(1, 1)
+    enough = consistency.enough
+    consistent = enough & (sample.misfit <= consistency.limit)
+    consistent = consistent.named(f"{prefix}{SET_PREFIX}in_range")
     prior = prior_summary(family)
     names = ("mean", "std", "low", "high")
     estimated = concat([mean, std, interval], axis=1)  # (q, 4)
@@ -109,13 +120,12 @@ def add_posterior_outputs(
     chosen, scale = where(enough, estimated, fallback), context.target_scale
     if scale is not None:
         chosen = chosen * scale
-    for name, column in zip(names, chosen.split(4, axis=1), strict=True):
-        column.reshape(q).named(f"{prefix}{SET_PREFIX}{name}")
+    for place, name in enumerate(names):
+        chosen.node("Gather", chosen.number(place), axis=1).named(f"{prefix}{SET_PREFIX}{name}")
     chosen = where(enough, covariance, np.diag(prior["std"] ** 2))
     if scale is not None:
         chosen = chosen * gemm(scale, scale, transpose_b=True)
     chosen.named(f"{prefix}{SET_PREFIX}covariance")
-    consistent.reshape(1).named(f"{prefix}{SET_PREFIX}in_range")
     _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
     vague = std > NOT_IDENTIFIED_ABOVE * prior["std"][:, None]
     (vague | ~consistent).reshape(q).named(f"{prefix}{SET_PREFIX}abstains")
@@ -125,9 +135,8 @@ def add_posterior_outputs(
 def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:
     """Whether a mean is within `EDGE_STDS` standard deviations of an end of its prior, (q,)."""
     ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
-    margin = std * EDGE_STDS
-    low, high = mean - margin < ends[:, :1], mean + margin > ends[:, 1:]
-    return (low | high).reshape(family.targets)
+    middle, half = ends.mean(axis=1, keepdims=True), 0.5 * np.diff(ends, axis=1)
+    return (absolute(mean - middle) + std * EDGE_STDS > half).reshape(family.targets)
 
 
 def prior_summary(family: WheelFamily) -> dict[str, Floats]:

@@ -26,12 +26,7 @@ from training.set_posterior.families.wheel_family import (
 )
 from training.set_posterior.model_errors import ModelErrors
 from training.set_posterior.response_surface import Response, ResponseValues
-from training.set_posterior.sensor_errors import (
-    OperatingReadings,
-    SensorErrors,
-    add_offsets,
-    add_sensor_errors,
-)
+from training.set_posterior.sensor_errors import OperatingReadings, SensorErrors
 
 #: Tolerance of the box of features, as a share of its width: float32 rounds readings at its ends.
 BOX_TOLERANCE = 1e-3
@@ -55,18 +50,21 @@ class ResidualRows:
     is one channel of one row: so they are joined without a copy of each.
     """
 
-    fixed: Value  # (terms + offsets, readings) columns that are the same at all soils, unweighted
     weight: Value  # (1, readings), 0 for readings that are left out
     used: Value  # (readings,) whether a reading takes part
-    values: ResponseValues  # the response surface at the rows, with slopes by log slip and load
+    values: ResponseValues  # the response surface at the rows, unweighted
     sensor_errors: SensorErrors
     model_errors: ModelErrors
     in_range: Value  # (rows,) whether the features lie in the range of the response surface
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
-    def system_at(self, basis: Value | None) -> Value:
+    def system_at(self, basis: Value) -> Value:
         """The system (readings, terms + errors) of the readings that take part."""
         return self.compressed(self.columns_at(basis))
+
+    def of_noise_alone(self) -> Value:
+        """The system (readings, terms) with no errors but the noise of the channels."""
+        return self.compressed(self.values.coefficients * self.weight)
 
     def compressed(self, columns: Value) -> Value:
         """Columns as rows (columns, readings) as a system of the readings that take part."""
@@ -84,12 +82,15 @@ class ResidualRows:
             is then without columns of errors of the model.
         """
         slopes = self.values.slopes_at(basis)
-        common, of_row = self.sensor_errors.columns_at(slopes)
-        parts = [self.fixed, common]
+        of_residuals, coefficients = (
+            self.sensor_errors.of_residuals(slopes),
+            self.values.coefficients,
+        )
+        parts = [coefficients, self.sensor_errors.common_columns(of_residuals)]
         if basis is not None:
-            parts.append(self.model_errors.columns_at(slopes, self.values.coefficients, basis))
+            parts.append(self.model_errors.columns_at(slopes, coefficients, basis))
         system = concat(parts, axis=0) * self.weight
-        return self.sensor_errors.whitened(system, of_row * self.weight)
+        return self.sensor_errors.whitened(system, of_residuals, self.weight)
 
 
 def add_residual_rows(
@@ -102,6 +103,8 @@ def add_residual_rows(
     with y the torque on the scale of the response, the logarithm of sinkage over length, or drawbar
     pull over load, sigma its noise on that scale, and epsilon the error of the response surface.
     Readings out of range, or with too much noise for a logarithm, are left out.
+
+    readings: Readings and standard deviations (1, rows), and inputs of the whole set (1,), by name.
     """
     context = family.add_context(readings)
     operating, outside = _operating(readings), _outside(response, context.features)
@@ -122,17 +125,17 @@ def add_residual_rows(
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
     outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)
+    exact = operating.stds.reduce("ReduceMax") <= 0.0
     counts = [
         used.sum().reshape(1),
         in_range.node("Shape").astype(np.float32),
         _all_below(response, outside_noise).sum().reshape(1),
     ]
     return context, ResidualRows(
-        fixed=concat([values.coefficients, add_offsets(readings, slope)], axis=0),
         weight=weight.reshape(1, -1),
         used=used.reshape(-1).astype(np.bool_),
         values=values,
-        sensor_errors=add_sensor_errors(context, readings, operating, y),
+        sensor_errors=SensorErrors(context, readings, operating, y, slope, exact),
         model_errors=ModelErrors(family, response, context, readings, slope),
         in_range=in_range,
         counts=concat(counts, axis=0),

@@ -58,44 +58,31 @@ class ResponseValues:
     """
 
     coefficients: Value  # (terms, readings), with the offset taken off the constant term
-    tangent: Value  # (d, hidden, rows) derivatives of the last hidden layer along d directions
-    last_layer: Floats  # (channels * hidden, terms) its weights
+    hidden: tuple[Value, ...]  # the hidden layers, (hidden, rows) each
+    directions: Floats  # (d, f) of the features, along which there are derivatives
+    layers: tuple[Floats, ...]  # weights (units, inputs) of the hidden layers
+    last_layer: Floats  # (channels * hidden, terms) weights of the last one
     #: the whole last layer (terms, channels * (hidden + channels)), where it is kept once only
     whole_layer: Floats | None = None
-
-    @staticmethod
-    def of(
-        hidden: Value,
-        offset: Value,
-        tangent: Value,
-        last: tuple[Floats, ...],
-        terms: int,
-        once: bool = False,
-    ) -> ResponseValues:
-        """From the last hidden layer, and weights and bias of the last, of (terms * channels)."""
-        weights, bias = last
-        # the constant term is the first of each channel
-        of_offset = -np.eye(terms * CHANNELS, CHANNELS)
-        layer = np.concatenate([weights.T, of_offset], axis=1)
-        whole = concat([hidden, offset], axis=0)
-        output = gemm(constant(hidden.graph, layer), whole, bias[:, None])
-        kept = layer.reshape(terms, -1) if once else None
-        by_channel = _by_channel(weights, terms)
-        return ResponseValues(output.reshape(terms, -1), tangent, by_channel, kept)
 
     def slopes_at(self, basis: Value | None) -> Value:
         """Derivatives (d, channels, rows) of the channels at one soil along the directions.
 
         The soil is given by its monomials (terms, 1); None is the middle of the prior's range.
+        They are exact: each layer carries the tangents of its values.
         """
+        tangent: Value | Floats = self.directions[:, :, None]
+        for weights, hidden in zip(self.layers, self.hidden, strict=True):
+            tangent = (weights @ tangent) * (1.0 - hidden * hidden)
+        assert isinstance(tangent, Value)
         if basis is None:
-            return self.last_layer[:, 0].reshape(CHANNELS, -1) @ self.tangent
+            return self.last_layer[:, 0].reshape(CHANNELS, -1) @ tangent
         if self.whole_layer is not None:
             at_soil = gemm(basis, self.whole_layer, transpose_a=True).reshape(CHANNELS, -1)
             units = len(self.last_layer) // CHANNELS
-            return at_soil.split([units, CHANNELS], axis=1)[0] @ self.tangent
+            return at_soil.split([units, CHANNELS], axis=1)[0] @ tangent
         last_layer = constant(basis.graph, self.last_layer)
-        return (last_layer @ basis).reshape(CHANNELS, -1) @ self.tangent
+        return (last_layer @ basis).reshape(CHANNELS, -1) @ tangent
 
 
 def _by_channel(layer: Floats, terms: int) -> Floats:
@@ -181,20 +168,29 @@ class Response:
     def add_to(
         self, features: Value, offset: Value, directions: Floats, once: bool = False
     ) -> ResponseValues:
-        """Add the network to a graph, with its derivatives along directions of the features (d, f).
+        """Add the network to a graph, which can then have derivatives along directions (d, f).
 
-        The derivatives are exact: each layer carries the tangents of its values. The offset
-        (channels, rows) is subtracted from the channels. With `once`, slopes at a soil read the
-        same weights as the coefficients, in another order: the program is smaller.
+        The offset (channels, rows) is subtracted from the channels. With `once`, slopes at a soil
+        read the same weights as the coefficients, in another order: the program is smaller.
         """
-        hidden = features - self.scaling.mean[:, None]
-        tangent: Value | Floats = directions[:, :, None]
-        for weights, bias in self._inner_layers():
-            hidden = tanh(gemm(constant(hidden.graph, weights), hidden, bias))
-            tangent = (weights @ tangent) * (1.0 - hidden * hidden)
-        assert isinstance(tangent, Value)
+        layers, hidden = self._inner_layers(), [features - self.scaling.mean[:, None]]
+        for weights, bias in layers:
+            hidden.append(tanh(gemm(constant(features.graph, weights), hidden[-1], bias)))
+        last_weights, last_bias = self.layers[-2:]
         terms = len(self.terms)
-        return ResponseValues.of(hidden, offset, tangent, self.layers[-2:], terms, once)
+        # the constant term is the first of each channel
+        of_offset = -np.eye(terms * CHANNELS, CHANNELS)
+        layer = np.concatenate([last_weights.T, of_offset], axis=1)
+        whole = concat([hidden[-1], offset], axis=0)
+        output = gemm(constant(features.graph, layer), whole, last_bias[:, None])
+        return ResponseValues(
+            output.reshape(terms, -1),
+            tuple(hidden[1:]),
+            directions,
+            tuple(weights for weights, _ in layers),
+            _by_channel(last_weights, terms),
+            layer.reshape(terms, -1) if once else None,
+        )
 
     def _inner_layers(self) -> list[tuple[Floats, Floats]]:
         """Weights (units, inputs) and biases (units, 1) of all layers but the last.

@@ -7,8 +7,6 @@ all rows, or feed what a failing sensor gives.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import reduce
-from operator import add
 from typing import Any
 
 import numpy as np
@@ -28,7 +26,7 @@ from soilml.onboard.set_contract import (
     READING_INPUTS,
     RESPONSE_CHANNELS,
 )
-from training.onnx_graph.value import Value, absolute, concat, constant, sqrt, where
+from training.onnx_graph.value import Value, absolute, concat, constant, shortcut, sqrt, where
 
 #: Standard deviations of the noise of the channels, in their order.
 CHANNEL_STDS = tuple(f"{name}_std" for name in RESPONSE_CHANNELS)
@@ -89,7 +87,7 @@ def complete_inputs(
     """
     complete = dict(inputs)
     by_row = [inputs[name] for name in ROWS]
-    total = reduce(add, by_row)  # (rows,), also where some inputs have one element
+    total = by_row[0].node("Sum", *by_row[1:])  # (rows,), also where some have one element
     rows = total.node("Shape")
     if context:
         values = concat([inputs[name] for name in context], axis=0)
@@ -98,8 +96,7 @@ def complete_inputs(
         complete |= zip(context, values.split(len(context), axis=0), strict=True)
         total = total + of_set
     finite = absolute(total) <= LARGEST_SUM
-    stacked = concat([value.node("Expand", rows) for value in by_row], axis=0)
-    stacked = where(finite, stacked.reshape(len(ROWS), -1), constant(stacked.graph, HARMLESS))
+    stacked = where(finite, _stacked(by_row, rows), constant(total.graph, HARMLESS))
     state, counts = (inputs[name] for name in MEMORY_INPUTS)
     squares = state.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
     intact = squares <= LARGEST_MEMORY
@@ -108,6 +105,21 @@ def complete_inputs(
         MEMORY_INPUTS, (where(intact, state, 0.0), where(intact, counts, damaged)), strict=True
     )
     return complete | _without_markers(stacked, noise)
+
+
+def _stacked(by_row: Sequence[Value], rows: Value) -> Value:
+    """Inputs as the rows of a matrix, those of one element repeated; rows: the number of rows."""
+    flat = concat(by_row, axis=0)
+    none_repeated = flat.node("Shape").node("Equal", rows * flat.number(len(by_row)))
+
+    def repeated(_: Value, rows: Value, *by_row: Value) -> Value:
+        whole = concat([value.node("Expand", rows) for value in by_row], axis=0)
+        return whole.reshape(len(by_row), -1)
+
+    def as_they_are(flat: Value, *_: Value) -> Value:
+        return flat.reshape(len(by_row), -1)
+
+    return shortcut(none_repeated, as_they_are, repeated, flat, rows, *by_row)
 
 
 def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:

@@ -7,6 +7,7 @@ faster (Owen, Monte Carlo theory, methods and examples, chapter 15).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +21,6 @@ from training.onnx_graph.value import (
     absolute,
     concat,
     constant,
-    floor,
     gemm,
     log,
     minimum,
@@ -30,7 +30,7 @@ from training.onnx_graph.value import (
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, PriorAxis
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
-from training.set_posterior.scale_mixture import ScaledMisfit, ScaleMixture
+from training.set_posterior.scale_mixture import OneSystem, PointMisfit, ScaleMixture
 
 #: Degrees of freedom of the t distributions: tails heavier than those of a normal distribution keep
 #: the importance weights bounded where the posterior has heavier tails than its normal
@@ -135,33 +135,26 @@ class WeightedRound:
     """Samples of one round of importance sampling."""
 
     points: Value  # (1 + p, n) limited to the box
+    solved: Value  # (1, n) their last coordinate
+    basis: Value  # (terms, n) monomials of the points
     boxed_log_weight: Value  # (1, n) of the points as limited to the box
     log_weight: Value  # (1, n) vanishing weight for samples outside of the box
-    surprise: Value  # (1, n) -2 log likelihood
-    basis: Value  # (terms, n) monomials of the points
-    misfit: ScaledMisfit | None = None  # by scale of the model's errors, where they are known
+    misfit: PointMisfit  # by scale of the model's errors
 
     def tempered_weights(self) -> tuple[Value, Value]:
         """Weights (1, n) of a power of the density that several samples share, and that power."""
         power = tempering_power(self.boxed_log_weight)
         return tempered_weights(self.log_weight, power), power
 
-    def reweighed(self, mixture: ScaleMixture) -> WeightedRound:
-        """The same points with the weights of a mixture in place of one system of residuals."""
-        misfit = mixture.misfit(self.basis)
-        change = (self.surprise - misfit.surprise) * 0.5
-        boxed, log_weight = self.boxed_log_weight + change, self.log_weight + change
-        return WeightedRound(self.points, boxed, log_weight, misfit.surprise, self.basis, misfit)
-
 
 def sample_round(
     residuals: PolynomialResiduals,
     axes: tuple[PriorAxis, ...],
-    others: Value,
+    others: Sequence[Value],
     solved: tuple[Value, Value],
     draws: ProposalDraws,
+    posterior: OneSystem | ScaleMixture,
     log_jacobian: Value | None = None,
-    mixture: ScaleMixture | None = None,
 ) -> WeightedRound:
     r"""Draw the solved coordinate around its conditional mode, and weigh the samples.
 
@@ -173,27 +166,26 @@ def sample_round(
     up to constants, with t a draw of the t distribution and c the scale of the proposal. The last
     sum is there if the other coordinates are hyperbolic tangents of the draws z.
 
-    residuals: The system of the set, whose likelihood is that of the samples without a mixture.
+    residuals: The system of the set along the solved coordinate.
     axes: The axes of the family, whose `tilt` is the lambda of their prior.
-    others: 1, and the other coordinates, within the box (p, n).
+    others: 1, and the other coordinates, within the box: rows that make up (p, n).
     solved: Mode and precision of the solved coordinate given the others, (1, n) each.
     draws: The draws t of the round, and the log density of all draws.
+    posterior: The likelihood.
     log_jacobian: log(1 - x_i^2) of the other coordinates (p - 1, n).
-    mixture: The likelihood, where it is averaged over scales of the model's errors.
     """
     mode, precision = solved
     proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)
     inside = within_box(proposed)
-    points = concat([others, inside], axis=0)
+    points = concat([*others, inside], axis=0)
     basis = residuals.basis(points)
-    misfit = None if mixture is None else mixture.misfit(basis)
-    surprise = residuals.squared_norm(basis) if misfit is None else misfit.surprise
+    misfit = posterior.misfit(basis)
     distance = absolute(proposed - inside)
     # one matrix product adds up the parts of the log weight, with these coefficients
     parts = [
         (points, [0.0, *[axes[i].tilt for i in residuals.order]]),
         (log(precision), [-0.5]),
-        (surprise, [-0.5]),
+        (misfit.log_likelihood, [1.0 / misfit.multiple]),
     ]
     if log_jacobian is not None:
         parts.append((log_jacobian, [1.0] * (len(residuals.order) - 1)))
@@ -205,7 +197,7 @@ def sample_round(
         -draws.log_density,
     )
     boxed_log_weight, log_weight = both.split(2, axis=0)
-    return WeightedRound(points, boxed_log_weight, log_weight, surprise, basis, misfit)
+    return WeightedRound(points, inside, basis, boxed_log_weight, log_weight, misfit)
 
 
 def tempering_power(log_weight: Value) -> Value:
@@ -225,16 +217,3 @@ def tempering_power(log_weight: Value) -> Value:
 def tempered_weights(log_weight: Value, power: Value) -> Value:
     """Weights (1, n) of a power of the density, which sum to 1."""
     return softmax(log_weight * power, axis=1)
-
-
-def weights_by_effective_size(weights: Value, power: Value | None = None) -> Value:
-    r"""Weights times the effective sample size of their round (Kish), with which rounds are pooled.
-
-    .. math:: n_{eff} = \frac{1}{\sum_i w_i^2}
-
-    With a power, a round that had to be tempered (power below 1) gets the weight 0: its samples are
-    those of another distribution.
-    """
-    if power is None:
-        return weights / weights.sum_of_squares(keepdims=True)
-    return weights * (floor(power) / weights.sum_of_squares(keepdims=True))

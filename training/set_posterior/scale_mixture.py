@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, log, sqrt, where
 from training.set_posterior.columns import triangular_factor
 from training.set_posterior.error_scales import ErrorScales
@@ -13,12 +15,40 @@ from training.set_posterior.polynomial_residuals import NearlyKnown, PolynomialR
 
 
 @dataclass(frozen=True)
-class ScaledMisfit:
+class PointMisfit:
     """How well points explain the readings."""
 
-    surprise: Value  # (1, n) -2 log likelihood up to a constant, averaged over scales
-    least: Value  # (1, n) sum of squared residuals with usual errors of the model
-    log_parts: Value  # (scales, n) logarithms of what each scale adds to the likelihood
+    least: Value  # (1, n) sum of squared residuals, with usual errors of the model
+    log_likelihood: Value  # (1, n) up to a constant, and as this multiple of it:
+    multiple: float
+
+
+@dataclass(frozen=True)
+class ScaledMisfit(PointMisfit):
+    """The same with errors of the model of each scale."""
+
+    parts: Value  # (scales, n) what each adds to the likelihood, over the largest
+    total: Value  # (1, n) the sum of these parts
+
+
+@dataclass(frozen=True)
+class OneSystem:
+    """Residuals A b(x) of a set whose likelihood is that of standard normal variables."""
+
+    system: Value  # A, (m, terms)
+
+    def misfit(self, basis: Value) -> PointMisfit:
+        """At points with these monomials (terms, n)."""
+        squares = (self.system @ basis).sum_of_squares(axis=0, keepdims=True)
+        return PointMisfit(squares, squares, multiple=-2.0)
+
+    def proposal(self, like: PolynomialResiduals, *_: object) -> PolynomialResiduals:
+        """The system for proposals: the same in all rounds."""
+        return like
+
+    def divided_by(self, std: Value) -> OneSystem:
+        """For noise whose standard deviation is larger by a factor (1,)."""
+        return OneSystem(self.system / std)
 
 
 @dataclass(frozen=True)
@@ -34,15 +64,10 @@ class ScaleMixture:
     References: MacKay, Neural Computation 4(3), 1992 (the determinant as Occam factor).
     """
 
-    systems: Value  # A_k, (scales, m, terms), by rising scale
+    systems: Value  # A_k, (scales, m, terms), that of the scale that is judged first
     log_weight: Value  # (scales, 1) logarithms of p_k over the root of the determinant
-    scales: ErrorScales
+    count: int  # number of scales
     common: Value | None = None  # further rows (m, terms), which all scales have
-
-    @property
-    def count(self) -> int:
-        """Number of scales."""
-        return len(self.scales.scales)
 
     def standardised(self, nearly_known: NearlyKnown | None) -> ScaleMixture:
         """In coordinates of nearly known unknowns, with their prior as further rows."""
@@ -59,23 +84,27 @@ class ScaleMixture:
 
     def misfit(self, basis: Value) -> ScaledMisfit:
         """At points with these monomials (terms, n)."""
-        squares = (self.systems @ basis).sum_of_squares(axis=1, keepdims=False)
+        residuals = self.systems @ basis
+        # onnxruntime takes three times as long for sums of squares over the middle of three axes
+        squares = (residuals * residuals).sum(axis=1, keepdims=False)
         if self.common is not None:
             squares = squares + (self.common @ basis).sum_of_squares(axis=0, keepdims=True)
         log_parts = squares * -0.5 + self.log_weight
         largest = log_parts.reduce("ReduceMax", axis=0, keepdims=True)
-        total = log(exp(log_parts - largest).sum(axis=0, keepdims=True)) + largest
-        least = squares.take([self.scales.judged], axis=0)
-        return ScaledMisfit(total * -2.0, least, log_parts - total)
+        parts = exp(log_parts - largest)
+        total = parts.sum(axis=0, keepdims=True)
+        log_likelihood = log(total) + largest
+        return ScaledMisfit(squares.take([0], axis=0), log_likelihood, 1.0, parts, total)
 
     def proposal(
-        self, like: PolynomialResiduals, misfit: ScaledMisfit, weights: Value
+        self, like: PolynomialResiduals, misfit: PointMisfit, weights: Value
     ) -> PolynomialResiduals:
         """One system for proposals: the mean of all by the posterior of their scales.
 
         misfit, weights: Of a sample of the posterior, whose weights (1, n) have the sum 1.
         """
-        shares = gemm(weights, exp(misfit.log_parts), transpose_b=True)  # (1, scales)
+        assert isinstance(misfit, ScaledMisfit)
+        shares = gemm(weights / misfit.total, misfit.parts, transpose_b=True)  # (1, scales)
         flat = self.systems.reshape(self.count, -1)
         system = (shares @ flat).reshape(-1, len(like.terms))
         if self.common is not None:
@@ -84,7 +113,13 @@ class ScaleMixture:
         return like.with_system(system)
 
 
-def add_scale_mixture(system: Value, size: Value, terms: int, scales: ErrorScales) -> ScaleMixture:
+def add_scale_mixture(
+    system: Value,
+    size: Value,
+    terms: int,
+    scales: ErrorScales,
+    present: Sequence[bool] = (True,) * len(MODEL_ERROR_COLUMNS),
+) -> ScaleMixture:
     r"""A system (m, terms + errors) with the errors of the last columns integrated out.
 
     As `integrate_out_errors` does, for all scales at once. The determinant is the product of that
@@ -93,20 +128,23 @@ def add_scale_mixture(system: Value, size: Value, terms: int, scales: ErrorScale
     .. math:: |I + E E^T| = \prod_j (1 + |g_j|^2)
 
     size: Zero or more: the scale (1,) alone; below zero: `scales`.
-    scales: By rising size.
+    present: Which of `MODEL_ERROR_COLUMNS` the model can have.
     """
-    of_columns = scales.of_columns
-    count, errors = of_columns.shape
-    own, columns = system.split([terms, errors], axis=1)
+    order = np.argsort(np.arange(len(scales.scales)) != scales.judged, kind="stable")
+    kept = np.flatnonzero(present)
+    of_columns, probabilities = scales.of_columns[order][:, kept], scales.probabilities[order]
+    own, columns = system.split([terms, len(present)], axis=1)
+    if len(kept) < len(present):
+        columns = columns.take(kept.tolist(), axis=1)
     factors = where(size < 0.0, constant(system.graph, of_columns[:, None]), size)
-    copies = (own.reshape(1, -1, terms) * np.ones((count, 1, 1)), columns * factors)
+    copies = (own.reshape(1, -1, terms) * np.ones((len(order), 1, 1)), columns * factors)
     systems, determinants = concat(copies, axis=2), []
-    for last in range(terms + errors - 1, terms - 1, -1):
+    for last in range(terms + len(kept) - 1, terms - 1, -1):
         a, g = systems.split([last, 1], axis=2)
         determinant = g.sum_of_squares(axis=1, keepdims=True) + 1.0  # (scales, 1, 1)
         determinants.append(determinant)
         change = g.node("Transpose", perm=[0, 2, 1]) @ a
         systems = a - (g / (determinant + sqrt(determinant))) * change
     log_determinant = log(concat(determinants, axis=1)).sum(axis=1, keepdims=False)
-    log_prior = np.log(scales.probabilities)[:, None]
-    return ScaleMixture(systems, log_prior - log_determinant * 0.5, scales)
+    log_prior = np.log(probabilities)[:, None]
+    return ScaleMixture(systems, log_prior - log_determinant * 0.5, len(order))

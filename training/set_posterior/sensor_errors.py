@@ -11,8 +11,9 @@ from soilml.onboard.set_contract import (
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
     SENSOR_ERROR_COLUMNS,
+    SENSOR_ERROR_INPUTS,
 )
-from training.onnx_graph.value import Value, concat, constant, gemm, shortcut, sqrt, stack_rows
+from training.onnx_graph.value import Value, concat, constant, gemm, shortcut, sqrt
 from training.set_posterior.families.wheel_family import ContextValues
 
 CHANNELS = len(RESPONSE_CHANNELS)
@@ -29,72 +30,76 @@ class OperatingReadings:
 
 @dataclass(frozen=True)
 class SensorErrors:
-    """Changes of the residuals with errors of slip and load, before weights."""
+    """Errors of sensors, and the changes of the residuals with them before weights."""
 
-    by_reading: Value  # (2, channels, rows): what load's change of the scales adds to the slopes
-    common: Value  # (2, 1, rows): log slip and log load for one standard deviation of the offsets
-    of_row: Value  # (2, 1, rows): the same of the errors of each row
-    exact: Value  # (1, 1) whether no row has errors of its own
+    context: ContextValues  # how the scale of torque depends on load
+    readings: dict[str, Value]  # readings and standard deviations by input name
+    operating: OperatingReadings
+    y: Value  # readings on the scales of the channels, (channels, rows)
+    slope: Value  # derivatives of these scales by the readings, (channels, rows)
+    exact: Value  # (1, 1) whether no row has errors of slip and load of its own
 
-    def columns_at(self, slopes: Value) -> tuple[Value, Value]:
-        """Columns of the common errors, and of each row's own, at a soil, (2, readings) each.
+    @property
+    def size(self) -> Value:
+        """A number (1, 1) that is zero without errors, also if there are no rows, else larger."""
+        shared = concat([self.readings[name] for name in SENSOR_ERROR_INPUTS], axis=0)
+        of_set = shared.sum_of_squares(keepdims=True)
+        of_rows = self.readings["torque_bias"].sum_of_squares(keepdims=True)
+        return of_rows.node("Sum", self.operating.stds.sum_of_squares(keepdims=True), of_set)
 
-        `slopes` (2, channels, rows) are derivatives of the channels there by log slip and log load.
+    def of_residuals(self, slopes: Value) -> Value:
+        r"""Derivatives (2, channels, rows) of residuals by log slip and log load.
+
+        The reading of slip is s + e. The residual of channel k, :math:`f_k(s + e) - y_k`, changes
+        by :math:`f_k' e`. An error of load changes torque over load and drawbar pull over load as
+        well: with the relative error e of load, the residuals of the three channels change by
+        :math:`(f_1' + 1) e`, :math:`f_2' e` and :math:`(f_3' + f_3) e`, with f' the derivatives by
+        the logarithm of load.
+
+        slopes: Derivatives (2, channels, rows) of the channels at a soil.
         """
-        slopes = slopes + self.by_reading
-        common, of_row = slopes * self.common, slopes * self.of_row
-        return common.reshape(2, -1), of_row.reshape(2, -1)
+        torque, pull = np.zeros((2, 2, CHANNELS, 1))
+        torque[1, 0], pull[1, 2] = self.context.torque_by_load, 1.0
+        return slopes + (self.y * pull + torque)
 
-    def whitened(self, system: Value, of_row: Value) -> Value:
-        """A system (columns, readings) with errors of each row (errors, readings) integrated out.
+    def common_columns(self, slopes: Value) -> Value:
+        """Columns (errors, readings) of the common errors, in their order.
+
+        slopes: Those of the residuals.
+        """
+        slip, load = self.operating.values.split(2, axis=0)
+        shared = [self.readings["slip_bias"] / slip, self.readings["load_gain"] + load * 0.0]
+        of_operating = slopes * concat(shared, axis=0).reshape(2, 1, -1)
+        return concat([self._offsets(), of_operating.reshape(2, -1)], axis=0)
+
+    def _offsets(self) -> Value:
+        """Columns (channels + 1, readings) of the channels' offsets, and of the gain of torque."""
+        readings = self.readings
+        none = readings["load"] * 0.0
+        stds = [readings["torque_bias"]]
+        stds += [readings[f"{name}_bias"] + none for name in RESPONSE_CHANNELS[1:]]
+        offsets = concat([*stds, readings["torque_gain"] * readings["torque"]], axis=0)
+        # row k has the offset of channel k; the last has the gain of torque
+        channel_of_row = np.eye(CHANNELS + 1, CHANNELS)[..., None]
+        channel_of_row[-1, 0] = 1.0
+        scale = self.slope * channel_of_row
+        return (scale * offsets.reshape(CHANNELS + 1, 1, -1)).reshape(CHANNELS + 1, -1)
+
+    def whitened(self, system: Value, slopes: Value, weight: Value) -> Value:
+        """A system (columns, readings) with errors of each row integrated out.
 
         Where slip and load of all rows are exact, nothing is to be done.
+
+        slopes: Those of the residuals.
+        weight: That of each reading (1, readings).
         """
-        return shortcut(self.exact, lambda whole, _: whole, whiten_rows, system, of_row)
 
+        def general(system: Value, slopes: Value, noise: Value, weight: Value) -> Value:
+            of_row = slopes * noise.reshape(len(OPERATING_STD_INPUTS), 1, -1)
+            return whiten_rows(system, of_row.reshape(2, -1) * weight)
 
-def add_sensor_errors(
-    context: ContextValues, readings: dict[str, Value], operating: OperatingReadings, y: Value
-) -> SensorErrors:
-    r"""How residuals change with errors of slip and load.
-
-    The reading of slip is s + e. The residual of channel k, :math:`f_k(s + e) - y_k`, changes by
-    :math:`f_k' e`. An error of load changes torque over load and drawbar pull over load as well:
-    with the relative error e of load, the residuals of the three channels change by
-    :math:`(f_1' + 1) e`, :math:`f_2' e` and :math:`(f_3' + f_3) e`, with f' the derivatives by the
-    logarithm of load.
-
-    context: How the torque scale depends on load.
-    readings: Standard deviations by input name.
-    operating: Slip and load of the rows.
-    y: Readings on the scales of the channels, (channels, rows).
-    """
-    torque, pull = np.zeros((2, 2, CHANNELS, 1))
-    torque[1, 0], pull[1, 2] = context.torque_by_load, 1.0
-    slip, load = operating.values.split(2, axis=0)
-    common = stack_rows([readings["slip_bias"] / slip, readings["load_gain"] + load * 0.0])
-    return SensorErrors(
-        y * pull + torque,
-        common.reshape(2, 1, -1),
-        operating.relative_noise.reshape(len(OPERATING_STD_INPUTS), 1, -1),
-        operating.stds.reduce("ReduceMax") <= 0.0,
-    )
-
-
-def add_offsets(readings: dict[str, Value], slope: Value) -> Value:
-    """Columns (channels + 1, readings) of the offset of each channel, and of the gain of torque.
-
-    `slope` (channels, rows) are derivatives of the channels' scales by the readings.
-    """
-    none = readings["load"] * 0.0
-    stds = [readings["torque_bias"]]
-    stds += [readings[f"{name}_bias"] + none for name in RESPONSE_CHANNELS[1:]]
-    offsets = concat([*stds, readings["torque_gain"] * readings["torque"]], axis=0)
-    # row k has the offset of channel k; the last has the gain of torque
-    channel_of_row = np.eye(CHANNELS + 1, CHANNELS)[..., None]
-    channel_of_row[-1, 0] = 1.0
-    scale = slope * channel_of_row
-    return (scale * offsets.reshape(CHANNELS + 1, 1, -1)).reshape(CHANNELS + 1, -1)
+        given = (system, slopes, self.operating.relative_noise, weight)
+        return shortcut(self.exact, lambda whole, *_: whole, general, *given)
 
 
 def whiten_rows(system: Value, of_row: Value) -> Value:

@@ -5,7 +5,7 @@ import pytest
 
 from training.export.one_step import _without_branches
 from training.onnx_graph.builder import SHORTCUT, Graph, session_of
-from training.onnx_graph.value import Value, constant, shortcut, stack_rows
+from training.onnx_graph.value import Value, constant, shortcut, shortcuts, stack_rows
 
 
 def test_a_constant_and_a_node_are_added_once():
@@ -54,6 +54,30 @@ def test_a_shortcut_is_taken_where_its_condition_is_true(model, x):
     added = 0.0 if sum(x) <= 0.0 else 2.0 if sum(x) <= 100.0 else 3.0
     found = session_of(model).run(None, {"x": np.asarray(x, np.float32)})[0]
     assert found == pytest.approx(1.5 * (np.asarray(x) + added))
+
+
+def two_ways(quick):
+    """Two values of x, both from one If node."""
+    graph = Graph()
+    x = Value(graph, "x")
+    given = {"x": x, "also": (x + 1.0,)}  # a branch reads values within collections
+    first, second = shortcuts(x.sum() <= 0.0, quick, lambda g: [g["x"], g["also"][0] * 3.0], given)
+    first.node("Identity").named("y")
+    second.node("Identity").named("z")
+    return graph.model({"x": [1]}, {"y": (1, [1]), "z": (1, [1])})
+
+
+@pytest.mark.parametrize("x, expected", [(-1.0, (0.0, -1.0)), (2.0, (2.0, 9.0))])
+def test_a_shortcut_has_several_values(x, expected):
+    model = two_ways(lambda g: [g["also"][0], g["x"]])
+    assert [node.op_type for node in model.graph.node].count("If") == 1
+    found = session_of(model).run(None, {"x": np.asarray([x], np.float32)})
+    assert tuple(float(value[0]) for value in found) == expected
+
+
+def test_a_branch_gives_no_value_twice():
+    with pytest.raises(ValueError, match="the same value as two of its outputs"):
+        two_ways(lambda g: [g["x"] * 2.0, g["x"] * 2.0])
 
 
 def test_without_branches_the_general_way_is_left(model):

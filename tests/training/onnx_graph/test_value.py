@@ -89,5 +89,5 @@ def test_only_the_last_node_can_be_given_the_name_of_an_output():
     x = Value(Graph(), "x")
     first = x + 1.0
     assert (first * 2.0).named("y").name == "y"
-    with pytest.raises(ValueError, match="not the output of the last node"):
+    with pytest.raises(ValueError, match="not an output of the last node"):
         first.named("z")

@@ -27,7 +27,7 @@ from training.set_posterior.families.wheel_family import (
     USUAL_MODEL_ERRORS,
     typical_model_errors,
 )
-from training.set_posterior.graph import SetPosteriorGraph
+from training.set_posterior.graph import ROW_INPUTS, SetPosteriorGraph
 from training.set_posterior.monomials import monomials
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import ResponseSettings, fit_response
@@ -53,6 +53,7 @@ def model_columns(posterior, readings, size) -> np.ndarray:
     """Columns (channels, rows, errors) of errors of the model, on the scales of the channels."""
     graph = Graph()
     inputs = {name: Value(graph, name) for name in posterior.inputs if name not in MEMORY_INPUTS}
+    inputs |= {name: inputs[name].reshape(1, -1) for name in ROW_INPUTS}
     _, rows = add_residual_rows(posterior.family, posterior.response, inputs)
     basis = monomials(SOIL, posterior.response.terms)
     rows.system_at(constant(graph, basis[:, None])).named("out")

@@ -6,6 +6,7 @@ import pytest
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, ERROR_COLUMNS, MEMORY_INPUTS
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value, constant
+from training.set_posterior.graph import ROW_INPUTS
 from training.set_posterior.monomials import monomials
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.sensor_errors import integrate_out_errors, whiten_rows
@@ -93,10 +94,11 @@ def test_columns_of_common_errors_are_changes_of_the_residuals(wheel_posterior, 
     graph, inputs = Graph(), {}
     for key in wheel_posterior.inputs:
         if key not in MEMORY_INPUTS:
-            inputs[key] = Value(graph, key)
+            given = Value(graph, key)
+            inputs[key] = given.reshape(1, -1) if key in ROW_INPUTS else given
     _, rows = add_residual_rows(wheel_posterior.family, response, inputs)
     basis = None if x is None else constant(graph, at_soil[:, None])
-    rows.system_at(basis).named("out")
+    rows.compressed(rows.columns_at(basis)).named("out")
     shapes = {key: wheel_posterior.inputs[key] for key in inputs}
     session = session_of(graph.model(shapes, {"out": (1, ["m", "columns"])}))
 

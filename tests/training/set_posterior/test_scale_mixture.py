@@ -22,11 +22,11 @@ def session():
     inputs = {name: Value(graph, name) for name in ("system", "size", "basis")}
     mixture = add_scale_mixture(inputs["system"], inputs["size"], TERMS, USUAL_SCALES)
     found = mixture.misfit(inputs["basis"])
-    found.surprise.node("Identity").named("surprise")
+    (found.log_likelihood * -2.0).named("surprise")
     found.least.node("Identity").named("least")
-    found.log_parts.node("Identity").named("log_parts")
+    (found.parts / found.total).named("shares")
     shapes = {"system": ["m", TERMS + ERRORS], "size": [1], "basis": [TERMS, POINTS]}
-    outputs = {name: (1, ["k", POINTS]) for name in ("surprise", "least", "log_parts")}
+    outputs = {name: (1, ["k", POINTS]) for name in ("surprise", "least", "shares")}
     return session_of(graph.model(shapes, outputs))
 
 
@@ -51,7 +51,7 @@ def run(session, system, basis, size) -> list[np.ndarray]:
 
 
 def test_the_likelihood_is_the_average_over_scales(session, example):
-    surprise, least, log_parts = run(session, *example, INFERRED)
+    surprise, least, shares = run(session, *example, INFERRED)
     parts, misfits = [], []
     for scales, probability in zip(SIZES, PROBABILITIES, strict=True):
         misfit, log_determinant = dense(*example, np.repeat(scales, GROUPS))
@@ -59,17 +59,21 @@ def test_the_likelihood_is_the_average_over_scales(session, example):
         parts.append(np.log(probability) - 0.5 * (misfit + log_determinant))
     expected = logsumexp(parts, axis=0)
     assert surprise[0] == pytest.approx(-2.0 * expected, rel=1e-4)
-    assert log_parts == pytest.approx(np.asarray(parts) - expected, abs=1e-3)
+    # the scale that is judged comes first
+    parts = [parts[JUDGED], *(part for k, part in enumerate(parts) if k != JUDGED)]
+    assert shares == pytest.approx(np.exp(np.asarray(parts) - expected), abs=1e-4)
     assert least[0] == pytest.approx(misfits[JUDGED], rel=1e-4)
 
 
 @pytest.mark.parametrize("size", [0.0, 0.5, 1.0])
 def test_a_size_that_is_told_is_the_only_one(session, example, size):
-    surprise, least, log_parts = run(session, *example, size)
+    surprise, least, shares = run(session, *example, size)
     misfit, log_determinant = dense(*example, np.full(ERRORS, size))
     assert least[0] == pytest.approx(misfit, rel=1e-4)
     assert surprise[0] == pytest.approx(misfit + log_determinant, rel=1e-4)
-    assert np.exp(log_parts) == pytest.approx(np.outer(PROBABILITIES, np.ones(POINTS)), rel=1e-3)
+    others = [p for k, p in enumerate(PROBABILITIES) if k != JUDGED]
+    expected = np.outer([PROBABILITIES[JUDGED], *others], np.ones(POINTS))
+    assert shares == pytest.approx(expected, rel=1e-3)
 
 
 def test_scales_rise_and_their_probabilities_are_one_in_all():

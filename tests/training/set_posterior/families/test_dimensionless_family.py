@@ -59,6 +59,7 @@ def test_features_in_the_graph_are_those_of_the_training(any_posterior):
     names = [*sets.readings, *sets.context]
     graph = Graph()
     inputs = {name: Value(graph, name) for name in names}
+    inputs |= {name: inputs[name].reshape(1, -1) for name in sets.readings}
     family.add_context(inputs).features.node("Identity").named("features")
     shapes = {n: ["rows"] if n in sets.readings else [1] for n in names}
     session = session_of(graph.model(shapes, {"features": (1, [5, "rows"])}))
