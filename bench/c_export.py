@@ -6,6 +6,7 @@ import ctypes
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -27,6 +28,7 @@ FILES = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel", "kls1
 FLAGS = ("-O2",)
 CALLS, SETS, STREAMS = 600, 1000, 20
 NAMES = ("mean", "std", "low", "high")
+SINGLE = "one reading"
 
 
 def c_export(folder: Path) -> str:
@@ -52,20 +54,34 @@ def latency_table(models: dict[str, CompiledModel]) -> str:
     """Median and 99th percentile (us) of the same work in onnxruntime and in C."""
     lines = [
         "Microseconds of processor time, all in turn: median and 99th percentile. "
-        "*Step*: one more row and the answer, by the "
-        "rows in the memory. C is called through ctypes, which adds about one microsecond.",
+        "*Step*: one more row and the answer, by the rows in the memory. *Noise alone*: a case "
+        "without errors of sensors and model, for which the graph has a branch and C has none; "
+        "*with errors*: those that the file has by itself. C is called through ctypes, which adds "
+        "about one microsecond.",
         "",
         "| file | what | onnxruntime | p99 | C | p99 |",
         "|---|---|---:|---:|---:|---:|",
     ]
     case = read_recipe("wheel").case
     for name, model in models.items():
-        estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), case)
-        for what, outputs, feed, by_c in tasks(name, model, estimator):
-            run = partial(estimator.session.run, outputs, feed)
-            times = processor_times(run, by_c)
-            lines.append(f"| {name} | {what} | {' | '.join(f'{t:.0f}' for t in times)} |")
+        file = Estimator.load(ROOT / "exported" / f"{name}.onnx")
+        for label, estimator in with_and_without_errors(for_simulated_case(file, case), file):
+            for what, outputs, feed, by_c in tasks(name, model, estimator):
+                run = partial(estimator.session.run, outputs, feed)
+                times = " | ".join(f"{t:.0f}" for t in processor_times(run, by_c))
+                lines.append(f"| {name} | {what}{'' if what == SINGLE else label} | {times} |")
     return "\n".join(lines)
+
+
+def with_and_without_errors(exact: Estimator, file: Estimator) -> list[tuple[str, Estimator]]:
+    """The estimator with no errors but noise, and one with the errors that the file has by itself.
+
+    The former alone for a file without a set posterior.
+    """
+    if exact.sets is None or file.sets is None:
+        return [("", exact)]
+    usual = replace(exact.sets, common_errors=file.sets.common_errors)
+    return [(", noise alone", exact), (", with errors", replace(exact, sets=usual))]
 
 
 def processor_times(*works):  # type: ignore[no-untyped-def]
@@ -84,12 +100,12 @@ def tasks(name, model, estimator):  # type: ignore[no-untyped-def]
     """What is timed: a name, outputs and inputs of onnxruntime, and a call of the C library."""
     library, reference, work = model.library, ctypes.byref, ctypes.byref(model.work)
     sets = estimator.sets
-    if not (sets and sets.sets_only):
+    if not (sets and (sets.sets_only or sets.common_errors["model_error"])):
         feed = {n: np.asarray([v], np.float32) for n, v in reading().items()}
         row, estimate = model.row(**reading()), model.new("estimate")
         single = getattr(library, f"{name}_single")
         arguments = reference(row), reference(estimate), work
-        yield "one reading", OUTPUTS, feed, lambda: single(*arguments)
+        yield SINGLE, OUTPUTS, feed, lambda: single(*arguments)
     if sets is None or name == "kls1_wheel":  # the rows are of another wheel
         return
     names = [*(SET_PREFIX + output for output in SET_OUTPUTS), *MEMORY_OUTPUTS]
@@ -97,7 +113,8 @@ def tasks(name, model, estimator):  # type: ignore[no-untyped-def]
     found, many = model.new("set_estimate"), readings()
     for what, before, count in (("set of 16", 0, 16), ("step at 8", 8, 1), ("step at 200", 200, 1)):
         rows = {k: np.resize(v, before + count).astype(np.float32) for k, v in many.items()}
-        own, memory = model.start(**sets.context_values), estimator.start()
+        own = model.start(**sets.context_values, **sets.common_errors)
+        memory = estimator.start()
         for first in range(0, before, 16):
             part = {k: v[first : min(first + 16, before)] for k, v in rows.items()}
             model.step(own, model.rows(**part))
