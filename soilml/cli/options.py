@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from soilml.config.case import Case
     from soilml.physics.effects import Effect
+    from soilml.physics.soils.gravity_law import GravityChange
 
 FILE_SUFFIXES = (".html", ".json", ".csv", ".toml", ".pdf")  # Of no folder that is made
 REPORT_FILES = ("report.html", "report.json")  # Files of the folder of --report
@@ -87,6 +89,46 @@ def add_exact_model_option(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="take model and sensors to be exactly as in MODEL.toml",
     )
+
+
+def add_gravity_options(parser: argparse.ArgumentParser) -> None:
+    """Declare --gravity, --tested-at and --gravity-law, which `gravity_change` reads."""
+    parser.add_argument(
+        "--gravity",
+        metavar="G",
+        help="gravity that is predicted for: earth, moon, mars, or in m/s^2",
+    )
+    parser.add_argument(
+        "--tested-at",
+        metavar="G",
+        help="gravity of the rows (default: that of [rover], else earth)",
+    )
+    parser.add_argument(
+        "--gravity-law",
+        metavar="LAW",
+        help="how the soil changes with gravity: open (default), constant or proportional",
+    )
+
+
+def gravity_change(args: argparse.Namespace, case: Case) -> GravityChange | None:
+    """The gravity of the rows, the one that is asked for, and the law; None without --gravity.
+
+    Raises `InputError` for a gravity or a law that is none, or an option without --gravity.
+    """
+    from soilml.config.wheeled_rover import GRAVITY, read_gravity
+    from soilml.physics.soils.gravity_law import GravityChange
+
+    if args.gravity is None:
+        for option, value in (("tested-at", args.tested_at), ("gravity-law", args.gravity_law)):
+            if value is not None:
+                raise InputError(
+                    f"--{option} needs --gravity, the gravity that is predicted for, such as moon"
+                )
+        return None
+    tested = GRAVITY["earth"] if case.rover is None else case.rover.gravity
+    if args.tested_at is not None:
+        tested = read_gravity(args.tested_at)
+    return GravityChange(tested, read_gravity(args.gravity), args.gravity_law or "open")
 
 
 def add_by_option(parser: argparse.ArgumentParser) -> None:

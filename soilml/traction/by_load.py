@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -13,10 +14,12 @@ from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.operating_point import Operating
+from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.row_status import Status
 from soilml.traction.draws import SoilDraws
+from soilml.traction.gravity import LawComparison, compare_laws, draws_at_gravity
 from soilml.traction.pull_and_slope import Traction, predict_traction
 
 #: Extrapolation beyond the measured slips (difference) and loads (factor) that is reported.
@@ -123,11 +126,15 @@ def _extrapolation(
 
 @dataclass(frozen=True)
 class LoadPrediction:
-    """Pull and slope under one load, from the posterior and from the prior, with warnings."""
+    """Pull and slope under one load, from the posterior and from the prior, with warnings.
+
+    `laws` are answers by each law of gravity, where that is in doubt.
+    """
 
     posterior: Traction
     prior: Traction
     warnings: tuple[Remark, ...]
+    laws: LawComparison | None = None
 
     @property
     def remaining_fraction(self) -> tuple[float, float]:
@@ -147,21 +154,45 @@ def predictions_by_load(
     slip: Floats,
     measured: MeasuredRange,
     covariates: Mapping[str, float] | None = None,
+    gravity: GravityChange | None = None,
 ) -> list[LoadPrediction]:
     """Pull and slope under each load (N) at the slips (m,), by draws and by draws of the prior.
+
+    With `gravity`, the draws are those under the gravity of the tests, the answers under the other.
 
     Raises `InputError` for a load that more than half of the draws do not carry at any sinkage.
     """
     predictions = []
+    tested = draws
+    if gravity is not None:
+        draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
     for load in loads:
         _check_carried(case, draws, load, slip, covariates)
         after, before = (predict_traction(case, d, load, slip, covariates) for d in (draws, prior))
         bare = LoadPrediction(after, before, ())
-        texts = prediction_warnings(
+        texts: Iterable[Remark] = prediction_warnings(
             after, bare.remaining_fraction, measured, error_included=draws.errors is not None
         )
-        predictions.append(LoadPrediction(after, before, tuple(texts)))
+        laws = None
+        if gravity is not None:
+            answers = partial(_answers, case, load, slip, covariates)
+            laws = compare_laws(case, tested, gravity, answers)
+            texts = [*texts, *([] if laws is None else [laws.remark()])]
+        predictions.append(LoadPrediction(after, before, tuple(texts), laws))
     return predictions
+
+
+def _answers(
+    case: Case, load: float, slip: Floats, covariates: Mapping[str, float] | None, draws: SoilDraws
+) -> dict[str, Floats]:
+    """What laws of gravity are compared by: draws (n,), in the unit that is printed."""
+    found = predict_traction(case, draws, load, slip, covariates)
+    middle = len(slip) // 2 - 1
+    return {
+        "largest_pull_N": found.largest_pull,
+        "steepest_deg": np.rad2deg(found.steepest_slope),
+        f"sinkage_mm_slip_{slip[middle]:.2g}": 1e3 * found.sinkage[:, middle],
+    }
 
 
 def measured_loads(load: Floats) -> list[float]:

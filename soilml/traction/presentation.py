@@ -69,6 +69,7 @@ def _columns(one: LoadPrediction) -> dict[str, Any]:
         ("steepest_slope_rad", known.steepest_slope),
         ("tractive_efficiency", known.tractive_efficiency),
         ("pull_efficiency", known.pull_efficiency),
+        ("sinkage_m", known.sinkage),
     ):
         columns |= {k: np.broadcast_to(v, count) for k, v in band_columns(name, values).items()}
     columns |= _classes(known)
@@ -112,6 +113,7 @@ def pull_text(report: PullReport) -> str:
         f"loads {loads[0]:.4g} to {loads[1]:.4g} N"
     )
     parts = [head, *(_load_text(one) for one in report.by_load)]
+    parts += [one.laws.text() for one in report.by_load if one.laws is not None]
     return "\n\n".join([*parts, "\n".join(f"! {text}" for text in report.warnings)])
 
 

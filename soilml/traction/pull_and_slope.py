@@ -39,6 +39,8 @@ class Traction:
         Drawbar pull on level ground, N (n, m); NaN where the soil does not carry the load.
     slope
         Slope that a vehicle climbs steadily, rad (n, m); negative where it only descends.
+    sinkage
+        Sinkage on level ground, m (n, m).
     tractive_efficiency
         Power at the drawbar over that of the drive on level ground, (n, m); NaN for a leg.
     pull_efficiency
@@ -49,6 +51,7 @@ class Traction:
     slip: Floats
     pull: Floats
     slope: Floats
+    sinkage: Floats
     tractive_efficiency: Floats
     pull_efficiency: Floats
 
@@ -172,7 +175,9 @@ def predict_traction(
     slope = np.full(rows.size, np.nan)
     slope[carried] = np.where(root.converged | (root.x >= LARGEST_SLOPE), root.x, np.nan)
     shape = (count, len(slip))
-    found = (values.reshape(shape) for values in (level, slope, tractive, efficiency))
+    found = (
+        np.reshape(values, shape) for values in (level, slope, force.sinkage, tractive, efficiency)
+    )
     return Traction(float(load), slip, *found)
 
 

@@ -17,6 +17,7 @@ from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.operating_point import COVARIATES
 from soilml.physics.pull_efficiency import THRESHOLDS
+from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.figure_style import take_axes
@@ -29,6 +30,7 @@ from soilml.traction.by_load import (
     predictions_by_load,
     slip_grid,
 )
+from soilml.traction.gravity import gravity_remark
 from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.pull_and_slope import Traction, excluded_effects
 from soilml.traction.soil_draws import measured_soil, prior_draws
@@ -84,6 +86,7 @@ def pull_report(
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
     exact_model: bool = False,
+    gravity: GravityChange | None = None,
 ) -> PullReport:
     """Pull and slope of a gear on the soil that the rows were measured on.
 
@@ -105,6 +108,9 @@ def pull_report(
     exact_model
         Whether the soil is that of the model taken as exact, and not averaged over explanations as
         in `identify`; not with an estimator.
+    gravity
+        Gravity of the rows and of the prediction, with a law of the soil; loads are those of the
+        prediction. By default both are the same.
 
     Returns
     -------
@@ -139,7 +145,11 @@ def pull_report(
     if errors is not None:
         draws, before = replace(draws, errors=errors[0]), replace(before, errors=errors[1])
         error = errors[1].amplitude("drawbar_pull")
-    predictions = predictions_by_load(case, draws, before, loads, slip, measured_range, covariates)
+    predictions = predictions_by_load(
+        case, draws, before, loads, slip, measured_range, covariates, gravity
+    )
+    if gravity is not None and gravity.ratio != 1.0:
+        warnings.append(gravity_remark(gravity))
     key = column("drawbar_pull")
     pull = table[key] if key in table else np.full(len(table), np.nan)
     known = np.isfinite(pull)

@@ -30,6 +30,7 @@ def rover_text(rover: WheeledRover, report: RoverReport) -> str:
         f"{rover.gravity:.4g} m/s^2"
     )
     parts = [head, _slopes(report), _wheels(report), _answers(report)]
+    parts += [] if report.laws is None else [report.laws.text()]
     return "\n\n".join([*parts, "\n".join(f"! {text}" for text in report.warnings)])
 
 

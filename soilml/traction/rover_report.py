@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,18 @@ from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.quantiles import quantile_band
 from soilml.onboard.estimator import Estimator
+from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.figure_style import take_axes
 from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
 from soilml.traction.draws import DrawnErrors, SoilDraws
+from soilml.traction.gravity import (
+    LawComparison,
+    compare_laws,
+    draws_at_gravity,
+    gravity_remark,
+)
 from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.report import POSTERIOR, PRIOR
@@ -43,6 +51,7 @@ class RoverReport:
     performance: RoverPerformance
     prior_steepest: Floats
     warnings: tuple[Remark, ...]
+    laws: LawComparison | None = None  # By each law of gravity, where that is in doubt
 
     def plot(self, ax: Any = None) -> NDArray[Any]:
         """Draw slip, margin and energy against the slope, and the steepest slope.
@@ -62,6 +71,7 @@ def rover_report(
     slip_limit: float | None = None,
     estimator: Estimator | None = None,
     exact_model: bool = False,
+    gravity: GravityChange | None = None,
 ) -> RoverReport:
     """Performance of the case's rover on the soil that the rows were measured on.
 
@@ -75,6 +85,8 @@ def rover_report(
     estimator: Trained estimator whose estimate replaces the posterior.
     exact_model: Whether the soil is that of the model taken as exact, and not averaged over
         explanations as in `identify`; not with an estimator.
+    gravity: Gravity of the rows, and of the rover in place of that of the case, with a law of the
+        soil. By default the rows are from where the rover is.
 
     Raises `InputError` as `rover_performance` does, or for a slip limit outside (0, 1); `FitError`,
     `TableError` as `identify`.
@@ -87,19 +99,40 @@ def rover_report(
     table = with_rover_columns(case, as_table(table))
     soil = measured_soil(case, table, free, estimator, exact_model)
     table = table.rows(table.answered)
+    if gravity is not None:
+        case = with_gravity(case, gravity.target)
     measured = MeasuredRange.of(table["slip"], table["load_N"])
     slip = slip_grid(slip_limit, measured)
     key = column("speed")
     speed = float(np.nanmedian(table[key])) if key in table else None
     draws, prior = soil.draws, prior_draws(soil.unknown, case=case)
+    assert case.rover is not None
     loads = np.ravel(case.rover.loads(slopes)).tolist()
     errors = draw_model_errors(case, table, draws, slip, loads, noise_scale=soil.noise_scale)
     if errors is not None:
         draws, prior = replace(draws, errors=errors[0]), replace(prior, errors=errors[1])
+    laws = None
+    if gravity is not None:
+        laws = compare_laws(case, draws, gravity, partial(_answers, case, slip, speed))
+        draws, prior = (draws_at_gravity(case, d, gravity) for d in (draws, prior))
     found = rover_performance(case, draws, slopes, slip, speed)
     before = _steepest_before(case, prior, slip, speed)
-    warnings = (*soil.warnings, *_warnings(case, found, measured, draws.errors))
-    return RoverReport(len(table), measured, found, before, warnings)
+    warnings = (
+        *soil.warnings,
+        *([laws.remark()] if laws else []),
+        *_warnings(case, found, measured, draws.errors, gravity),
+    )
+    return RoverReport(len(table), measured, found, before, warnings, laws)
+
+
+def _answers(case: Case, slip: Floats, speed: float | None, draws: SoilDraws) -> dict[str, Floats]:
+    """What laws of gravity are compared by: draws (n,), in the unit that is printed."""
+    found = rover_performance(case, draws, np.zeros(1), slip, speed)
+    return {
+        "steepest_deg": np.rad2deg(found.steepest_slope),
+        "margin_N_level": found.margin[:, 0],
+        "deepest_mm_level": 1e3 * np.max([of[:, 0] for of in found.sinkage.values()], axis=0),
+    }
 
 
 def with_gravity(case: Case, gravity: float) -> Case:
@@ -118,7 +151,11 @@ def _steepest_before(case: Case, draws: SoilDraws, slip: Floats, speed: float | 
 
 
 def _warnings(
-    case: Case, found: RoverPerformance, measured: MeasuredRange, errors: DrawnErrors | None
+    case: Case,
+    found: RoverPerformance,
+    measured: MeasuredRange,
+    errors: DrawnErrors | None,
+    gravity: GravityChange | None,
 ) -> Iterator[Remark]:
     assert case.rover is not None
     outside = "" if errors else ", whose error is not in the bands"
@@ -136,11 +173,13 @@ def _warnings(
             f"no slip above {measured.slip[1]:.2g} was measured: extrapolated by the model up "
             f"to {found.slip_limit:.2g}",
         )
-    if abs(case.rover.gravity / EARTH - 1.0) > OTHER_GRAVITY:
+    if gravity is not None and gravity.ratio != 1.0:
+        yield gravity_remark(gravity)
+    elif abs(case.rover.gravity / EARTH - 1.0) > OTHER_GRAVITY:
         yield Remark(
             "other-gravity",
-            f"gravity is {case.rover.gravity:.3g} m/s^2: the soil is taken to have the "
-            "parameters that the rows show",
+            f"gravity is {case.rover.gravity:.3g} m/s^2, of the rows too: if these are from "
+            "elsewhere, the soil may have other parameters (--gravity, --tested-at)",
         )
     tipping = case.rover.tipping_slope(float(LARGEST_SLOPE))
     if np.nanmean(found.steepest_slope > tipping - 1e-3) > 0.05:

@@ -166,7 +166,11 @@ def _named(command: str, dest: str, metavar: str) -> Iterable[str]:
         return released_models()
     if dest == "method":
         return ("nonlinear", "linear", "newton", "posterior")
-    if dest == "gravity":
+    if dest == "gravity_law":
+        from soilml.physics.soils.gravity_law import LAWS
+
+        return LAWS
+    if dest in ("gravity", "tested_at"):
         from soilml.config.wheeled_rover import GRAVITY
 
         return GRAVITY

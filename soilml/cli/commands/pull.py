@@ -12,10 +12,12 @@ from soilml.cli.options import (
     add_by_option,
     add_effects_option,
     add_exact_model_option,
+    add_gravity_options,
     add_model_and_runs,
     add_output,
     add_report_option,
     add_row_options,
+    gravity_change,
     need_for_report,
     slip_limit,
 )
@@ -55,9 +57,16 @@ but neither load transfer nor side slopes.
 A model file with [rover] answers for the whole rover, unless --load or --gear
 names one wheel: the slip that slopes need, the margin of pull, the work of the
 wheels for each metre, the steepest slope and the best slip, with the load of
-each wheel on the slope. --gravity moves it to another planet.
+each wheel on the slope.
 
   soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
+  soilml pull MODEL.toml RUNS.csv --load 20 --gravity 1.62 --tested-at 9.81
+
+--gravity predicts for another gravity than that of the rows, which is that of
+[rover], else the Earth's, or --tested-at. Loads are those of the prediction.
+How a soil changes with gravity is disputed: by default the law is open, and
+the bands contain that doubt; --gravity-law constant or proportional is one of
+the two schools.
 
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
 measurement. A value with a warning that it is not known is no more accurate
@@ -72,9 +81,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_model_and_runs(parser)
     parser.add_argument("--load", help="vertical loads in N: A,B,... or start:stop:count")
     parser.add_argument("--slope", metavar="A,B,...", help="slopes of a rover in degrees")
-    parser.add_argument(
-        "--gravity", metavar="G", help="gravity of a rover: earth, moon, mars, or in m/s^2"
-    )
+    add_gravity_options(parser)
     parser.add_argument(
         "--slip-limit", type=slip_limit, metavar="S", help="largest slip considered"
     )
@@ -124,17 +131,18 @@ def run(args: argparse.Namespace) -> int:
         if whole.rover is not None:
             print_table_hints(table, whole)
             return _run_rover(args, whole, table, options)
-    for option in ("slope", "gravity"):
-        if getattr(args, option) is not None:
-            raise InputError(
-                f"--{option} needs a model file with [rover], and neither --load nor --gear"
-            )
+    if args.slope is not None:
+        raise InputError("--slope needs a model file with [rover], and neither --load nor --gear")
     case = read_case_of_rows(args, args.model, table, available_effects(args))
     print_table_hints(table, case)
     loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
     if len(loads or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
-    options |= {"loads": loads, "estimator": _estimator(args)}
+    options |= {
+        "loads": loads,
+        "estimator": _estimator(args),
+        "gravity": gravity_change(args, case),
+    }
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: pull_report(case, rows, **options)
     )
@@ -148,19 +156,18 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
 
     from soilml.cli.options import parse_numbers
     from soilml.cli.tables import result_by_group
-    from soilml.config.wheeled_rover import read_gravity
     from soilml.traction.rover_presentation import rover_presentation
     from soilml.traction.rover_report import rover_report, with_gravity
 
-    if args.gravity is not None:
-        case = with_gravity(case, read_gravity(args.gravity))
     slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
-    options |= {"slopes": slopes, "estimator": _estimator(args)}
+    change = gravity_change(args, case)
+    options |= {"slopes": slopes, "estimator": _estimator(args), "gravity": change}
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: rover_report(case, rows, **options)
     )
-    assert case.rover is not None
-    _write_results(args, found, rover_presentation(case.rover), failed)
+    moved = case if change is None else with_gravity(case, change.target)
+    assert moved.rover is not None
+    _write_results(args, found, rover_presentation(moved.rover), failed)
     return 0
 
 

@@ -1,0 +1,94 @@
+"""A soil under another gravity: the schools are the ends of the open law, whose bands hold both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from remarked import remarked
+
+from soilml import Operating, read_case
+from soilml.errors import InputError
+from soilml.io.table import Table
+from soilml.numerics.quantiles import quantile_band
+from soilml.physics.soils.gravity_law import CONSTANT, PROPORTIONAL, GravityChange, GravityLawDraws
+from soilml.traction import SoilDraws, predict_traction
+from soilml.traction.gravity import draws_at_gravity
+from soilml.traction.report import pull_report
+
+EARTH, MOON = 9.80665, 1.62
+SCHOOLS = ("constant", "proportional")
+SOIL = {"kphi": 1.5e6, "friction_angle": 0.6, "shear_modulus": 0.012, "unit_weight": 15000.0}
+SOIL |= {"cohesion": 500.0, "kc": 990.0, "n": 1.1}
+
+
+@pytest.fixture
+def case(model_file):
+    return read_case(model_file)
+
+
+def test_the_ends_of_the_open_law_are_the_schools():
+    ends = GravityLawDraws(np.asarray([0.0, 1.0]), np.zeros(2), np.zeros(2))
+    found = GravityChange(EARTH, MOON).parameters(SOIL, ends)
+    for i, law in enumerate(SCHOOLS):
+        change = GravityChange(EARTH, MOON, law)
+        school = change.parameters(SOIL, change.draws(1))
+        for name, value in SOIL.items():
+            scaled = name == "unit_weight" or (name == "kphi" and law == "proportional")
+            assert school[name] == pytest.approx(value * (MOON / EARTH if scaled else 1.0))
+            assert np.broadcast_to(found[name], 2)[i] == np.ravel(school[name])[0]
+    exponent = GravityChange(EARTH, MOON).draws(1000).exponent
+    shares = np.mean(exponent == 0.0), np.mean(exponent == 1.0)
+    assert shares == pytest.approx((CONSTANT, PROPORTIONAL), abs=0.002)
+
+
+def test_under_the_gravity_of_the_tests_nothing_changes(case):
+    change, draws = GravityChange(3.7, 3.7), SoilDraws(("kphi",), np.asarray([[1e6], [2e6]]))
+    assert draws_at_gravity(case, draws, change) is draws
+    assert change.parameters(SOIL, change.draws(1)) == SOIL
+
+
+def test_draws_are_those_of_a_model_with_the_changed_soil(case):
+    draws = SoilDraws(("cohesion", "friction_angle"), np.asarray([[0.0, 0.5], [900.0, 0.6]]))
+    moved = draws_at_gravity(case, draws, GravityChange(EARTH, MOON, "proportional"))
+    found = predict_traction(case, moved, 20.0, np.asarray([0.3]))
+    soil = replace(case.soil, kphi=case.soil.kphi * MOON / EARTH)
+    soil = replace(soil, cohesion=draws.values[:, 0], friction_angle=draws.values[:, 1])
+    force = case.model(soil, Operating(slip=0.3, load=20.0))
+    np.testing.assert_allclose(found.pull[:, 0], force.drawbar_pull, rtol=1e-9)
+    np.testing.assert_allclose(found.sinkage[:, 0], force.sinkage, rtol=1e-9)
+
+
+@pytest.mark.slow
+def test_the_open_band_holds_the_medians_of_both_schools_and_says_what_the_law_costs(case):
+    true = case.with_values({"cohesion": 300.0, "friction_angle": 0.6, "shear_modulus": 0.012})
+    at = Operating(slip=np.asarray([0.1, 0.3, 0.5]), load=np.asarray([20.0, 60.0, 120.0]))
+    columns = {"run": np.full(3, "a"), "slip": at.slip, "load_N": at.load}
+    table = Table(columns | {"torque_Nm": true.model(true.soil, at).torque})
+    reports = {
+        law: pull_report(
+            case, table, loads=[20.0], exact_model=True, gravity=GravityChange(EARTH, MOON, law)
+        )
+        for law in ("open", *SCHOOLS)
+    }
+    found = {law: report.by_load[0].posterior for law, report in reports.items()}
+    for name in ("largest_pull", "sinkage", "steepest_slope"):
+        band = quantile_band(getattr(found["open"], name))
+        for law in SCHOOLS:
+            median = quantile_band(getattr(found[law], name)).middle
+            assert (band.lower < median).all() and (median < band.upper).all(), (name, law)
+    known = pull_report(case, table, loads=[20.0], exact_model=True)  # loads are the prediction's
+    np.testing.assert_array_equal(found["constant"].pull, known.by_load[0].posterior.pull)
+    width, *narrow = (quantile_band(found[law].largest_pull).width for law in ("open", *SCHOOLS))
+    share = f"makes {1.0 - np.mean(narrow) / width:.0%} of the band of largest_pull_N"
+    assert remarked(reports["open"].by_load[0].warnings, share)
+
+
+def test_what_has_no_law_is_refused(case):
+    for bad in ((0.0, MOON), (EARTH, -1.0), (EARTH, float("nan"))):
+        with pytest.raises(InputError, match="must lie between"):
+            GravityChange(*bad)
+    negative = SoilDraws(("kphi",), np.asarray([[1e6], [-2e6]]))
+    with pytest.raises(InputError, match="kphi is -2e\\+06"):
+        draws_at_gravity(case, negative, GravityChange(EARTH, MOON))
+    with pytest.raises(InputError, match="had one gravity"):
+        draws_at_gravity(replace(case, simulator=object()), negative, GravityChange(EARTH, MOON))
