@@ -10,17 +10,22 @@ from typing import TYPE_CHECKING, Any
 from soilml.cli.options import (
     add_effects_option,
     add_exact_model_option,
+    add_gravity_options,
     add_model_and_runs,
     add_output,
     add_row_options,
+    gravity_change,
+    number,
+    slip_limit,
     whole_number_from,
 )
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
-    from soilml.experiment_design import Advice, RatedRow
+    from soilml.experiment_design import Advice, ParameterSamples, RatedRow
     from soilml.fitting.readings import Readings
+    from soilml.remarks import Remark
 
 HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
@@ -46,9 +51,31 @@ and torque with each other channel. Without --loads, loads from half to twice
 the measured ones are tried. A point is excluded where a twentieth or more of
 the posterior samples does not carry the wheel. Model errors are considered where
 [discrepancy] declares them or [remainder] has them.
+
+With --gravity, rate tests made where --tested-at says (on Earth) by what they
+tell of the drawbar pull of the wheel there, under --target-load:
+
+  soilml advise MODEL.toml --gravity moon --target-load 20 --radii 0.1,0.15
+
+A test has rows at all --slips under a load, with a wheel of a radius.
+pull_left_N is the standard deviation of the pull that is expected after it, by
+the model, with the law of gravity in doubt; scaled_error_N is the error of the
+measured pull times the ratio of the loads, without a model. speed_ratio is the
+speed of the test over that there at equal Froude number. Beside the best tests
+stand those of the same load and of the same mass.
 """
 #: Largest number of rows planned in a sequence, and of operating points (slips times loads).
 MAX_COUNT, MAX_POINTS = 5, 1000
+MAX_TESTS = 200  # Most tests for another gravity
+#: Columns of their table, and the attribute of a test in each.
+TRANSFER = {
+    "load_N": "load",
+    "radius_m": "radius",
+    "pull_left_N": "pull_std",
+    "scaled_error_N": "scaled_error",
+    "speed_ratio": "speed_ratio",
+}
+COUNT = 3  # Default number of rows in the sequence
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,13 +88,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--count",
         type=whole_number_from(1, MAX_COUNT),
-        default=3,
         help="number of rows in the planned sequence, 1 to 5 (default: 3)",
     )
     parser.add_argument(
         "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
     )
     parser.add_argument("--all", action="store_true", help="list every candidate, best first")
+    add_gravity_options(parser)
+    parser.add_argument(
+        "--target-load",
+        type=number,
+        metavar="N",
+        help="with --gravity: load of the wheel there (default: mean of [rover])",
+    )
+    parser.add_argument(
+        "--target-slip", type=slip_limit, metavar="S", help="slip of the pull there (default: 0.3)"
+    )
+    parser.add_argument("--radii", metavar="A,B,...", help="further wheel radii of tests in m")
     add_effects_option(parser)
     add_exact_model_option(parser)
     add_row_options(parser)
@@ -98,6 +135,8 @@ def _with_noise_of_rows(case: Case, readings: Readings) -> Case:
 
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
+    import numpy as np
+
     from soilml.cli.options import available_effects, parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
@@ -115,6 +154,12 @@ def run(args: argparse.Namespace) -> int:
         need("matplotlib", "advise --picture")
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
+    if args.gravity is None:
+        for option in ("target_load", "target_slip", "radii"):
+            if getattr(args, option) is not None:
+                raise InputError(f"--{option.replace('_', '-')} needs --gravity, such as moon")
+    elif args.count is not None or args.picture is not None:
+        raise InputError("--count and --picture are of rows; with --gravity omit them")
     table = None if args.runs is None else read_rows(args, RUNS)
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     free = select_free(case, parse_names(args.free))
@@ -122,13 +167,16 @@ def run(args: argparse.Namespace) -> int:
         None if text is None else parse_numbers(option, text).tolist()
         for option, text in (("--slips", args.slips), ("--loads", args.loads))
     )
-    if table is None:
-        ranges, at = candidate_grid(slips, loads), None
-    else:
+    change = gravity_change(args, case)
+    at, driven, notes = None, np.empty(0), list[Remark]()
+    if table is not None:
         print_table_hints(table, case)
         readings = usable_readings(case, table)
         case = _with_noise_of_rows(case, readings)
-        ranges, at = candidate_grid(slips, loads, readings.row_load), readings.at
+        at, driven, notes = readings.at, readings.row_load, list(readings.notes)
+    if change is not None and loads is None:
+        driven = np.ones(1)  # loads of tests follow from that of the target
+    ranges = candidate_grid(slips, loads, driven)
     if len(ranges.slips) * len(ranges.loads) > MAX_POINTS:
         raise InputError(
             f"{len(ranges.slips)} slips times {len(ranges.loads)} loads are too many to try; "
@@ -140,7 +188,16 @@ def run(args: argparse.Namespace) -> int:
         else:
             samples = samples_of_rows(case, readings, free, exact_model=args.exact_model)
         known = {} if at is None else mean_covariates(at)
-        advice = advise(case, samples, ranges, measured=at, count=args.count, covariates=known)
+        if change is not None:
+            columns, found = _tests_elsewhere(
+                args, case, samples, change=change, loads=loads, slips=slips, covariates=known
+            )
+            write_columns(columns, args.out)
+            tell("\n".join(texts([*found, *notes])))
+            return 0
+        advice = advise(
+            case, samples, ranges, measured=at, count=args.count or COUNT, covariates=known
+        )
     if args.picture is not None:
         from soilml.experiment_design.presentation import save_maps
 
@@ -150,7 +207,7 @@ def run(args: argparse.Namespace) -> int:
         write_columns(_columns(advice, [("candidate", c) for c in ranked]), args.out)
     else:
         write_columns(_columns(advice, _best_rows(advice)), args.out)
-    remarks = [] if at is None else [*next_row_remarks(advice), *readings.notes]
+    remarks = [] if at is None else [*next_row_remarks(advice), *notes]
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
         text = f"the {which} of a next row counts as independent of that of other rows: "
@@ -163,6 +220,38 @@ def run(args: argparse.Namespace) -> int:
         remarks.append(Remark("not-carried", text))
     tell("\n".join(texts(remarks)))
     return 0
+
+
+def _tests_elsewhere(
+    args: argparse.Namespace, case: Case, samples: ParameterSamples, **options: Any
+) -> tuple[dict[str, Any], list[Remark]]:
+    """Columns and remarks of tests that are rated for the pull under another gravity."""
+    import numpy as np
+
+    from soilml.cli.options import parse_numbers
+    from soilml.experiment_design.transfer_tests import TARGET_SLIP, advise_transfer
+
+    load = args.target_load
+    if load is None:
+        if case.rover is None:
+            raise InputError("--gravity needs --target-load, the load of the wheel there in N")
+        load = case.rover.mass * options["change"].target / len(case.rover.wheels)
+    radii = None if args.radii is None else parse_numbers("--radii", args.radii).tolist()
+    if len(options["loads"] or ()) * (1 + len(radii or ())) > MAX_TESTS:
+        raise InputError(f"loads times radii are too many tests; at most {MAX_TESTS} are possible")
+    slip = args.target_slip or TARGET_SLIP
+    found = advise_transfer(case, samples, load=load, slip=slip, radii=radii, **options)
+    rows = {"best by the model": found.best, "best by scaling": found.best_scaled}
+    named = {"same load": found.same_load, "same mass": found.same_mass}
+    rows |= {name: test for name, test in named.items() if test is not None}
+    tests, names = list(rows.values()), list(rows)
+    if args.all:
+        tests = sorted(found.tests, key=lambda test: test.pull_std)
+        names = ["candidate"] * len(tests)
+    columns: dict[str, Any] = {"test": names}
+    for key, name in TRANSFER.items():
+        columns[key] = np.asarray([getattr(test, name) for test in tests])
+    return columns, list(found.remarks())
 
 
 def _best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:
