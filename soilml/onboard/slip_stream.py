@@ -75,15 +75,7 @@ class SlipEstimate:
 @final
 @dataclass(frozen=True)
 class SlipStream:
-    """Speed and slips row by row, state in and state out.
-
-    Examples
-    --------
-    >>> stream = SlipStream.load("rover_slip.onnx")  # doctest: +SKIP
-    >>> state = stream.start()  # doctest: +SKIP
-    >>> row = {"rim_speed": [0.1] * 4, "torque": [1.9] * 4}  # doctest: +SKIP
-    >>> found, state = stream.step(state, **row, load=[70.0] * 4, slope=0.1)  # doctest: +SKIP
-    """
+    """Speed and slips row by row, state in and state out (docs/how-to/slip-unknown.md)."""
 
     session: Session
     path: str
