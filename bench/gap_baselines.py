@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from datagen.challenge.linear_entries import lasso_weights
+from datagen.challenge.process_entry import gaussian_process, process_features
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
@@ -17,9 +19,6 @@ from soilml.fitting.readings import stack_readings
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import column
-
-#: Columns that regressions use where they vary.
-COVARIATES = ("speed_m_s", "pass", "slip_angle_rad", "time_s")
 
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
@@ -67,11 +66,7 @@ def _stlsq(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
 
 
 def _lasso(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
-    from sklearn.linear_model import LassoLarsIC
-
-    norm = np.linalg.norm(g, axis=0)
-    fitted = LassoLarsIC(criterion="bic", noise_variance=1.0).fit(g / norm, r)
-    return _largest(fitted.coef_ / norm, g, labels)
+    return _largest(lasso_weights(g, r), g, labels)
 
 
 def _stepwise(
@@ -116,26 +111,15 @@ def learned(
     physics.
     """
     from sklearn.ensemble import GradientBoostingRegressor
-    from sklearn.gaussian_process import GaussianProcessRegressor
-    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
     from sklearn.linear_model import Ridge
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import PolynomialFeatures
 
-    varied = [name for name in COVARIATES if name in table and np.ptp(table[name]) > 0.0]
-
-    def features(rows: Table) -> np.ndarray:
-        columns = [rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4]
-        columns += [rows[name] / np.ptp(table[name]) for name in varied]
-        if "gear" in rows:
-            columns.append(np.unique(rows["gear"], return_inverse=True)[1])
-        return np.column_stack(columns)
-
+    features = process_features(table)
     x = features(table)
 
-    def process() -> GaussianProcessRegressor:
-        kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0] * x.shape[1], (0.2, 20.0))
-        return GaussianProcessRegressor(kernel + WhiteKernel(1.0), random_state=0)
+    def process() -> Any:
+        return gaussian_process(x.shape[1])
 
     makers: dict[str, Callable[[], Any]] = {
         "Gaussian process": process,

@@ -12,15 +12,23 @@ that an error in the analysis cannot hide in the data that test it.
 a plan, and its truth.
 """
 
-from datagen.blind_sets.blind_set import BlindSet, draw_blind_set, write_blind_set
-from datagen.blind_sets.plans import MECHANISMS, Plan, benchmark_plans, plan_matrix
+from datagen.blind_sets.blind_set import BlindSet, csv_text, draw_blind_set, write_blind_set
+from datagen.blind_sets.plans import (
+    MECHANISMS,
+    Plan,
+    benchmark_plans,
+    draw_plan,
+    plan_matrix,
+)
 
 __all__ = [
     "MECHANISMS",
     "BlindSet",
     "Plan",
     "benchmark_plans",
+    "csv_text",
     "draw_blind_set",
+    "draw_plan",
     "plan_matrix",
     "write_blind_set",
 ]

@@ -204,8 +204,8 @@ def write_blind_set(plan: Plan, folder: Path, truth_folder: Path) -> None:
     blind_set = draw_blind_set(plan)
     folder.mkdir(parents=True, exist_ok=True)
     truth_folder.mkdir(parents=True, exist_ok=True)
-    (folder / "runs.csv").write_text(_csv(blind_set.columns))
-    (folder / "region.csv").write_text(_csv(blind_set.region))
+    (folder / "runs.csv").write_text(csv_text(blind_set.columns))
+    (folder / "region.csv").write_text(csv_text(blind_set.region))
     (folder / "model.toml").write_text(blind_set.model)
     (truth_folder / "truth.json").write_text(json.dumps(blind_set.truth, indent=1) + "\n")
 
@@ -322,7 +322,8 @@ def _model(soil: dict[str, float], free: int, wheels: Wheels, declared: dict[str
     return "\n".join(lines) + "\n"
 
 
-def _csv(columns: Columns) -> str:
+def csv_text(columns: Columns) -> str:
+    """Columns (rows,) by name as the text of a CSV file; readings not taken are blank."""
     names = list(columns)
     lines = [",".join(names)]
     for row in zip(*columns.values(), strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle, groupby, islice
 from typing import TypeVar
@@ -222,6 +222,36 @@ def benchmark_plans(seed: int = 0) -> list[Plan]:
                 )
             )
     return plans
+
+
+def draw_plan(tiers: Sequence[str], seed: int) -> Plan:
+    """One plan at random, of the design `sweep`: every tier, cause and level is equally likely.
+
+    A smooth discrepancy of a random size is beside every mechanism, at least the smallest is in
+    tier D, and none where nothing is wrong with the model (tiers N).
+
+    tiers: Keys of `MECHANISMS` or of `TIERS_WITHOUT_MECHANISM`.
+    seed: A number of any size; draws of others are independent.
+    """
+    generator = np.random.default_rng((seed, 3))
+
+    def one(levels: Sequence[T]) -> T:
+        return levels[int(generator.integers(len(levels)))]
+
+    tier = one(tiers)
+    cause = one(mechanism_keys(tier))
+    least = {"N": len(DISCREPANCIES), "D": 1}.get(tier[0], 0)
+    return Plan(
+        tier=tier,
+        cause=cause,
+        size=one(SIZES) if cause else 0.0,
+        noise=one(NOISE_LEVELS),
+        runs=one(RUNS),
+        soil_family=one(list(FAMILIES)),
+        free=one(FREE_COUNTS),
+        seed=seed,
+        discrepancy=one(DISCREPANCIES[least:] or (0.0,)),
+    )
 
 
 def _benchmark_cells(seed: int) -> Iterator[tuple[str, str, float, str]]:
