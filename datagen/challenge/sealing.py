@@ -130,7 +130,7 @@ def answer_of(plan: Plan, causes: Sequence[dict[str, Any]]) -> str:
 def _public_files(drawn: BlindSet) -> dict[str, str]:
     """Runs, model and operating points of the rows kept back; no reading of these.
 
-    Times are left out: they are there in some tiers alone, which would be told by them.
+    Times are left out: they are there in some tiers alone, which they would reveal.
     """
     runs = {name: values for name, values in drawn.columns.items() if name != "time_s"}
     given = [name for name in runs if name not in COLUMNS]

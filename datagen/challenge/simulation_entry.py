@@ -32,8 +32,8 @@ OF_CAUSE, OF_OTHERS = 80, 400
 SIZE, ERROR, ERROR_ALONE = (0.3, 3.0), (0.0, 2.0), (0.3, 2.0)
 #: Principal components of the readings of the runs, and of those kept back.
 SEEN, PREDICTED = 24, 8
-#: Most epochs of training; the flow gains by more, which take minutes a set.
-RATIO_EPOCHS, FLOW_EPOCHS = 30, 60
+#: Most epochs of training, of each network.
+RATIO_EPOCHS, FLOW_EPOCHS = 150, 150
 
 
 @dataclass(frozen=True)
@@ -160,7 +160,7 @@ def _log_ratios(theta: Floats, x: Floats, observed: Floats) -> Floats:
     import torch
     from sbi.inference import NRE_B
 
-    inference = NRE_B(show_progress_bars=False)
+    inference = NRE_B(tracker=_Untracked(), show_progress_bars=False)
     inference.append_simulations(_tensor(theta), _tensor(x))
     estimator = inference.train(max_num_epochs=RATIO_EPOCHS)
     every = torch.eye(theta.shape[1])
@@ -174,7 +174,7 @@ def _posterior_draws(theta: Floats, x: Floats, observed: Floats) -> Floats:
     import torch
     from sbi.inference import NPE
 
-    inference = NPE(show_progress_bars=False)
+    inference = NPE(tracker=_Untracked(), show_progress_bars=False)
     inference.append_simulations(_tensor(theta), _tensor(x))
     estimator = inference.train(max_num_epochs=FLOW_EPOCHS)
     with torch.no_grad():
@@ -188,9 +188,34 @@ def _tensor(values: Floats) -> Any:
     return torch.as_tensor(np.asarray(values), dtype=torch.float32)
 
 
+class _Untracked:
+    """In place of the library's tracker, which writes a folder into the current one."""
+
+    log_dir = None
+
+    def log_metric(self, name: str, value: float, step: int | None = None) -> None:
+        """Keep nothing."""
+
+    def log_metrics(self, metrics: dict[str, float], step: int | None = None) -> None:
+        """Keep nothing."""
+
+    def log_params(self, params: dict[str, Any]) -> None:
+        """Keep nothing."""
+
+    def add_figure(self, name: str, figure: Any, step: int | None = None) -> None:
+        """Keep nothing."""
+
+    def flush(self) -> None:
+        """Nothing is kept."""
+
+
 @contextlib.contextmanager
 def _quiet() -> Iterator[None]:
-    """The library prints how its training goes."""
+    """The library prints how its training goes; one thread, since its networks are small."""
+    import torch
+
+    threads = torch.get_num_threads()
+    torch.set_num_threads(1)
     with (
         Path(os.devnull).open("w") as nowhere,
         contextlib.redirect_stdout(nowhere),
@@ -202,3 +227,4 @@ def _quiet() -> Iterator[None]:
             yield
         finally:
             logging.disable(logging.NOTSET)
+            torch.set_num_threads(threads)

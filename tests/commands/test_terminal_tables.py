@@ -55,6 +55,7 @@ ELSEWHERE = {
     "completion",
     "import",
     "generate",
+    "challenge",
     "train",
     "design-runs",
     "export-c",
