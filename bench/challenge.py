@@ -1,7 +1,7 @@
 """Entries of the house in one challenge, scored: the table of docs/how-to/challenge.md.
 
 python bench/challenge.py            24 sets, four methods: about three minutes of one core
-python bench/challenge.py --sbi      and simulation-based inference, some minutes for each set
+python bench/challenge.py --sbi      and simulation-based inference, half a minute for each set
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from soilml.cli.progress import progress_bar
 
 #: The seed was chosen before any entry was scored on its sets.
 SETS, SEED = 24, 1
-#: The method that needs an extra, and most of the time.
+#: The method that needs an extra, and takes most of the time.
 SLOW = "sbi"
 
 
