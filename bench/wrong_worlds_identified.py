@@ -130,24 +130,28 @@ def _notes(found: Sequence[AnswerScores], columns: int) -> list[str]:
 
 def _hidden(worlds: Sequence[str], found: Sequence[AnswerScores], columns: int) -> list[str]:
     """Worlds that the readings hardly tell from a sound one, and the width that they demand."""
-    texts = []
-    for k, name in enumerate(CHANNELS):
-        wanting = []
-        for world, exact in zip(worlds, found[2 * k + 1 :: columns], strict=True):
-            if np.mean(exact.flagged) > 0.5:
-                continue
+    lines = [
+        "Worlds in which the residuals of exact_model exceed the noise in at most half of the "
+        f"sets. To cover {100 * TO_COVER:.0f} % there, its intervals would have to be wider by these "
+        "factors, on sound sets too.",
+        "",
+        f"| world | {' | '.join(f'{c}: c | phi | K' for c in CHANNELS)} |",
+        f"|---|{'---:|' * 3 * len(CHANNELS)}",
+    ]
+    for place, world in enumerate(worlds):
+        cells = []
+        for exact in found[columns * place + 1 : columns * (place + 1) : 2]:
+            hidden = np.mean(exact.flagged) <= 0.5
             factor = np.quantile(exact.needed, TO_COVER, axis=0)
-            wanting += [
-                f"{f:.1f} for {symbol} ({world})"
-                for f, symbol in zip(factor, ("c", "phi", "K"), strict=True)
-                if f > NOTABLE
-            ]
-        texts.append(
-            f"With {name}, the residuals of exact_model exceed the noise in at most half of the "
-            f"sets of some worlds. To cover {100 * TO_COVER:.0f} % there, its intervals would have "
-            f"to be wider by these factors, on sound sets too: {'; '.join(wanting) or 'none'}."
-        )
-    return texts
+            cells += [f"{f:.1f}" if hidden and f > NOTABLE else "" for f in factor]
+        if any(cells):
+            lines.append(f"| {world} | {' | '.join(cells)} |")
+    return [
+        "",
+        *lines,
+        "",
+        f"Factors up to {NOTABLE:.0f}, and worlds that residuals show, are blank.",
+    ]
 
 
 def section() -> str:
