@@ -22,6 +22,7 @@ from training.export_c.functions import (
 )
 from training.export_c.graph_translation import rows_are_apart
 from training.export_c.interface import Interface, read_interface
+from training.export_c.operators.together import FEW_ROWS
 from training.export_c.program import Constant, SharedParts
 from training.export_c.single_precision import in_single_precision
 from training.export_c.stage_text import ARRAYS, WIDTH
@@ -36,7 +37,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 _MATH = {
     "EXP": {"float": "expf", "double": "exp"},
     "SQRT": {"float": "sqrtf", "double": "sqrt"},
-    "FEW_ROWS": {"float": "20", "double": "20"},
+    "FEW_ROWS": {"float": str(FEW_ROWS), "double": str(FEW_ROWS)},
     "LEAST_REST": {"float": "1e-7f", "double": "1e-7"},
 }
 #: Entries of the metadata that tell one file from another, and what they were trained from.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from soilml.onboard.set_contract import (
     SET_PREFIX,
     SET_SWITCH,
 )
-from training.export_c.graph_translation import added_rows, translate_graph
+from training.export_c.graph_translation import added_rows, longest_shortcut, translate_graph
 from training.export_c.interface import Interface, input_shapes
 from training.export_c.program import Program, SharedParts, plan_memory
 from training.export_c.stage_text import ARRAYS, WIDTH, stage_functions
@@ -46,6 +46,28 @@ class GraphFunction:
     lengths: dict[str, int]  # elements of working memory by type
     unpacks: bool  # whether it reads the memory of a set
     constants: frozenset[str]  # names of the constant arrays that it reads
+    counts: tuple[str, ...]  # counts that it is given
+    returns: str  # C type of what it returns
+
+    def head(self, kinds: Mapping[str, str]) -> str:
+        """Its declaration, from the C types of inputs."""
+        parameters = [
+            "WORK *work",
+            *(["const MEMORY *memory"] if self.unpacks else []),
+            *(f"int {count}" for count in self.counts),
+            *(f"const {kinds[name]} *in_{name}" for name in self.inputs),
+            *(f"const {kind} **out_{key}" for key, (kind, _) in self.outputs.items()),
+        ]
+        return f"static {self.returns} {self.name}({', '.join(parameters)})"
+
+    def arguments(self) -> list[str]:
+        """What a function with the same names gives it, but for the outputs."""
+        memory = ["memory"] if self.unpacks else []
+        return ["work", *memory, *self.counts, *(f"in_{name}" for name in self.inputs)]
+
+    def passed_on(self, other: GraphFunction) -> list[str]:
+        """What it gives a function with the same outputs."""
+        return [*other.arguments(), *(f"out_{key}" for key in self.outputs)]
 
 
 def single_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
@@ -68,21 +90,85 @@ def update_function(
 ) -> GraphFunction:
     """The state with the rows that readings add, the counts, and the answer."""
     inputs = _inputs(model, {ROWS: Size.of(ROWS), KEPT: Size.of(KEPT)}, switch=True)
-    program = Program(shared, {ROWS: rows, KEPT: interface.columns})
-    added, *others = added_rows(model), *STEP_OUTPUTS[1:], *_answers(model)
-    function = graph_function(
-        "update_graph", model, program, inputs, [added, *others], not interface.small
-    )
-    outputs = {(MEMORY_OUTPUTS[0] if k == added else k): v for k, v in function.outputs.items()}
-    return replace(function, outputs=outputs)
+    bounds = {ROWS: rows, KEPT: interface.columns}
+
+    def way(name: str, chosen: Mapping[str, Tensor]) -> GraphFunction:
+        added = added_rows(model, chosen)
+        wanted = [added, *STEP_OUTPUTS[1:], *_answers(model)]
+        given, program = inputs | chosen, Program(shared, bounds)
+        made = graph_function(name, model, program, given, wanted, not interface.small)
+        outputs = {(MEMORY_OUTPUTS[0] if k == added else k): v for k, v in made.outputs.items()}
+        return replace(made, outputs=outputs)
+
+    return _with_shortcut("update", model, inputs, Program(shared, bounds), way)
 
 
 def answer_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
     """The estimate from the state of a set."""
     inputs = _inputs(model, {ROWS: Size(0), KEPT: Size.of(KEPT)}, switch=True)
-    program = Program(shared, {KEPT: interface.columns})
-    wanted = _answers(model)
-    return graph_function("answer_graph", model, program, inputs, wanted, not interface.small)
+    bounds = {KEPT: interface.columns}
+
+    def way(name: str, chosen: Mapping[str, Tensor]) -> GraphFunction:
+        given, program = inputs | chosen, Program(shared, bounds)
+        return graph_function(name, model, program, given, _answers(model), not interface.small)
+
+    return _with_shortcut("answer", model, inputs, Program(shared, bounds), way)
+
+
+def _with_shortcut(
+    name: str,
+    model: Any,
+    inputs: Mapping[str, Tensor],
+    program: Program,
+    way: Callable[[str, Mapping[str, Tensor]], GraphFunction],
+) -> GraphFunction:
+    """A function that takes the way of readings with noise alone where they are, else the general.
+
+    model: With the longest of its shortcuts; a function without one has no branch.
+    program: Receives the statements of the condition.
+    way: The function of a name in which some conditions are fixed.
+    """
+    condition = longest_shortcut(model)
+    if condition is None:
+        return way(f"{name}_graph", {})
+    asked = graph_function(f"{name}_is_noise_alone_graph", model, program, inputs, [condition])
+    quick, general = (
+        way(f"{name}_{kind}_graph", {condition: Tensor.constant(np.asarray([taken]), condition)})
+        for kind, taken in (("noise_alone", True), ("with_errors", False))
+    )
+    whole = replace(
+        general,
+        name=f"{name}_graph",
+        inputs=tuple(n for n in inputs if any(n in f.inputs for f in (asked, quick, general))),
+        counts=tuple(dict.fromkeys((*general.counts, *asked.counts, *quick.counts))),
+        lengths={
+            kind: max(f.lengths.get(kind, 0) for f in (asked, quick, general))
+            for kind in {**general.lengths, **quick.lengths, **asked.lengths}
+        },
+        unpacks=True,
+        constants=asked.constants | quick.constants | general.constants,
+    )
+    kinds = {n: inputs[n].kind for n in whole.inputs}
+    back = "return " if whole.returns == "int" else ""
+    lines = [
+        *_wrapped(whole.head(kinds), 0),
+        "{",
+        "    const bool *noise_alone;",
+        *_wrapped(f"{asked.name}({', '.join([*asked.arguments(), '&noise_alone'])});", 4),
+        "    if (*noise_alone)",
+        *_wrapped(f"{back}{quick.name}({', '.join(whole.passed_on(quick))});", 8),
+        *(["    else"] if not back else []),
+        *_wrapped(f"{back}{general.name}({', '.join(whole.passed_on(general))});", 4 if back else 8),
+        "}",
+    ]
+    return replace(whole, text="\n\n".join([asked.text, quick.text, general.text, "\n".join(lines)]))
+
+
+def _wrapped(text: str, indent: int) -> list[str]:
+    """Lines of C, those after the first indented by four more."""
+    return textwrap.wrap(
+        text, WIDTH, initial_indent=" " * indent, subsequent_indent=" " * (indent + 4)
+    )
 
 
 def _answers(model: Any) -> list[str]:
@@ -132,16 +218,23 @@ def graph_function(
     read = [n for n, tensor in inputs.items() if tensor.name in given_on]
     varying = [t.shape[0] for t in found.values() if not t.count.fixed and t.rank > 1]
     kinds = {tensor.name: tensor.kind for tensor in inputs.values()}
-    parameters = [
-        "WORK *work",
-        *(["const MEMORY *memory"] if unpacks else []),
-        *(f"int {count}" for count in given),
-        *(f"const {inputs[n].kind} *in_{n}" for n in read),
-        *(f"const {tensor.kind} **out_{key}" for key, tensor in found.items()),
-    ]
-    head = f"static {'int' if varying else 'void'} {name}({', '.join(parameters)})"
+    sizes = {k: (t.kind, t.count.constant if t.count.fixed else -1) for k, t in found.items()}
     stages, calls = stage_functions(name, program, plan, kinds)
-    lines = [*textwrap.wrap(head, WIDTH, subsequent_indent=" " * 4), "{", *calls]
+    code = " ".join(s.code for s in program.statements)
+    names = {*re.findall(r"\bw\d+\b", code), *(tensor.owner for tensor in found.values())}
+    function = GraphFunction(
+        name=name,
+        text="",
+        inputs=tuple(read),
+        outputs=sizes,
+        lengths=plan.lengths,
+        unpacks=unpacks,
+        constants=frozenset(names),
+        counts=given,
+        returns="int" if varying else "void",
+    )
+    head = function.head({n: inputs[n].kind for n in read})
+    lines = [*_wrapped(head, 0), "{", *calls]
     for key, tensor in found.items():
         place = tensor.name
         if tensor.owner in program.memory:
@@ -150,15 +243,4 @@ def graph_function(
             place = re.sub(rf"\b{tensor.owner}\b", at, tensor.name)
         lines.append(f"    *out_{key} = {place};")
     lines += [f"    return {varying[0].c};"] if varying else []
-    sizes = {k: (t.kind, t.count.constant if t.count.fixed else -1) for k, t in found.items()}
-    code = " ".join(s.code for s in program.statements)
-    names = {*re.findall(r"\bw\d+\b", code), *(tensor.owner for tensor in found.values())}
-    return GraphFunction(
-        name=name,
-        text="\n\n".join([*stages, "\n".join([*lines, "}"])]),
-        inputs=tuple(read),
-        outputs=sizes,
-        lengths=plan.lengths,
-        unpacks=unpacks,
-        constants=frozenset(names),
-    )
+    return replace(function, text="\n\n".join([*stages, "\n".join([*lines, "}"])]))

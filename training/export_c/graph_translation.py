@@ -205,10 +205,13 @@ def _with_sound_memory(nodes: Sequence[Any]) -> list[Any]:
     ]
 
 
-def added_rows(model: Any) -> str:
-    """Name of the value with the rows that readings add to the state of a set."""
+def added_rows(model: Any, chosen: Mapping[str, Tensor]) -> str:
+    """Name of the value with the rows that readings add to the state of a set.
+
+    chosen: Conditions that are fixed, by name.
+    """
     switch = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_), SET_SWITCH)}
-    nodes = _without_branches(model.graph, switch)
+    nodes = _without_branches(model.graph, switch | chosen)
     makers = {name: node for node in nodes for name in node.output}
     joined = _source(makers, MEMORY_OUTPUTS[0], "Concat")
     return str(joined.input[1])
@@ -298,10 +301,27 @@ def _computed_now(node: Any, inputs: list[Tensor | None], opsets: Any) -> list[T
     return [Tensor.constant(np.asarray(x), n) for x, n in zip(found, outputs, strict=True)]
 
 
+def longest_shortcut(model: Any) -> str | None:
+    """The condition of the shortcut that computes most; None where all but pass values on.
+
+    C code has a branch for this one, and takes the general way of the others.
+    """
+    lengths: dict[str, int] = {}
+    graphs = [model.graph]
+    while graphs:
+        for node in graphs.pop().node:
+            branches = {a.name: a.g for a in node.attribute} if node.op_type == "If" else {}
+            graphs += branches.values()
+            if branches and node.doc_string == SHORTCUT:
+                lengths[node.input[0]] = len(branches["then_branch"].node)
+    name = max(lengths, key=lengths.__getitem__, default=None)
+    return name if name is not None and lengths[name] > 1 else None
+
+
 def _without_branches(graph: Any, known: dict[str, Tensor]) -> list[Any]:
     """The nodes of a graph, with each If node replaced by its chosen branch.
 
-    Of a shortcut whose condition depends on the readings, that is the general way.
+    Of a shortcut whose condition is not known, that is the general way.
     """
     from onnx import helper, numpy_helper
 

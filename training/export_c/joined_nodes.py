@@ -343,11 +343,12 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
             for place in changed[id(node)]:
                 new.input[place] = f"{node.input[place]}_factor"
         result.append(new)
-        result += [
-            helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0)
-            for name in node.output
-            if name in wanted
-        ]
+        for name in wanted.intersection(node.output):
+            if node.op_type == "Div" and node.input[0] in wanted:  # by a number: rows stay few
+                given = [f"{node.input[0]}_factor", node.input[1]]
+                result.append(helper.make_node("Div", given, [f"{name}_factor"]))
+            else:
+                result.append(helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0))
     return result
 
 

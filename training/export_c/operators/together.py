@@ -30,6 +30,7 @@ from training.export_c.tensor import Expression, Size, Tensor, strides, total
 
 #: Rows of a system begin at multiples of so many numbers.
 GRAIN = 4
+FEW_ROWS = 20  # A system of so many rows keeps them all
 
 
 def translate_integration(program: Program, node: Node) -> list[Tensor]:
@@ -213,7 +214,7 @@ def translate_factor(program: Program, node: Node) -> list[Tensor]:
         )
     x = x.block(n * skipped, (x.shape[0] + -skipped, n))
     m = x.shape[0]
-    count = program.count_up_to(m.most(program.bounds))
+    count = program.count_up_to(min(m.most(program.bounds), max(n.constant, FEW_ROWS)))
     system = program.new(x.kind, x.shape)
     rest, change = program.new(x.kind, (n,)), program.new(x.kind, (n,))
     program.emit(element_loops(system.name, x.shape, Expression("{0}", (x,))), system, x)
