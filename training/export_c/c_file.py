@@ -85,7 +85,7 @@ def write_c(
         else:
             functions["update"] = update_function(model, interface, shared, rows)
             depends = True
-        functions["answer"] = answer_function(model, interface, shared)
+        functions["answer"] = answer_function(model, interface, shared, rows)
     used = frozenset().union(*(function.constants for function in functions.values()))
     constants = [parts for parts in shared.constants.values() if parts[0] in used]
     environment = template_environment()

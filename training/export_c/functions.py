@@ -20,6 +20,7 @@ from soilml.onboard.set_contract import (
 )
 from training.export_c.graph_translation import added_rows, longest_shortcut, translate_graph
 from training.export_c.interface import Interface, input_shapes
+from training.export_c.point_stages import SMALL_TILE, TILE
 from training.export_c.program import Program, SharedParts, plan_memory
 from training.export_c.stage_text import ARRAYS, WIDTH, stage_functions
 from training.export_c.tensor import Shape, Size, Tensor
@@ -95,7 +96,7 @@ def update_function(
     def way(name: str, chosen: Mapping[str, Tensor]) -> GraphFunction:
         added = added_rows(model, chosen)
         wanted = [added, *STEP_OUTPUTS[1:], *_answers(model)]
-        given, program = inputs | chosen, Program(shared, bounds)
+        given, program = {**inputs, **chosen}, Program(shared, bounds, _tile(rows))
         made = graph_function(name, model, program, given, wanted, not interface.small)
         outputs = {(MEMORY_OUTPUTS[0] if k == added else k): v for k, v in made.outputs.items()}
         return replace(made, outputs=outputs)
@@ -103,16 +104,23 @@ def update_function(
     return _with_shortcut("update", model, inputs, Program(shared, bounds), way)
 
 
-def answer_function(model: Any, interface: Interface, shared: SharedParts) -> GraphFunction:
+def answer_function(
+    model: Any, interface: Interface, shared: SharedParts, rows: int
+) -> GraphFunction:
     """The estimate from the state of a set."""
     inputs = _inputs(model, {ROWS: Size(0), KEPT: Size.of(KEPT)}, switch=True)
     bounds = {KEPT: interface.columns}
 
     def way(name: str, chosen: Mapping[str, Tensor]) -> GraphFunction:
-        given, program = inputs | chosen, Program(shared, bounds)
+        given, program = {**inputs, **chosen}, Program(shared, bounds, _tile(rows))
         return graph_function(name, model, program, given, _answers(model), not interface.small)
 
     return _with_shortcut("answer", model, inputs, Program(shared, bounds), way)
+
+
+def _tile(rows: int) -> int:
+    """Points that a stage takes at a time, by the most rows of a step: a small board reads one."""
+    return TILE if rows > 1 else SMALL_TILE
 
 
 def _with_shortcut(
@@ -158,10 +166,14 @@ def _with_shortcut(
         "    if (*noise_alone)",
         *_wrapped(f"{back}{quick.name}({', '.join(whole.passed_on(quick))});", 8),
         *(["    else"] if not back else []),
-        *_wrapped(f"{back}{general.name}({', '.join(whole.passed_on(general))});", 4 if back else 8),
+        *_wrapped(
+            f"{back}{general.name}({', '.join(whole.passed_on(general))});", 4 if back else 8
+        ),
         "}",
     ]
-    return replace(whole, text="\n\n".join([asked.text, quick.text, general.text, "\n".join(lines)]))
+    return replace(
+        whole, text="\n\n".join([asked.text, quick.text, general.text, "\n".join(lines)])
+    )
 
 
 def _wrapped(text: str, indent: int) -> list[str]:

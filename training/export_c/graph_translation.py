@@ -12,15 +12,15 @@ from soilml.errors import ModelFileError
 from soilml.onboard.set_contract import MEMORY_INPUTS, MEMORY_OUTPUTS, ROW_IN_RANGE, SET_SWITCH
 from training.export_c.joined_nodes import joined
 from training.export_c.operators import OPERATORS as ONNX_OPERATORS
-from training.export_c.operators import together
+from training.export_c.operators import solved, together
 from training.export_c.operators.products import squares_of_product
-from training.export_c.point_stages import TILE, PointStage, in_stages, with_late_copies
+from training.export_c.point_stages import PointStage, in_stages, with_late_copies
 from training.export_c.program import Node, Program, SharedParts
 from training.export_c.tensor import Size, Tensor
 from training.onnx_graph.builder import SHORTCUT, needed_nodes
 
 #: Operators of ONNX, and those that its nodes are joined to.
-OPERATORS = ONNX_OPERATORS | together.OPERATORS
+OPERATORS = ONNX_OPERATORS | together.OPERATORS | solved.OPERATORS
 
 
 def translate_graph(
@@ -115,7 +115,7 @@ class _Translation:
         known = {name: tensor for name, tensor in self.known.items() if name not in made}
         with self.program.stage(stage.points):
             for name in stage.tiled:
-                known[name] = self.program.tile_of(known[name], TILE)
+                known[name] = self.program.tile_of(known[name], self.program.tile)
             inner = _Translation(self.program, stage.nodes, known, stage.outputs, self.opsets)
             inner.add_all(stage.nodes)
             for name in stage.outputs:
@@ -211,7 +211,7 @@ def added_rows(model: Any, chosen: Mapping[str, Tensor]) -> str:
     chosen: Conditions that are fixed, by name.
     """
     switch = {SET_SWITCH: Tensor.constant(np.ones(1, np.bool_), SET_SWITCH)}
-    nodes = _without_branches(model.graph, switch | chosen)
+    nodes = _without_branches(model.graph, {**switch, **chosen})
     makers = {name: node for node in nodes for name in node.output}
     joined = _source(makers, MEMORY_OUTPUTS[0], "Concat")
     return str(joined.input[1])

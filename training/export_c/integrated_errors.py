@@ -18,6 +18,10 @@ import numpy as np
 from training.export_c.tensor import Tensor
 
 INTEGRATION = "IntegrateOut"
+#: Other operators that stand for several nodes.
+ROWS, SUMS = "ProductsOfRows", "GaussNewtonSums"
+APART, FACTOR, MEAN = "ErrorsApart", "RowFactor", "MeanOfScales"
+SQUARES = "SquaresByScale"
 
 
 @dataclass(frozen=True)
@@ -171,3 +175,10 @@ def only_user(users: Mapping[str, list[Any]], name: str, kind: str, fits: Any) -
 def _is_one(known: Mapping[str, Tensor], name: str) -> bool:
     value = known[name].value if name in known else None
     return value is not None and bool(np.all(value == 1.0))
+
+
+def over_rows(node: Any, known: Mapping[str, Tensor]) -> bool:
+    """Whether a node sums over the first axis, which it keeps."""
+    axes = known[node.input[1]].value if len(node.input) > 1 and node.input[1] in known else None
+    kept = all(a.i for a in node.attribute if a.name == "keepdims")
+    return axes is not None and axes.tolist() == [0] and kept

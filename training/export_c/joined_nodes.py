@@ -14,18 +14,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from training.export_c.integrated_errors import (
+    APART,
+    FACTOR,
     INTEGRATION,
+    MEAN,
+    ROWS,
+    SQUARES,
+    SUMS,
     makers_of,
     only_user,
+    over_rows,
     users_of,
     with_errors_integrated_out,
 )
+from training.export_c.solved_polynomials import with_solved_polynomials
 from training.export_c.tensor import Tensor
 from training.onnx_graph.builder import needed_nodes
-
-ROWS, SUMS = "ProductsOfRows", "GaussNewtonSums"
-APART, FACTOR, MEAN = "ErrorsApart", "RowFactor", "MeanOfScales"
-SQUARES = "SquaresByScale"
 
 
 def joined(nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str]) -> list[Any]:
@@ -38,6 +42,7 @@ def joined(nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str
     found = with_errors_integrated_out(_with_sums_of_squares(nodes, kept), known, outputs)
     found = _with_gauss_newton_sums(_with_products_of_rows(found, known), known)
     found = _with_factors(_with_errors_apart(found, known), known)
+    found = with_solved_polynomials(found, known)
     found = _without_zeros(_without_repeats(found, kept), known)
     return needed_nodes(found, list(outputs))[0]
 
@@ -169,7 +174,7 @@ def _with_gauss_newton_sums(nodes: Sequence[Any], known: Mapping[str, Tensor]) -
     users, makers = users_of(nodes), makers_of(nodes)
     gone, new = set(), {}
     for node in nodes:
-        if node.op_type != "ReduceSum" or not _over_rows(node, known):
+        if node.op_type != "ReduceSum" or not over_rows(node, known):
             continue
         product: Any = makers.get(node.input[0])
         if product is None or product.op_type != "Mul" or len(users[product.output[0]]) != 1:
@@ -177,7 +182,7 @@ def _with_gauss_newton_sums(nodes: Sequence[Any], known: Mapping[str, Tensor]) -
         found: list[Any] = [makers.get(name) for name in product.input]
         residual, slope = found
         squares = slope and only_user(users, slope.output[0], "ReduceSumSquare", lambda n: True)
-        if not squares or not _over_rows(squares, known) or len(users[slope.output[0]]) != 2:
+        if not squares or not over_rows(squares, known) or len(users[slope.output[0]]) != 2:
             continue
         matrices = residual is not None and residual.op_type == slope.op_type == "MatMul"
         if not matrices or len(users[residual.output[0]]) != 1:
@@ -330,7 +335,7 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
             changed[id(node)] = (0, 2)
         elif node.op_type == "MatMul" and node.input[0] not in known:
             (*others, user) = users[node.output[0]]
-            if not others and user.op_type == "ReduceSumSquare" and _over_rows(user, known):
+            if not others and user.op_type == "ReduceSumSquare" and over_rows(user, known):
                 changed[id(node)] = (0,)
         if id(node) in changed:
             wanted.add(node.input[0])
@@ -354,10 +359,3 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
 
 def _place(nodes: Sequence[Any], node: Any) -> int:
     return next(k for k, other in enumerate(nodes) if other is node)
-
-
-def _over_rows(node: Any, known: Mapping[str, Tensor]) -> bool:
-    """Whether a node sums over the first axis, which it keeps."""
-    axes = known[node.input[1]].value if len(node.input) > 1 and node.input[1] in known else None
-    kept = all(a.i for a in node.attribute if a.name == "keepdims")
-    return axes is not None and axes.tolist() == [0] and kept

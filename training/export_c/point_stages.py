@@ -11,23 +11,31 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from training.export_c.integrated_errors import users_of
-from training.export_c.joined_nodes import ROWS, SQUARES, SUMS
+from training.export_c.integrated_errors import ROWS, SQUARES, SUMS, users_of
 from training.export_c.operators.elementwise import OPERATORS as ELEMENTWISE
 from training.export_c.operators.reductions import REDUCTIONS
+from training.export_c.solved_polynomials import (
+    COEFFICIENTS,
+    SOLVED_SCALES,
+    SOLVED_SQUARES,
+    STEP_SUMS,
+)
 from training.export_c.tensor import Size, Tensor
 
-TILE = 32  # Points that a stage takes at a time
+#: Points that a stage takes at a time; the latter where memory is scarce.
+TILE, SMALL_TILE = 16, 8
 LEAST_POINTS = 128  # Fewer are not worth a stage
 #: Operators that move elements along an axis.
 MOVING = ("Concat", "Gather", "Slice", "Split")
-PRODUCTS = ("Gemm", "MatMul", SQUARES, SUMS)
+POLYNOMIALS = (COEFFICIENTS, SOLVED_SCALES, SOLVED_SQUARES, STEP_SUMS)
+PRODUCTS = ("Gemm", "MatMul", SQUARES, SUMS, *POLYNOMIALS)
 #: Results of so many numbers a point, which another stage needs, are stored; wider ones are
 #: computed again there, if they follow from others without products or functions.
 STORED = 8
 #: Of the numbers that `with_late_copies` computes again, one in so many varies at most.
 LEAST_CONSTANT = 4
-_POINTS_AT = {"Gemm": 1, "MatMul": 1, SUMS: 1, SQUARES: 3}  # the input that has the points
+#: The input that has the points, if it is not the first.
+_POINTS_AT = {"Gemm": 1, "MatMul": 1, SUMS: 1, SQUARES: 3, COEFFICIENTS: 1}
 RECOMPUTED = (*MOVING, ROWS, "Add", "Identity", "Mul", "Sub")
 
 
@@ -254,7 +262,13 @@ def _points(node: Any, known: Mapping[str, Tensor]) -> int:
 def _treats_points(node: Any, known: Mapping[str, Tensor]) -> bool:
     """Whether the elements of its outputs follow from those at the same place of the last axis."""
     attributes = {a.name: a for a in node.attribute}
-    if node.op_type in ELEMENTWISE or node.op_type in ("Identity", ROWS, SQUARES, SUMS):
+    if node.op_type in ELEMENTWISE or node.op_type in (
+        "Identity",
+        ROWS,
+        SQUARES,
+        SUMS,
+        *POLYNOMIALS,
+    ):
         return True
     if node.op_type == "MatMul":
         return all(known[name].rank >= 2 for name in node.input)
@@ -277,6 +291,10 @@ def _may_be_aligned(node: Any, place: int) -> bool:
     """Whether an input of a node may have an element for each point."""
     if node.op_type in (SQUARES, SUMS):
         return place == 3 or (place == 1 and node.op_type == SUMS)
+    if node.op_type == COEFFICIENTS:
+        return place == 1
+    if node.op_type in POLYNOMIALS:  # matrices of scales have none
+        return node.op_type != SOLVED_SCALES or place != 2
     if node.op_type in PRODUCTS:
         return place > 0
     return place == 0 or node.op_type in ELEMENTWISE or node.op_type == "Concat"

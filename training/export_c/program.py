@@ -62,10 +62,12 @@ class Program:
 
     shared: Constants and kernels of the file.
     bounds: Largest value of each count that sizes depend on.
+    tile: Points that a stage takes at a time.
     """
 
-    def __init__(self, shared: SharedParts, bounds: dict[str, int]) -> None:
+    def __init__(self, shared: SharedParts, bounds: dict[str, int], tile: int = 1) -> None:
         self.shared = shared
+        self.tile = tile
         self.bounds = dict(bounds)
         self.statements: list[Statement] = []
         self.memory: dict[str, tuple[str, Shape]] = {}

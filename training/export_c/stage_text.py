@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from training.export_c.point_stages import TILE
 from training.export_c.program import MemoryPlan, Program, Statement
 
 WIDTH = 100  # Width of lines of C
@@ -19,9 +18,13 @@ ARRAYS = {"double": "doubles", "float": "floats", "int": "ints", "bool": "bools"
 
 #: What a part computes, by a kernel that it calls: the first of these. Name, and sentence.
 SUBJECTS = (
-    ("share_below", "intervals", "Moments and intervals of the posterior, from all points."),
+    ("shares?_below", "intervals", "Moments and intervals of the posterior, from all points."),
     ("gauss_newton_sums", "points_at_mode", "Points whose last coordinate is solved for by "
      "Gauss-Newton steps, and their weights: of a tile of points, from `first` on."),
+    ("solved_sums", "points_at_mode", "Points whose last coordinate is solved for by "
+     "Gauss-Newton steps, and their weights: of a tile of points, from `first` on."),
+    ("solved_squares", "points_weighed", "Sums of squared residuals of points, and the log "
+     "weights that follow from them: of a tile of points, from `first` on."),
     ("squares_of_product", "points_weighed", "Sums of squared residuals of points, and the log "
      "weights that follow from them: of a tile of points, from `first` on."),
     ("reflect", "errors_apart", "Errors of the model, of each scale, in the first rows of the "
@@ -89,7 +92,7 @@ def stage_functions(
         texts.append("\n".join([*lines, "}"]))
         if part.stage and part.stage != stage:
             points = program.stages[part.stage]
-            calls.append(f"    for (int first = 0; first < {points}; first += {TILE}) {{")
+            calls.append(f"    for (int first = 0; first < {points}; first += {program.tile}) {{")
         call = f"{f'const int {part.count} = ' if part.count else ''}{name}({arguments});"
         indent = "        " if part.stage else "    "
         calls += textwrap.wrap(

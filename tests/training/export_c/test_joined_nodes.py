@@ -3,8 +3,8 @@
 import numpy as np
 from onnx import helper, numpy_helper
 
-from training.export_c.integrated_errors import INTEGRATION
-from training.export_c.joined_nodes import FACTOR, ROWS, SUMS, joined
+from training.export_c.integrated_errors import FACTOR, INTEGRATION, ROWS, SUMS
+from training.export_c.joined_nodes import joined
 from training.export_c.tensor import Tensor
 from training.onnx_graph.builder import Graph
 from training.onnx_graph.value import Value

@@ -7,8 +7,15 @@ from onnx import helper, numpy_helper
 from test_operators import called, library, read, tensors_of
 
 from training.export_c.functions import graph_function
-from training.export_c.integrated_errors import INTEGRATION
-from training.export_c.joined_nodes import APART, FACTOR, MEAN, ROWS, SQUARES, SUMS
+from training.export_c.integrated_errors import (
+    APART,
+    FACTOR,
+    INTEGRATION,
+    MEAN,
+    ROWS,
+    SQUARES,
+    SUMS,
+)
 from training.export_c.operators import together
 from training.export_c.program import Program, SharedParts
 

@@ -191,6 +191,9 @@ def _emit_shares_below(
     program: Program, shape: Shape, below: tuple[Tensor, Tensor], weights: Tensor, out: Tensor
 ) -> None:
     """The weight of the points below each place, with a step that is one wide."""
+    if below[0].value is not None and len(shape) > 1 and _whole_apart(below[0].value, shape[-2]):
+        _emit_shares_of_grid(program, shape, below, weights, out)
+        return
     place, points = (program.stored(tensor) for tensor in below)
     indices = indices_of(shape[:-1])
     for name in ("at_least", "at_most"):
@@ -202,6 +205,35 @@ def _emit_shares_below(
     target = offset(strides(shape[:-1]), indices)
     code = f"{out.name}[{target}] = {kernel}({shape[-1].c}, {first}, &{other}, {weights.name});"
     program.emit(nest(shape[:-1], indices, code), out, place, points, weights)
+
+
+def _whole_apart(places: NDArray[Any], count: Size) -> bool:
+    """Whether places ascend by whole numbers, the same for each sample."""
+    distances = places.reshape(-1) - places.flat[0]
+    rising = (np.diff(distances) > 0).all() and (distances == np.rint(distances)).all()
+    return bool(Size(places.size) == count and rising)
+
+
+def _emit_shares_of_grid(
+    program: Program, shape: Shape, below: tuple[Tensor, Tensor], weights: Tensor, out: Tensor
+) -> None:
+    """The weight of the points below each of several places, which are whole numbers apart."""
+    places, points = below[0].value, program.stored(below[1])
+    assert places is not None
+    after = (places.reshape(-1) - places.flat[0]).astype(np.int32)
+    distances = program.stored(Tensor.constant(after, ""))
+    part, whole = (program.new(out.kind, (Size(int(after[-1]) + 3),)) for _ in range(2))
+    indices = [*indices_of(shape[:-2]), "0", "0"]
+    other = element(shape, Expression("{0}", (points,)), indices)
+    target = offset(strides(shape[:-1]), indices[:-1])
+    kernel = program.shared.kernel("shares_below", out.kind)
+    code = (
+        f"{kernel}({shape[-1].c}, {number(float(places.flat[0]), out.kind)}, {len(after)}, "
+        f"{distances.name}, &{other}, {weights.name}, {part.name}, {whole.name}, "
+        f"{out.name} + {target});"
+    )
+    body = nest(shape[:-2], indices[:-2], code)
+    program.emit(body, out, part, whole, points, weights, distances)
 
 
 def squares_of_product(program: Program, a: Tensor, b: Tensor, keepdims: bool) -> Tensor:

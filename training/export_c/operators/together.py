@@ -16,10 +16,10 @@ from training.export_c.c_text import (
     number,
     offset,
 )
-from training.export_c.integrated_errors import INTEGRATION
-from training.export_c.joined_nodes import (
+from training.export_c.integrated_errors import (
     APART,
     FACTOR,
+    INTEGRATION,
     MEAN,
     ROWS,
     SQUARES,

@@ -8,17 +8,25 @@
  */
 static int factor_rows_REAL(int m, int n, REAL *a, REAL *rest, REAL *change)
 {
-    const int most = m < n ? m : n;
+    const int most = m < n ? m : n, wide = n - n % 4;
     if (m <= FEW_ROWS)
         return m;
     for (int k = 0; k < most; ++k) {
         int pivot = 0;
         REAL total = 0;
-        for (int j = 0; j < n; ++j)
+        for (int j = 0; j < wide; j += 4) {
+            four_REAL sum = {0};
+            for (int i = k; i < m; ++i) {
+                const four_REAL x = load_REAL(a + i * n + j);
+                sum = plus_product_REAL(sum, x, x);
+            }
+            store_REAL(sum, rest + j);
+        }
+        for (int j = wide; j < n; ++j) {
             rest[j] = 0;
-        for (int i = k; i < m; ++i)
-            for (int j = 0; j < n; ++j)
+            for (int i = k; i < m; ++i)
                 rest[j] += a[i * n + j] * a[i * n + j];
+        }
         for (int j = 0; j < n; ++j) {
             total += rest[j];
             pivot = rest[j] > rest[pivot] ? j : pivot;

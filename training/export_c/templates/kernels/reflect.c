@@ -15,14 +15,16 @@ static void reflect_REAL(int m, int n, int step, int k, int pivot, REAL *a, REAL
     const REAL length = SQRT(square), first = top[pivot] < 0 ? -length : length;
     const REAL h = square + first * top[pivot];
     top[pivot] += first;
-    for (int j = 0; j < n; ++j)
+    for (int j = 0; j < wide; j += 4) {
+        four_REAL sum = {0};
+        for (int i = k; i < m; ++i)
+            sum = plus_REAL(sum, a[i * step + pivot], load_REAL(a + i * step + j));
+        store_REAL(sum, change + j);
+    }
+    for (int j = wide; j < n; ++j) {
         change[j] = 0;
-    for (int i = k; i < m; ++i) {
-        const REAL *row = a + i * step;
-        for (int j = 0; j < wide; j += 4)
-            store_REAL(plus_REAL(load_REAL(change + j), row[pivot], load_REAL(row + j)), change + j);
-        for (int j = wide; j < n; ++j)
-            change[j] += row[pivot] * row[j];
+        for (int i = k; i < m; ++i)
+            change[j] += a[i * step + pivot] * a[i * step + j];
     }
     for (int i = k; i < m; ++i) {
         REAL *row = a + i * step;

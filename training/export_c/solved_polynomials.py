@@ -1,0 +1,182 @@
+r"""Residuals as polynomials of the solved coordinate, whose coefficients are computed once a point.
+
+Points of a round differ from those of its Gauss-Newton steps in their last coordinate t alone. The
+residuals of a point are
+
+.. math:: r(t) = \sum_g c_g t^g, \qquad c_g = \sum_{i \in g} A_i b_i
+
+with A_i the columns of the system and b_i the monomials of the other coordinates, by their power g
+of t. So a step and the weights of its points need one product with the system together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.export_c.integrated_errors import (
+    ROWS,
+    SQUARES,
+    SUMS,
+    makers_of,
+    over_rows,
+    users_of,
+)
+from training.export_c.tensor import Tensor
+
+COEFFICIENTS, STEP_SUMS = "SolvedCoefficients", "SolvedSums"
+SOLVED_SQUARES, SOLVED_SCALES = "SolvedSquares", "SolvedSquaresByScale"
+
+
+@dataclass(frozen=True)
+class _Monomials:
+    """Monomials of the other coordinates, in the order of their power of the solved one.
+
+    name: Of the monomials (terms, n).
+    solved: Name of the solved coordinate (1, n).
+    order: Name of the columns of the system in this order.
+    powers: Of the solved coordinate, by column of the system.
+    nodes: That compute them; none where they are constant.
+    """
+
+    name: str
+    solved: str
+    order: str
+    powers: NDArray[np.intp]
+    nodes: tuple[Any, ...]
+
+    def coefficients(self, system: str) -> Any:
+        """The node of the coefficients (m * powers, n) of a system (m, terms)."""
+        from onnx import helper
+
+        made = f"{system}_{self.name}"
+        ends = np.searchsorted(np.sort(self.powers), np.arange(self.powers.max() + 1), "right")
+        inputs = [system, self.name, self.order]
+        return helper.make_node(COEFFICIENTS, inputs, [made], ends=ends.tolist())
+
+
+def with_solved_polynomials(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[Any]:
+    """The nodes, with products of systems and monomials by powers of the solved coordinate."""
+    from onnx import helper
+
+    users, makers = users_of(nodes), makers_of(nodes)
+    fixed: list[_Monomials] = []  # those whose other coordinates are constant
+    new: dict[int, list[Any]] = {}
+    for node in reversed(nodes):  # a step at a constant point comes before those that it resembles
+        place = {SUMS: 1, SQUARES: 3, "MatMul": 1}.get(node.op_type)
+        if place is None:
+            continue
+        found = _monomials(node.input[place], makers, known)
+        if found is None and node.op_type == SUMS:
+            found = next((m for own in fixed if (m := _at_zero(node, own, known))), None)
+        if found is None:
+            continue
+        if not found.nodes and node.input[place] not in known:
+            fixed.append(found)
+        groups = int(found.powers.max()) + 1
+        if node.op_type == SUMS:
+            if not _is_derivative(node, found.powers, known):
+                continue
+            parts = [found.coefficients(name) for name in (node.input[0], *node.input[6:])]
+            inputs = [found.solved, *(part.output[0] for part in parts)]
+            last = helper.make_node(STEP_SUMS, inputs, list(node.output), groups=groups)
+        elif node.op_type == SQUARES:
+            top, matrices, rest, _ = node.input
+            parts = [found.coefficients(name) for name in (top, rest)]
+            inputs = [found.solved, parts[0].output[0], matrices, parts[1].output[0]]
+            last = helper.make_node(SOLVED_SCALES, inputs, list(node.output), groups=groups)
+        else:
+            (*others, user) = users.get(node.output[0], [None])
+            if others or user is None or user.op_type != "ReduceSumSquare":
+                continue
+            if not over_rows(user, known):
+                continue
+            parts = [found.coefficients(node.input[0])]
+            inputs = [found.solved, parts[0].output[0]]
+            last = helper.make_node(SOLVED_SQUARES, inputs, list(user.output), groups=groups)
+            new[id(user)] = []
+        new[id(node)] = [*found.nodes, *parts, last]
+    made: set[str] = set()
+    result = []
+    for node in nodes:
+        for own in new.get(id(node), [node]):
+            if own.output[0] not in made:
+                result.append(own)
+            made |= {*own.output}
+    return result
+
+
+def _monomials(name: str, makers: Mapping[str, Any], known: dict[str, Tensor]) -> _Monomials | None:
+    """Of products of products of coordinates, of which the last is solved for."""
+    from onnx import helper
+
+    chain: list[Any] = []
+    for kind in (ROWS, ROWS, "Concat"):
+        node = makers.get(chain[-1].input[0] if chain else name)
+        if node is None or node.op_type != kind:
+            return None
+        chain.append(node)
+    second, first, points = chain
+    if len(points.input) < 2:
+        return None
+    head = known.get(points.input[0])
+    if head is None or head.value is None or head.rank != 2:
+        return None
+    pairs, terms = (_numbers(node, known) for node in (first, second))
+    if pairs is None or terms is None:
+        return None
+    powers = (pairs == pairs.max()).sum(axis=0)[terms].sum(axis=0)
+    order = np.argsort(powers, kind="stable").astype(np.int32)
+    stem = "_".join(points.input[:-1])
+    ones, by_power = f"{stem}_ones", f"{second.input[1]}_{second.input[2]}_by_power"
+    known[ones] = Tensor.constant(np.ones((1, head.value.shape[1]), head.value.dtype), ones)
+    for k, name in enumerate((by_power, f"{by_power}_left", f"{by_power}_right")):
+        known[name] = Tensor.constant(order if k == 0 else terms[k - 1][order], name)
+    made = [f"{stem}_{part}" for part in ("others", "pairs", by_power)]
+    nodes: tuple[Any, ...] = (
+        helper.make_node("Concat", [*points.input[:-1], ones], [made[0]], axis=0),
+        helper.make_node(ROWS, [made[0], *first.input[1:]], [made[1]]),
+        helper.make_node(ROWS, [made[1], f"{by_power}_left", f"{by_power}_right"], [made[2]]),
+    )
+    rows = [known[name].value if name in known else None for name in nodes[0].input]
+    if all(row is not None for row in rows):  # of a round that is drawn from the prior
+        values = np.concatenate([row for row in rows if row is not None])
+        for left, right in (pairs, terms[:, order]):
+            values = values[left] * values[right]
+        known[made[2]], nodes = Tensor.constant(values, made[2]), ()
+    return _Monomials(made[2], points.input[-1], by_power, powers, nodes)
+
+
+def _numbers(node: Any, known: Mapping[str, Tensor]) -> NDArray[np.intp] | None:
+    """Numbers of the rows whose products a node forms, (2, products)."""
+    found = [known[name].value for name in node.input[1:] if name in known]
+    return None if len(found) < 2 else np.asarray(found, np.intp)
+
+
+def _is_derivative(node: Any, powers: NDArray[np.intp], known: Mapping[str, Tensor]) -> bool:
+    """Whether the factors of a Gauss-Newton step are powers of the solved coordinate."""
+    picked, factors = (known[name].value for name in node.input[4:6])
+    if node.input[0] != node.input[2] or picked is None or factors is None:
+        return False
+    found = np.zeros(len(powers))
+    found[picked] = factors
+    return np.array_equal(found, powers)
+
+
+def _at_zero(node: Any, like: _Monomials, known: dict[str, Tensor]) -> _Monomials | None:
+    """The monomials whose solved coordinate is zero, if those of a node are of the same points."""
+    basis, constant = (
+        known[name].value if name in known else None for name in (node.input[1], like.name)
+    )
+    order = known[like.order].value
+    if basis is None or constant is None or order is None or basis.shape != constant.shape:
+        return None
+    if not np.allclose(basis[order], np.where((like.powers[order] == 0)[:, None], constant, 0.0)):
+        return None
+    zero = f"{like.name}_zero"
+    known[zero] = Tensor.constant(np.zeros_like(constant[:1]), zero)
+    return replace(like, solved=zero)
