@@ -32,6 +32,7 @@ from training.set_posterior.polynomial_residuals import (
     NearlyKnown,
     PolynomialResiduals,
     gauss_newton,
+    order_of_axes,
     within_box,
 )
 from training.set_posterior.sampling_rounds import (
@@ -75,8 +76,7 @@ class FirstRound:
     likelihood: Likelihood | SmallLikelihood
     nearly_known: NearlyKnown | None
     limit: Value  # (1,) largest misfit of sound sets
-    rows: Value  # of new readings, as `Likelihood.start` takes them
-    residuals: PolynomialResiduals  # of readings that have noise alone
+    residuals: PolynomialResiduals
     samples: WeightedRound
 
 
@@ -96,8 +96,8 @@ def add_importance_sampler(
     angle, is solved for: Gauss-Newton steps move it onto the sheet, and it is drawn around this
     conditional mode with the width of its conditional posterior.
 
-    1. In the first round the other unknowns are drawn from the prior, and readings are taken as
-       having their noise alone: it is but a start. Its mean is the soil at which errors are linear.
+    1. In the first round the other unknowns are drawn from the prior, and the model is taken as
+       right: it is but a start. Its mean is the soil at which errors are linear.
     2. In each adapted round their inverse hyperbolic tangents, which are unbounded, are drawn from
        a t distribution with the mean and covariance of the previous round. These moments are those
        of the highest power of the density that enough samples share (`tempering_power`). Before
@@ -118,35 +118,51 @@ def add_importance_sampler(
     Casella, Monte Carlo Statistical Methods, 2004, chapter 4 (conditioning on one unknown given the
     others); Kish, Survey Sampling, 1965 (effective sample size).
     """
-    family, rows = likelihood.family, likelihood.first_rows()
+    family = likelihood.family
     nearly_known = NearlyKnown.of(family, likelihood.response, likelihood.context)
-    residuals = PolynomialResiduals.of(
-        family, likelihood.response, nearly_known, likelihood.start(rows)
-    )
-    samples = _prior_round(family, residuals, prior_draws(family, residuals.order, sizes.prior))
-    first = FirstRound(likelihood, nearly_known, consistency.limit, rows, residuals, samples)
+    given = likelihood, nearly_known, consistency.limit
     with_errors = partial(_with_errors, sizes)
     if likelihood.noise_alone is None:
-        state, points, weights, misfit = with_errors(first)
+        state, points, weights, misfit = with_errors(*given)
         state.node("Identity").named(grown)
     else:
         state, points, weights, misfit = shortcuts(
-            likelihood.noise_alone, partial(_with_noise_alone, sizes), with_errors, first
+            likelihood.noise_alone, partial(_with_noise_alone, sizes), with_errors, *given
         )
         state.named(grown)
     count = sizes.prior + sizes.rounds * sizes.adapted
-    return WeightedSample(points, weights, misfit, count, residuals.order)
+    return WeightedSample(points, weights, misfit, count, order_of_axes(family))
 
 
-def _with_errors(sizes: SampleSizes, first: FirstRound) -> list[Value]:
+def _first_round(
+    sizes: SampleSizes,
+    likelihood: Likelihood | SmallLikelihood,
+    nearly_known: NearlyKnown | None,
+    limit: Value,
+    start: Value,
+) -> FirstRound:
+    """The round of draws of the prior, for residuals `start` (m, terms)."""
+    family = likelihood.family
+    residuals = PolynomialResiduals.of(family, likelihood.response, nearly_known, start)
+    samples = _prior_round(family, residuals, prior_draws(family, residuals.order, sizes.prior))
+    return FirstRound(likelihood, nearly_known, limit, residuals, samples)
+
+
+def _with_errors(
+    sizes: SampleSizes,
+    likelihood: Likelihood | SmallLikelihood,
+    nearly_known: NearlyKnown | None,
+    limit: Value,
+) -> list[Value]:
     """The state with new rows, points, weights and misfit, errors linear at the first mean."""
-    likelihood, samples = first.likelihood, first.samples
+    first = _first_round(sizes, likelihood, nearly_known, limit, likelihood.start())
+    samples = first.samples
     weights, _ = samples.tempered_weights()
     soil = first.residuals.basis(gemm(samples.points, weights, transpose_b=True))
-    if first.nearly_known is not None:
-        soil = soil * first.nearly_known.factors.node("Transpose")
+    if nearly_known is not None:
+        soil = soil * nearly_known.factors.node("Transpose")
     mixture, state = likelihood.mixture_at(soil)
-    mixture = mixture.standardised(first.nearly_known)
+    mixture = mixture.standardised(nearly_known)
     misfit = mixture.misfit(samples.basis)
     change = samples.misfit.least * 0.5 + misfit.log_likelihood
     samples = replace(
@@ -158,10 +174,13 @@ def _with_errors(sizes: SampleSizes, first: FirstRound) -> list[Value]:
     return [state, *_adapted_rounds(sizes, replace(first, samples=samples), mixture)]
 
 
-def _with_noise_alone(sizes: SampleSizes, first: FirstRound) -> list[Value]:
+def _with_noise_alone(
+    sizes: SampleSizes, likelihood: Likelihood, nearly_known: NearlyKnown | None, limit: Value
+) -> list[Value]:
     """The same of readings that have noise alone."""
-    assert isinstance(first.likelihood, Likelihood)
-    state = first.likelihood.grown(first.rows)
+    rows = likelihood.rows_of_noise_alone()
+    first = _first_round(sizes, likelihood, nearly_known, limit, likelihood.with_noise_alone(rows))
+    state = likelihood.grown(rows)
     return [state, *_adapted_rounds(sizes, first, OneSystem(first.residuals.system))]
 
 

@@ -60,18 +60,28 @@ class Likelihood:
         sizes = [of_sensors.sum_of_squares(), self.readings.size * self.readings.size]
         return self.readings.rows.sensor_errors.size.node("Sum", *sizes) <= 0.0
 
-    def first_rows(self) -> Value:
+    def rows_of_noise_alone(self) -> Value:
         """Rows (m, terms) of new readings that have noise alone."""
         return self.readings.rows.of_noise_alone()
 
-    def start(self, first_rows: Value) -> Value:
-        """Residuals (m, terms) of readings that have noise alone."""
-        return concat([self._state()[0], first_rows], axis=0)
+    def with_noise_alone(self, rows: Value) -> Value:
+        """Residuals (m, terms) of readings that have noise alone, with these new rows."""
+        return concat([self._state()[0], rows], axis=0)
 
-    def grown(self, first_rows: Value) -> Value:
+    def grown(self, rows: Value) -> Value:
         """The state with these rows, which have no errors."""
-        errors = first_rows.take([0], axis=1) * np.zeros((1, OF_SENSORS + OF_MODEL))
-        return concat([self.readings.state, concat([first_rows, errors], axis=1)], axis=0)
+        errors = rows.take([0], axis=1) * np.zeros((1, OF_SENSORS + OF_MODEL))
+        return concat([self.readings.state, concat([rows, errors], axis=1)], axis=0)
+
+    def start(self) -> Value:
+        """Residuals (m, terms) of a model without errors, those of sensors integrated out.
+
+        Errors of new readings are linear in the middle of the prior's range.
+        """
+        terms = len(self.response.terms)
+        earlier, _ = self.readings.state.split([terms + OF_SENSORS, OF_MODEL], axis=1)
+        whole = concat([earlier, self.readings.rows.system_at(None)], axis=0)
+        return integrate_out_sensor_errors(whole, terms)
 
     def mixture_at(self, basis: Value) -> tuple[ScaleMixture, Value]:
         """The likelihood with errors linear at a soil, and the state with the new rows.

@@ -21,6 +21,13 @@ from training.set_posterior.response_surface import Response
 DAMPING_STD = 0.7
 
 
+def order_of_axes(family: WheelFamily) -> tuple[int, ...]:
+    """The axes in the order in which they are sampled: the last is solved for."""
+    names = [axis.name for axis in family.axes]
+    solved = names.index("friction_angle") if "friction_angle" in names else 0
+    return *(i for i in range(len(names)) if i != solved), solved
+
+
 @dataclass(frozen=True)
 class PolynomialResiduals:
     """Residuals A b(x) (m, n) of a set at points x.
@@ -46,10 +53,7 @@ class PolynomialResiduals:
         """
         if nearly_known is not None:
             system = nearly_known.standardised(system)
-        names = [axis.name for axis in family.axes]
-        solved = names.index("friction_angle") if "friction_angle" in names else 0
-        order = (*(i for i in range(len(names)) if i != solved), solved)
-        return PolynomialResiduals.solved_last(system, response.terms, order)
+        return PolynomialResiduals.solved_last(system, response.terms, order_of_axes(family))
 
     @staticmethod
     def solved_last(system: Value, terms: Terms, order: tuple[int, ...]) -> PolynomialResiduals:

@@ -58,7 +58,7 @@ class ResidualRows:
     in_range: Value  # (rows,) whether the features lie in the range of the response surface
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
-    def system_at(self, basis: Value) -> Value:
+    def system_at(self, basis: Value | None) -> Value:
         """The system (readings, terms + errors) of the readings that take part."""
         return self.compressed(self.columns_at(basis))
 

@@ -47,13 +47,12 @@ class SmallLikelihood:
         context = replace(context, axis_std=None)
         return SmallLikelihood(family, response, context, readings, terms, linear)
 
-    def first_rows(self) -> Value:
-        """Columns (terms + errors of sensors, m) of new readings, linear in the middle."""
-        return self.readings.rows.columns_at(None)
+    def start(self) -> Value:
+        """Residuals (terms, terms) of a model without errors, those of sensors integrated out.
 
-    def start(self, first_rows: Value) -> Value:
-        """Residuals (terms, terms) of a model without errors, those of sensors integrated out."""
-        first, (sensors,) = self._split(first_rows, 0)
+        Errors of new readings are linear in the middle of the prior's range.
+        """
+        first, (sensors,) = self._split(self.readings.rows.columns_at(None), 0)
         own = [first] if self.linear is None else self.linear.in_the_middle(first)
         columns = concat([*own, sensors], axis=0)
         sampled = len(self.response.terms)
@@ -67,7 +66,7 @@ class SmallLikelihood:
         rows, sampled = self.readings.rows, len(self.response.terms)
         soil, unit = basis, basis
         if self.linear is not None:  # the columns are put together again, as they are large
-            soil, unit = self.linear.soil(self._split(self.first_rows(), 0)[0], basis)
+            soil, unit = self.linear.soil(self._split(rows.columns_at(None), 0)[0], basis)
         new = rows.columns_at(soil)
         grown = concat([self.readings.state, rows.compressed(new)], axis=0)
         whole, (of_sensors, of_model) = self._split(new, OF_MODEL)
