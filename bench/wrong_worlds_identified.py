@@ -132,8 +132,8 @@ def _hidden(worlds: Sequence[str], found: Sequence[AnswerScores], columns: int) 
     """Worlds that the readings hardly tell from a sound one, and the width that they demand."""
     lines = [
         "Worlds in which the residuals of exact_model exceed the noise in at most half of the "
-        f"sets. To cover {100 * TO_COVER:.0f} % there, its intervals would have to be wider by these "
-        "factors, on sound sets too.",
+        f"sets. To cover {100 * TO_COVER:.0f} % there, its intervals would have to be wider by "
+        "these factors, on sound sets too.",
         "",
         f"| world | {' | '.join(f'{c}: c | phi | K' for c in CHANNELS)} |",
         f"|---|{'---:|' * 3 * len(CHANNELS)}",
