@@ -32,6 +32,12 @@ TITLES = {
     "gap-speed": "Gap workflow: seconds",
     "gap-measured": "Gap workflow: published tests",
 }
+#: Pages whose figures a command of their own prints, by what they compare.
+ELSEWHERE = {
+    "Files for the board before and after an adaptation": ("how-to/adapt", "bench/adapt.py"),
+    "The gap workflow beside regressions, sealed": ("how-to/challenge", "bench/challenge.py"),
+    "Tests on Earth for a pull on the Moon": ("how-to/gravity", "examples/gravity/moon.py"),
+}
 SUMMARY = "At a glance"
 
 
@@ -72,6 +78,10 @@ def write_first_page(names: Sequence[str], summary: str, root: Path = ROOT) -> N
     environment = former[1] if former and not summary else machine()
     pages = [name for name in TITLES if page_file(name, root).exists()]
     rows = "\n".join(f"| {_link(name)} | {_contents(name, root)} |" for name in pages)
+    rows += "".join(
+        f"\n| [{what}](docs/{name}.md) | by `python {command}` |"
+        for what, (name, command) in ELSEWHERE.items()
+    )
     text = (
         "# Benchmarks\n\n"
         "Measured figures of soilml: accuracy and speed of the physics, error and calibration of "
