@@ -14,7 +14,7 @@ from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.onboard.features import inputs_of
 from soilml.onboard.fusion_rules import RULES
-from soilml.onboard.set_contract import RESPONSE_CHANNELS
+from soilml.onboard.set_contract import RESPONSE_CHANNELS, SENSOR_ERROR_INPUTS
 from soilml.quantities import SHEAR, column
 from training.dataset import PER_ROW, check_targets
 from training.regressors.coupled_lssvm import CoupledLSSVM
@@ -227,9 +227,25 @@ def take_response_settings(settings: Settings, seed: int) -> ResponseSettings:
         table.fail(
             f"terms is {terms}; a small file needs {LEAST_SMALL_TERMS} to {MOST_SMALL_TERMS}"
         )
-    scales = _take_scales(table)
+    scales, sensors = _take_scales(table), _take_sensor_errors(table)
     table.finish()
-    return ResponseSettings(**counts, seed=seed, small=small, terms=terms, scales=scales)
+    return ResponseSettings(
+        **counts, seed=seed, small=small, terms=terms, scales=scales, sensor_errors=sensors
+    )
+
+
+def _take_sensor_errors(table: Settings) -> dict[str, float]:
+    """Read [set_posterior.sensor_errors]: standard deviations by input, 0 or more."""
+    if "sensor_errors" not in table:
+        return {}
+    errors = table.table("sensor_errors")
+    errors.permit(SENSOR_ERROR_INPUTS)
+    found = {name: errors.number(name) for name in SENSOR_ERROR_INPUTS if name in errors}
+    for name, std in found.items():
+        if std < 0.0:
+            errors.fail(f"{name} is {std:g}; needed is a standard deviation of 0 or more")
+    errors.finish()
+    return found
 
 
 def _take_scales(table: Settings) -> ErrorScales:

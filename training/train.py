@@ -191,8 +191,12 @@ def _train_set_posterior(
     family = RecipeFamily.of(parse_recipe(data.recipe, "recipe of the data"), spec.targets)
     response = fit_response(family, spec.set_posterior, progress)
     posterior = calibrate_misfit_limits(family, response, progress, spec.set_posterior.small)
-    scales = spec.set_posterior.scales
-    posterior = replace(posterior, noise=family.declared_noise(), scales=scales)
+    posterior = replace(
+        posterior,
+        noise=family.declared_noise(),
+        scales=spec.set_posterior.scales,
+        sensor_errors=spec.set_posterior.sensor_errors,
+    )
     return posterior, validate_posterior(posterior, progress)
 
 

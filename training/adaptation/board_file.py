@@ -16,11 +16,11 @@ from soilml.io.atomic_files import atomic_outputs, save_text
 from soilml.processes import limited_workers, process_map
 from soilml.quantities import SHEAR
 from training.adaptation.steps import ResumableSteps
+from training.adaptation.supported_errors import USUAL_ERRORS, SupportedErrors
 from training.dataset import read_dataset
 from training.export.model_card import model_card
 from training.export.model_file import export_model
 from training.export_c.c_file import write_c
-from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.response_surface import check_equilibria
 from training.spec import Spec, read_spec
@@ -65,7 +65,7 @@ def make_file(
     recipe: str,
     *,
     seed: int,
-    scales: ErrorScales = USUAL_SCALES,
+    errors: SupportedErrors = USUAL_ERRORS,
     workers: int | None = None,
     as_c: bool = False,
     progress: Progress = lambda text, done, total: None,
@@ -74,7 +74,7 @@ def make_file(
 
     recipe: Text of the recipe; see `training.adaptation.campaign.recipe_text`.
     seed: Of the training.
-    scales: Sizes of the errors of its model, and their probabilities.
+    errors: Sizes of the errors of its model and sensors.
     workers: Processes; one for each core by default.
     as_c: Whether C code is written as well.
 
@@ -85,7 +85,7 @@ def make_file(
     folder = steps.folder
     save_text(folder / names.recipe, recipe)
     found = read_recipe(folder / names.recipe)
-    spec = _spec(found, seed, scales)
+    spec = _spec(found, seed, errors)
     # both raise before rows are simulated and the training begins
     check_equilibria(RecipeFamily.of(found, spec.targets), seed)
     rows, model = folder / names.rows, folder / names.model[0]
@@ -112,19 +112,22 @@ def make_file(
     return model
 
 
-def _spec(recipe: Recipe, seed: int, scales: ErrorScales) -> Spec:
+def _spec(recipe: Recipe, seed: int, errors: SupportedErrors) -> Spec:
     """The packaged spec for those of its targets that vary, with this seed and these errors."""
     spec = read_spec(SPEC)
     assert spec.set_posterior is not None
     targets = tuple(name for name in SHEAR if name in recipe.case.prior)
     content = json.loads(spec.text) | {"targets": list(targets), "seed": seed}
-    if scales != USUAL_SCALES:
-        content["set_posterior"] |= {"model_errors": scales.as_list()}
+    if errors != USUAL_ERRORS:
+        stated = {"model_errors": errors.scales.as_list(), "sensor_errors": errors.sensors}
+        content["set_posterior"] |= stated
     return replace(
         spec,
         seed=seed,
         targets=targets,
-        set_posterior=replace(spec.set_posterior, seed=seed, scales=scales),
+        set_posterior=replace(
+            spec.set_posterior, seed=seed, scales=errors.scales, sensor_errors=errors.sensors
+        ),
         text=json.dumps(content, sort_keys=True),
     )
 

@@ -1,4 +1,4 @@
-"""Sizes of a hybrid model's errors that a campaign supports, for the file that is trained on it."""
+"""Sizes of errors of model and sensors that a campaign supports, for the file trained on it."""
 
 from __future__ import annotations
 
@@ -11,15 +11,17 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
+from soilml.fitting.covariance import sensor_columns
 from soilml.fitting.misfit import misfit_limit
 from soilml.fitting.readings import Readings
-from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, usual_errors
+from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, declared_errors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.averaged import ERRORS, EXACT, with_noise_of_fit
 from soilml.identification.condensing import condensed
 from soilml.identification.hypotheses import ErrorHypothesis, fit_hypothesis
+from soilml.identification.soil_density import SoilDensity
 from soilml.io.table import Table
-from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS
+from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_INPUTS
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 
 #: A model that is all but right: errors of bearing, contact and channels are a seventh of the usual
@@ -30,6 +32,9 @@ CHECKED = ErrorScale(EXACT + ERRORS[0.1], bearing=0.15, channels=0.15, laws=0.6)
 
 #: Share of the prior that no campaign rules out: errors on other soils than its own.
 OPEN = 0.05
+#: Share of a sensor's usual error by which later drives may differ from the campaign: a tyre that
+#: wears, a motor that warms up. Rows of one campaign cannot tell it.
+DRIFT = 1.0 / 3.0
 
 
 @dataclass(frozen=True)
@@ -58,15 +63,44 @@ class BoardErrors(ErrorHypothesis):
         }
 
 
-def supported_scales(case: Case, kept_back: Table, whole: Table) -> ErrorScales:
-    r"""Probabilities of sizes of the errors of a hybrid model, given the rows of a campaign.
+@dataclass(frozen=True)
+class SupportedErrors:
+    """Sizes of errors that a file for the board takes from a campaign.
+
+    Attributes
+    ----------
+    scales
+        Sizes of the model's errors, and their probabilities: `CHECKED` and the usual ones.
+    sensors
+        Standard deviations of errors of the sensors that all rows share, by input of the file.
+        Those that the case declares, and of channels that were not measured, are missing.
+    """
+
+    scales: ErrorScales
+    sensors: dict[str, float]
+
+
+#: Those of a file of which no campaign tells.
+USUAL_ERRORS = SupportedErrors(USUAL_SCALES, {})
+
+
+def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErrors:
+    r"""Sizes of errors of a hybrid model, and of its sensors, given the rows of a campaign.
 
     .. math:: p(s | y) \propto p(s) \int p(y | \theta, s)\, p(\theta)\, d\theta
 
     The rows of the runs that were kept back, by which the model was not chosen, say how large its
-    errors may be; all rows of the campaign do so too. Those count that leave less to `CHECKED`. A
+    errors s may be; all rows of the campaign do so too. Those count that leave less to `CHECKED`. A
     share of the prior, `OPEN`, remains in any case. Errors that leave a significant misfit are not
     supported; where all do, the usual ones have their usual probabilities.
+
+    Board and campaign have the same sensors. An error e of a sensor, in usual standard deviations,
+    has a mean m and a variance v given all rows and a size of the model's errors. The file has
+
+    .. math:: \sigma^2 = \min\left(1, \sum_s p(s | y) \left(m_s^2 + v_s\right) + d^2\right)
+
+    with the drift d between campaign and later drives, `DRIFT`; m^2 + v is 1 where s is not
+    supported.
 
     Parameters
     ----------
@@ -75,30 +109,30 @@ def supported_scales(case: Case, kept_back: Table, whole: Table) -> ErrorScales:
     kept_back, whole
         Rows of the runs that were kept back, and all rows.
 
-    Returns
-    -------
-    ErrorScales
-        `CHECKED` and the usual scales, by rising size.
-
     References
     ----------
-    MacKay, Neural Computation 4(3), 1992 (evidence by Laplace's approximation).
+    MacKay, Neural Computation 4(3), 1992 (evidence by Laplace's approximation). Kennedy and
+    O'Hagan, J. R. Statist. Soc. B 63(3), 2001 (errors that all readings share).
     """
     rest = 1.0 - CHECKED.probability
     usual = [replace(s, probability=s.probability * rest) for s in USUAL_SCALES.scales]
     scales = [CHECKED, *usual]
     prior = np.asarray([scale.probability for scale in scales])
     own = replace(case, discrepancy={}, remainder=None, soil_tests=())
-    found = [_posterior(own, rows, scales, prior) for rows in (kept_back, whole)]
+    fits = [_fits(own, rows, scales) for rows in (kept_back, whole)]
+    found = [_posterior(of_rows, prior) for of_rows in fits]
     widest = min(found, key=lambda probabilities: float(probabilities[0]))
-    return ErrorScales(
-        tuple(replace(s, probability=float(p)) for s, p in zip(scales, widest, strict=True))
+    return SupportedErrors(
+        ErrorScales(
+            tuple(replace(s, probability=float(p)) for s, p in zip(scales, widest, strict=True))
+        ),
+        _sensor_errors(own, fits[1], widest),
     )
 
 
-def _posterior(case: Case, rows: Table, scales: Sequence[ErrorScale], prior: Floats) -> Floats:
-    """Probabilities of the scales given these rows; the prior of the usual ones without a fit."""
-    logs = np.log(prior) + _log_evidences(case, rows, scales)
+def _posterior(fits: Sequence[SoilDensity | None], prior: Floats) -> Floats:
+    """Probabilities of the scales given these fits; the prior of the usual ones without a fit."""
+    logs = np.log(prior) + [-np.inf if fit is None else fit.log_evidence for fit in fits]
     if not np.isfinite(logs).any():
         logs = np.log(prior)
         logs[0] = -np.inf
@@ -106,13 +140,13 @@ def _posterior(case: Case, rows: Table, scales: Sequence[ErrorScale], prior: Flo
     return np.asarray((1.0 - OPEN) * weights / weights.sum() + OPEN * prior)
 
 
-def _log_evidences(case: Case, rows: Table, scales: Sequence[ErrorScale]) -> Floats:
-    """Logarithms (scales,) of the integrals over soil, effects and errors.
+def _fits(case: Case, rows: Table, scales: Sequence[ErrorScale]) -> list[SoilDensity | None]:
+    """Densities of the soil with errors of each scale.
 
-    Minus infinity where a scale leaves a significant misfit, for which the evidence, linearised in
-    the errors, means nothing, and where no fit succeeds.
+    None where a scale leaves a significant misfit, for which the evidence, linearised in the
+    errors, means nothing, and where no fit succeeds.
     """
-    found = np.full(len(scales), -np.inf)
+    found: list[SoilDensity | None] = [None] * len(scales)
     try:
         free = select_free(case, None)
         readings = condensed(case, usable_readings(case, rows), free)
@@ -126,5 +160,46 @@ def _log_evidences(case: Case, rows: Table, scales: Sequence[ErrorScale]) -> Flo
             continue
         start = density.optimum.values()
         if (density.squares + readings.squares_within) / freedom <= misfit_limit(freedom):
-            found[k] = density.log_evidence
+            found[k] = density
     return found
+
+
+def _sensor_errors(
+    case: Case, fits: Sequence[SoilDensity | None], probabilities: Floats
+) -> dict[str, float]:
+    """Standard deviations of the errors of sensors, by name; see `supported_errors`."""
+    supported = [fit for fit in fits if fit is not None]
+    if not supported:
+        return {}
+    readings = supported[0].optimum.problem.readings
+    usual = usual_errors(case, readings.row_load, [c.path for c in supported[0].free])
+    found = {}
+    for name in SENSOR_ERROR_INPUTS:
+        if name not in usual or name in declared_errors(case):
+            continue
+        squares = [1.0 if fit is None else _mean_square(fit, name, usual[name]) for fit in fits]
+        size = np.sqrt(min(1.0, float(probabilities @ squares) + DRIFT**2))
+        if size < 1.0:
+            found[name] = float(f"{size * usual[name]:.3g}")
+    return found
+
+
+def _mean_square(fit: SoilDensity, name: str, std: float) -> float:
+    """Expected square of an error of a sensor given the rows, in squares of its prior's `std`."""
+    column = _column_of(fit, name, std)
+    if column is None:
+        return 1.0
+    white = fit.whiten @ column
+    beside = white - fit.jacobian @ np.linalg.solve(fit.precision, fit.jacobian.T @ white)
+    return float(beside @ fit.residual) ** 2 + 1.0 - float(beside @ white)
+
+
+def _column_of(fit: SoilDensity, name: str, std: float) -> Floats | None:
+    """Change (m,) of the readings by a standard deviation of an error; None without its channel."""
+    for k, coordinate in enumerate(fit.others):
+        if coordinate.path.endswith(f".{name}"):
+            return np.asarray(fit.other_columns[:, k])
+    optimum = fit.optimum
+    alone = replace(optimum.problem.readings, shared_errors={name: std})
+    columns = sensor_columns(alone, optimum.prediction[None, :])
+    return None if columns is None else np.asarray(columns[0, :, 0])

@@ -41,8 +41,7 @@ from training.adaptation.judgement import BoardCandidate, Judgement, check_lengt
 from training.adaptation.page import adapt_page
 from training.adaptation.result import AdaptReport
 from training.adaptation.steps import ResumableSteps
-from training.adaptation.supported_errors import supported_scales
-from training.set_posterior.error_scales import ErrorScales
+from training.adaptation.supported_errors import SupportedErrors, supported_errors
 
 #: Statuses of a gap report with effects that the evidence supports.
 CLAIMED = ("named", "partly-named", "class", "form-open")
@@ -82,9 +81,9 @@ def adapt(
     over soils of the priors and the slips and loads of the log. From the torque of the first rows
     of a run that was kept back, each estimates the soil, and its model predicts torque, drawbar
     pull and sinkage of the later rows. What a file does not estimate has the value of the fit to
-    the campaign, in both models. The adapted file has errors of its model of sizes that the
-    campaign supports (`supported_scales`); the old file is judged by the better of two answers, its
-    own and that of the model taken as right.
+    the campaign, in both models. The adapted file has errors of its model and sensors of sizes
+    that the campaign supports (`supported_errors`); the old file is judged by the better of two
+    answers, its own and that of the model taken as right.
 
     Of fewer than four runs none is kept back: a file is then trained and not judged, and what the
     gap analysis says of rows that it kept back itself is all that speaks for it.
@@ -178,9 +177,9 @@ def adapt(
             make_adapted()
             report = found.report((), None, [*remarks, _unjudged(table)], rows, seed)
             return _finish(report, target, origin)
-        scales = supported_scales(new, split.kept_back, table)
-        remarks = [*remarks, _errors_remark(scales)]
-        file = make_adapted(scales=scales)
+        errors = supported_errors(new, split.kept_back, table)
+        remarks = [*remarks, _errors_remark(errors)]
+        file = make_adapted(errors=errors)
         if earlier is None:
             before = make(BEFORE, recipe_text(old, driven, rows, seed))
             earlier = with_sensors_of(Estimator.load(before), old)
@@ -306,13 +305,16 @@ def _sensor_remark(case: Case) -> list[Remark]:
     return [Remark("sensor-error-trained", text, names)]
 
 
-def _errors_remark(scales: ErrorScales) -> Remark:
-    """A note on the errors that the adapted file takes its model to have."""
-    checked = scales.scales[0]
+def _errors_remark(errors: SupportedErrors) -> Remark:
+    """A note on the errors that the adapted file takes its model and sensors to have."""
+    checked = errors.scales.scales[0]
     text = (
         f"the adapted file has errors of its model: {checked.bearing:g} of the usual ones with a "
         f"probability of {checked.probability:.2f}, as the campaign supports, else larger ones"
     )
+    if errors.sensors:
+        sizes = ", ".join(f"{name} {std:g}" for name, std in errors.sensors.items())
+        text += f"; standard deviations of errors of its sensors are {sizes}"
     return Remark("model-errors", text, severity="note")
 
 

@@ -54,7 +54,9 @@ def write_anew(path: Path) -> None:
     terms = tuple(tuple(term) for term in sets.get("monomials", ())) or family_terms(family)
     response = read_response(branch, family, sets["error"], terms)
     small = bool(sets.get("small", False))
-    posterior = SetPosteriorGraph(family, response, limits, sets["noise"], small, _scales(sets))
+    posterior = SetPosteriorGraph(
+        family, response, limits, sets["noise"], small, _scales(sets), _sensor_errors(metadata)
+    )
     graph = Graph("" if sets["alone"] else "sets_")
     posterior.add_to(graph, "" if sets["alone"] else "sets_")
     if sets["alone"]:
@@ -85,6 +87,12 @@ def _scales(sets: Mapping[str, Any]) -> ErrorScales:
     """Scales of the model's errors; the usual ones where a file states none."""
     stated = sets.get("model_error_scales")
     return USUAL_SCALES if stated is None else ErrorScales.of_list(stated)
+
+
+def _sensor_errors(metadata: Mapping[str, str]) -> dict[str, float]:
+    """Errors of the sensors that the spec of a file states."""
+    stated = json.loads(metadata["spec"]).get("set_posterior", {}).get("sensor_errors", {})
+    return {name: float(std) for name, std in stated.items()}
 
 
 def _branch(model: Any, name: str) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -55,6 +56,8 @@ class SetPosteriorGraph:
         Whether it is for a microcontroller: fewer points, smaller systems.
     scales
         Sizes of the model's errors, and their probabilities before a set is read.
+    sensor_errors
+        Standard deviations of errors of the sensors that are not the family's typical ones.
     """
 
     family: WheelFamily
@@ -63,6 +66,12 @@ class SetPosteriorGraph:
     noise: FileNoise = field(default_factory=dict)
     small: bool = False
     scales: ErrorScales = USUAL_SCALES
+    sensor_errors: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def typical_errors(self) -> dict[str, float]:
+        """Standard deviations of the errors that a set has where none are fed, by input."""
+        return self.family.typical_errors() | dict(self.sensor_errors)
 
     @property
     def columns(self) -> int:
@@ -105,8 +114,8 @@ class SetPosteriorGraph:
 
         Context inputs have none, and the state is empty.
         """
-        errors = self.family.typical_errors()
-        values = default_values() | {k: np.full(1, v, np.float32) for k, v in errors.items()}
+        errors = self.typical_errors.items()
+        values = default_values() | {k: np.full(1, v, np.float32) for k, v in errors}
         return values | dict(zip(MEMORY_INPUTS, empty_memory(self.columns), strict=True))
 
     def add_to(self, graph: Graph, prefix: str = "") -> None:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -117,7 +117,9 @@ CHECKED_DESIGNS, CLEARLY_TOO_FEW = 64, 0.35
 class ResponseSettings:
     """Effort of the fit: designs simulated, width of the two hidden layers, epochs, seed.
 
-    `scales` are those of the errors that a model trained so has, which the fit does not depend on.
+    `scales` are those of the errors that a model trained so has, and `sensor_errors` are standard
+    deviations of errors of its sensors, by input, where they are not the typical ones. The fit does
+    not depend on them.
     """
 
     designs: int
@@ -127,6 +129,7 @@ class ResponseSettings:
     small: bool = False  # whether the file is for a microcontroller
     terms: int = 0  # most monomials; 0: all of the family's degrees
     scales: ErrorScales = USUAL_SCALES
+    sensor_errors: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

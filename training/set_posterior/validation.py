@@ -192,7 +192,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
         "terms": len(posterior.response.terms),
         "noise": {name: list(parts) for name, parts in posterior.noise.items()},
         "context": posterior.family.limits(),
-        "errors": posterior.family.typical_errors(),
+        "errors": posterior.typical_errors,
         "model_errors": posterior.family.model_errors(),
         "model_error_scales": posterior.scales.as_list(),
         "alone": sets_only,

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from conftest import THREE_CHANNEL_MODEL
 
-from soilml import ExitAngle, SlipSinkage, read_case, simulate
+from soilml import ExitAngle, Noise, SlipSinkage, read_case, simulate
+from soilml.fitting.shared_errors import USUAL_SENSOR_ERRORS
 from soilml.io.table import Table
-from training.adaptation.supported_errors import CHECKED, OPEN, supported_scales
+from training.adaptation.supported_errors import CHECKED, DRIFT, OPEN, supported_errors
 from training.set_posterior.error_scales import USUAL_SCALES
 
 pytestmark = pytest.mark.slow
@@ -25,6 +26,10 @@ def rows_of(case, *effects, loads=(50.0, 90.0)):
     slip = np.tile(np.linspace(0.08, 0.6, 14), len(loads))
     names = np.repeat([f"r{i}" for i in range(len(loads))], 14)
     return simulate(true, slip, np.repeat(loads, 14), run=names, seed=2)
+
+
+def supported_scales(case, kept_back, whole):
+    return supported_errors(case, kept_back, whole).scales
 
 
 def whole_of(kept_back, case, *effects):
@@ -72,3 +77,34 @@ def test_a_share_of_the_prior_remains(case):
     rest = 1.0 - CHECKED.probability
     least = OPEN * rest * np.asarray(USUAL_SCALES.probabilities)
     assert (scales.probabilities[1:] >= least * (1.0 - 1e-9)).all()
+
+
+def with_slip_error(table, error):
+    return Table(table.columns | {"slip": table["slip"] - error}, table.source)
+
+
+def test_sensors_that_the_rows_find_right_have_small_errors(case):
+    rows = whole_of(rows_of(case), case)
+    sensors = supported_errors(case, rows, rows).sensors
+    usual = USUAL_SENSOR_ERRORS["slip_bias"]
+    assert DRIFT * usual < sensors["slip_bias"] < 0.7 * usual
+
+
+def test_an_error_that_the_rows_show_stays_in_the_file(case):
+    rows = with_slip_error(whole_of(rows_of(case), case), 0.03)
+    sensors = supported_errors(case, rows, rows).sensors
+    assert "slip_bias" not in sensors  # at least the usual error, which is the file's own
+
+
+def test_channels_that_were_not_measured_and_declared_errors_keep_theirs(case):
+    torque = ("run", "slip", "load_N", "torque_Nm")
+    rows = whole_of(rows_of(case), case)
+    rows = Table({k: rows[k] for k in torque}, "torque alone")
+    known = replace(case, bias={"torque_Nm": Noise(share=0.02)})
+    sensors = supported_errors(known, rows, rows).sensors
+    assert not {"sinkage_bias", "drawbar_pull_bias", "torque_gain"} & sensors.keys()
+
+
+def test_rows_that_no_error_explains_leave_the_usual_ones(case):
+    rows = whole_of(rows_of(case, SlipSinkage(n1=1.5)), case, SlipSinkage(n1=1.5))
+    assert supported_errors(case, rows, rows).sensors == {}
