@@ -11,7 +11,6 @@ from soilml.cli.options import (
     InputFile,
     add_output,
     add_report_option,
-    need_for_report,
     number,
     parse_names,
     whole_number_from,
@@ -106,9 +105,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("scipy", "design")
-    need_for_report(args, "design")
-    if args.picture is not None:
-        need("matplotlib", "design --picture")
     from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
     from soilml.rover_design.figures import SIZE
