@@ -159,7 +159,7 @@ def test_what_a_cause_needs_varies(tier):
 @pytest.mark.slow
 def test_a_column_betrays_no_cause():
     drawn = [
-        draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(24)
+        draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(12)
     ]
     share = np.mean([len(d.columns) > 6 for d in drawn])
     assert 0.1 < share < 0.6
