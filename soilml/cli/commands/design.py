@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     InputFile,
@@ -17,7 +16,6 @@ from soilml.cli.options import (
 )
 
 if TYPE_CHECKING:
-    from soilml.report.page import Report
     from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
@@ -122,14 +120,13 @@ def run(args: argparse.Namespace) -> int:
         )
     content = found.as_json()
 
-    def draw(path: Path) -> None:
-        save_png(found.plot, 2, 2, SIZE, path)
-
-    def build() -> tuple[Report, Mapping[str, Any]]:
-        return design_page(found, args.study), content
-
-    text = json_text(content)
-    write_with_report(args, {args.out: text, args.picture: draw}, build, study.soil.files)
+    text, draw = json_text(content), partial(save_png, found.plot, 2, 2, SIZE)
+    write_with_report(
+        args,
+        {args.out: text, args.picture: draw},
+        lambda: (design_page(found, args.study), content),
+        study.soil.files,
+    )
     if args.out is not None or args.report is not None or is_terminal():
         show(design_text(found))
     else:
