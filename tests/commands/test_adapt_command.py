@@ -34,11 +34,11 @@ epochs = 60
 
 @pytest.fixture
 def small_training(tmp_path, monkeypatch):
-    """Files are trained by the small spec, and calibrated on a fifth of the usual sets."""
+    """Files are trained by the small spec, and calibrated on a tenth of the usual sets."""
     (tmp_path / "small.toml").write_text(SMALL_SPEC)
     monkeypatch.setattr(board_file, "SPEC", str(tmp_path / "small.toml"))
     for name in ("LIMIT_SETS", "FIGURE_SETS", "LEAST_NEIGHBOURS"):
-        monkeypatch.setattr(validation, name, getattr(validation, name) // 5)
+        monkeypatch.setattr(validation, name, getattr(validation, name) // 10)
 
 
 def write_log(folder, *effects, loads=(40.0, 60.0, 80.0, 100.0, 120.0, 50.0)):
