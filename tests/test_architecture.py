@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("soilml", "datagen", "training")
 FILES = sorted(f for p in PACKAGES for f in (ROOT / p).rglob("*.py"))
+OF_SOILML = [file for file in FILES if file.is_relative_to(ROOT / "soilml")]
 BOARD = {"numpy", "onnxruntime"}
 ALLOWED_OUTSIDE_BOARD = {
     # where soilml itself may reach for more than the board has, always inside a function
@@ -57,6 +59,16 @@ ALLOWED_OUTSIDE_BOARD = {
 }
 
 
+@cache
+def text_of(file):
+    return file.read_text()
+
+
+@cache
+def tree_of(file):
+    return ast.parse(text_of(file))
+
+
 def imports(tree, top_level_only=False):
     nodes = tree.body if top_level_only else ast.walk(tree)
     for node in nodes:
@@ -76,12 +88,9 @@ def test_the_layers_of_the_import_linter_hold():
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(ROOT)))
+@pytest.mark.parametrize("file", OF_SOILML, ids=lambda f: str(f.relative_to(ROOT)))
 def test_what_flies_imports_only_what_the_board_has(file):
-    name = str(file.relative_to(ROOT))
-    tree = ast.parse(file.read_text())
-    if not name.startswith("soilml/"):
-        return
+    name, tree = str(file.relative_to(ROOT)), tree_of(file)
     outside = {m.split(".")[0] for m in imports(tree)} - set(sys.stdlib_module_names) - {"soilml"}
     assert outside - BOARD <= ALLOWED_OUTSIDE_BOARD.get(name, set())
     at_top = {m.split(".")[0] for m in imports(tree, top_level_only=True)}
@@ -93,15 +102,14 @@ def test_what_flies_imports_only_what_the_board_has(file):
 def test_files_are_read_at_a_sitting_and_say_what_they_are():
     """One subject a file: usually 80 to 400 lines."""
     for file in FILES:
-        text = file.read_text()
-        assert len(text.splitlines()) <= 400, file
-        assert ast.get_docstring(ast.parse(text)), file
+        assert len(text_of(file).splitlines()) <= 400, file
+        assert ast.get_docstring(tree_of(file)), file
         assert file.stem not in ("utils", "common", "helpers", "core", "manager"), file
 
 
 def test_public_functions_and_classes_are_described():
     for file in FILES:
-        for node in ast.parse(file.read_text()).body:
+        for node in tree_of(file).body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
                 assert ast.get_docstring(node), f"{file}: {node.name}"
 
@@ -110,7 +118,7 @@ def test_no_two_classes_share_a_name():
     """Private classes of a module apart, a name means one thing in all three packages."""
     places = {}
     for file in FILES:
-        for node in ast.walk(ast.parse(file.read_text())):
+        for node in ast.walk(tree_of(file)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 places.setdefault(node.name, []).append(str(file.relative_to(ROOT)))
     assert {name: files for name, files in places.items() if len(files) > 1} == {}
@@ -122,24 +130,24 @@ def test_no_program_searches_the_words_of_its_own_remarks():
         r"in text for " + r"text in|in (str\([a-z_.]*|[a-z_]*)(note|remark|warning)(\)|\.text)"
     )
     for file in FILES:
-        assert not searching.search(file.read_text()), file
+        assert not searching.search(text_of(file)), file
 
 
 def test_nothing_is_unpickled():
     """But for tasks that a dask scheduler hands to its workers: dask has no other form for them."""
     modules = r"\b(pickle|cloudpickle|dill|joblib|marshal|shelve)\b|torch\.(load|save)\("
-    unpickling = [file for file in FILES if re.search(modules, file.read_text())]
+    unpickling = [file for file in FILES if re.search(modules, text_of(file))]
     assert unpickling == [ROOT / "datagen" / "dask_cluster.py"]
     tests = [file for file in (ROOT / "tests").rglob("*.py") if file != Path(__file__)]
     for file in [*FILES, *tests]:
-        text = file.read_text()
+        text = text_of(file)
         assert not re.search(r"allow_pickle\s*=\s*True|\bpickle\.loads?\(", text), file
 
 
 def test_no_module_reads_the_time_of_day():
     """A clock that jumps must change no result, no name of a file and no waiting time."""
     reading = re.compile(r"\btime\.time\(|\bdatetime\.(now|today|utcnow)\(|\bdate\.today\(")
-    assert not [str(file) for file in FILES if reading.search(file.read_text())]
+    assert not [str(file) for file in FILES if reading.search(text_of(file))]
 
 
 def test_importing_soilml_loads_nothing_else():

@@ -80,6 +80,11 @@ DEVIATION = {"kls1_wheel": 0.08, "wheel_small": 0.1}
 STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
 
 
+def long(*values):
+    """Values of a parameter whose case `make test` leaves to `make test-long`."""
+    return pytest.param(*values, marks=pytest.mark.long)
+
+
 @cache
 def runs(recipe_name, rows, steady, count=400):
     """Columns (runs, rows) of runs in which something is steady."""
@@ -106,24 +111,24 @@ def coverage(estimator, columns, copies=1):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
 @pytest.mark.parametrize("steady", STEADY, ids=lambda steady: "-".join(("steady", *steady)))
-def test_intervals_hold_in_every_pattern_of_run(name, steady):
+@pytest.mark.parametrize("rows", [long(2), 12, long(40)])
+def test_intervals_hold_in_every_pattern_of_run(name, steady, rows):
     recipe = read_recipe(RELEASED[name][0])
     estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), recipe.case)
-    for rows in (2, 12, 40):
-        valid, inside = coverage(estimator, runs(RELEASED[name][0], rows, steady))
-        assert valid > 0.97
-        assert (np.abs(inside - 0.9) < DEVIATION.get(name, 0.06)).all(), (rows, inside)
+    valid, inside = coverage(estimator, runs(RELEASED[name][0], rows, steady))
+    assert valid > 0.97
+    assert (np.abs(inside - 0.9) < DEVIATION.get(name, 0.06)).all(), inside
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", RELEASED)
-def test_repeated_readings_do_not_reduce_the_uncertainty(name):
+@pytest.mark.parametrize(("rows", "copies"), [(1, 32), long(3, 10)])
+def test_repeated_readings_do_not_reduce_the_uncertainty(name, rows, copies):
     recipe = read_recipe(RELEASED[name][0])
     estimator = for_simulated_case(Estimator.load(ROOT / "exported" / f"{name}.onnx"), recipe.case)
-    for rows, copies in ((1, 32), (3, 10)):
-        valid, inside = coverage(estimator, runs(RELEASED[name][0], rows, ()), copies)
-        assert valid > 0.97
-        assert (np.abs(inside - 0.9) < 0.06).all(), (rows, inside)
+    valid, inside = coverage(estimator, runs(RELEASED[name][0], rows, ()), copies)
+    assert valid > 0.97
+    assert (np.abs(inside - 0.9) < 0.06).all(), inside
 
 
 @pytest.mark.parametrize("name", SIMULATED)
@@ -134,7 +139,7 @@ def test_the_file_for_any_wheel_comes_from_its_spec(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rows", [1, 6, 24])
+@pytest.mark.parametrize("rows", [long(1), 6, long(24)])
 def test_the_file_for_any_wheel_is_as_good_as_that_of_the_reference_wheel(rows):
     recipe = read_recipe("wheel")
     one = for_simulated_case(Estimator.load(ROOT / "exported" / "wheel.onnx"), recipe.case)

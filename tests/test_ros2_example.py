@@ -3,12 +3,14 @@
 import math
 import sys
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 from ros2_messages import GIVEN, LOAD, MODEL, RADIUS, ROOT, SAND, SECOND, contents, drive, play
 
+from soilml import Estimator
 from soilml.errors import InputError, ModelFileError
 
 sys.path.insert(0, str(ROOT / "examples" / "ros2"))
@@ -21,6 +23,14 @@ from soil_estimator.slip import slip_of
 
 #: Rows of a drive of a minute: the last stretch is not known to be complete.
 WHOLE = 59
+
+
+@pytest.fixture(autouse=True, scope="module")
+def loaded_once():
+    """A model file is loaded once, not for each of these tests."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Estimator, "load", staticmethod(cache(Estimator.load)))
+        yield
 
 
 def logic(**given):

@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -91,7 +92,12 @@ def _stick_slip(script: ModuleType) -> None:
 
 
 def _wheel_leg_slip(script: ModuleType) -> Callable[[], object]:
+    """Few springs, stances and soils, and two effects in place of the catalogue."""
+    from soilml.physics.effects import EFFECTS
+
     _springs(script)
+    effects = {name: EFFECTS[name] for name in ("slip-sinkage", "torque-gain")}
+    script.gap = partial(script.gap, effects=effects)
     script.REALISATIONS = 1
     stances, soils = script.simulate_stances, script.sample_soils
     script.simulate_stances = lambda count, seed: stances(40, seed)
@@ -101,8 +107,10 @@ def _wheel_leg_slip(script: ModuleType) -> Callable[[], object]:
 
 
 def _wheel_legs(script: ModuleType) -> None:
-    from functools import partial
-
+    """Fewer feet, and a third of the instants of each walk."""
+    names = ("gait_metrics", "sinkage_fit")
+    for module in (script, *(sys.modules[f"soilml.systems.wheel_legs.{name}"] for name in names)):
+        module.walk = partial(module.walk, steps=300)  # type: ignore[attr-defined]
     script.compare_feet = partial(script.compare_feet, (4e5, 7e5, 1e6), ("LTF", "SRF"))
     script.compare_legs = partial(script.compare_legs, turns=1.0)
     script.strip, script.OUT = _nothing, _folder() / "picture.png"
@@ -113,18 +121,30 @@ def _import_wheel_leg(script: ModuleType) -> None:
     script.STANCES, script.SLIPS, script.SEEDS = 5, (0.2,), (2,)
 
 
-def _slip_compare(script: ModuleType) -> Callable[[], object]:
+def _first_rows(script: ModuleType, count: int) -> None:
+    """The script reads the first rows of its tables alone."""
     import numpy as np
 
-    whole, count = script.read_table, 6
-    script.PARTS = {"equal rim speeds": count}
+    whole = script.read_table
+    script.read_table = lambda *words, **named: whole(*words, **named).rows(np.arange(count))
 
-    def read_table(*words: Any) -> Any:
-        table = whole(*words)
-        return table.rows(np.arange(count * len(set(table["wheel"]))))
 
-    script.read_table = read_table
+def _slip_compare(script: ModuleType) -> Callable[[], object]:
+    """Six rows of each of the four wheels."""
+    script.PARTS = {"equal rim speeds": 6}
+    _first_rows(script, 4 * 6)
     return script.compare  # type: ignore[no-any-return]
+
+
+def _map_compare(script: ModuleType) -> Callable[[], object]:
+    """The first third of the drive."""
+    _first_rows(script, 160)
+    return script.compare  # type: ignore[no-any-return]
+
+
+def _moon(script: ModuleType) -> None:
+    """One law of gravity and one radius, and no picture."""
+    script.LAWS, script.RADII, script.draw = ("open",), (0.1,), _nothing
 
 
 def _c_review(script: ModuleType) -> None:
@@ -163,6 +183,8 @@ PROBES: dict[str, Shrink] = {
     "examples/papers/wheel_leg_slip.py": _wheel_leg_slip,
     "examples/papers/wheel_legs.py": _wheel_legs,
     "examples/import/wheel_leg.py": _import_wheel_leg,
+    "examples/gravity/moon.py": _moon,
+    "examples/map/compare.py": _map_compare,
     "examples/slip/compare.py": _slip_compare,
     "bench/c_review.py": _c_review,
     "bench/challenge.py": _challenge,

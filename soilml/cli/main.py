@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
-from soilml.cli.options import declared_outputs, input_files
+from soilml.cli.options import declared_outputs, input_files, need_for_options
 from soilml.cli.process import (
     StopSignals,
     Terminated,
@@ -223,6 +223,7 @@ def _status(words: list[str]) -> int:
     args.command_line, args.make_parser = words, parser
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()
+    need_for_options(args, words[0])
     status = int(args.run(args) or 0)
     if sys.stdout is not None:
         sys.stdout.flush()

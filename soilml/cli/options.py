@@ -157,26 +157,19 @@ def add_report_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def need_for_report(args: argparse.Namespace, command: str) -> None:
-    """Raise `MissingLibraryError` where `--report` is given and lacks a library."""
-    if args.report is not None:
-        from soilml.optional_imports import need
-
-        need("jinja2", f"{command} --report")
-        need("matplotlib", f"{command} --report")
-
-
 def add_picture_option(parser: argparse.ArgumentParser, text: str) -> None:
-    """Declare `--picture`, for which `need_for_picture` asks."""
+    """Declare `--picture`."""
     add_output(parser, "--picture", "FILE.png", text)
 
 
-def need_for_picture(args: argparse.Namespace, command: str) -> None:
-    """Raise `MissingLibraryError` where `--picture` is given and its library is missing."""
-    if args.picture is not None:
-        from soilml.optional_imports import need
+def need_for_options(args: argparse.Namespace, command: str) -> None:
+    """Raise `MissingLibraryError` where `--report` or `--picture` is given and lacks a library."""
+    for option, libraries in (("report", ("jinja2", "matplotlib")), ("picture", ("matplotlib",))):
+        if getattr(args, option, None) is not None:
+            from soilml.optional_imports import need
 
-        need("matplotlib", f"{command} --picture")
+            for library in libraries:
+                need(library, f"{command} --{option}")
 
 
 def folder_outputs(option: str, path: str | None, names: Sequence[str]) -> list[Path]:

@@ -14,8 +14,8 @@ from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import wheels_by_gear
 from soilml.log_import.channels.inputs import channel_constant, our_slip
 from soilml.log_import.channels.runs import Run, run_names
-from soilml.log_import.channels.shared_errors import SharedError, largest_errors, shared_errors
-from soilml.log_import.channels.wheel_quantities import constants_of, slope_of
+from soilml.log_import.channels.shared_errors import SharedError, largest_errors
+from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.checks.column_units import unit_hints
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.table_hints import table_hints
@@ -27,10 +27,10 @@ from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import (
     AVERAGED,
     WindowRow,
-    means_of,
     plain_constants,
     quantities_of,
     rows_as_table,
+    shared_errors_of,
     unusable,
     values_of,
     without_torque,
@@ -82,8 +82,7 @@ def import_rows(
             hints = unit_hints(log_map, own, first)
             hints += map_hints(log_map, own, values_of(every))
             wrong += with_other_columns(hints, own, first, steady=True)
-            if rows:
-                errors.append(_shared_errors(log_map, own, rows))
+            errors.append(shared_errors_of(log_map, own, rows))
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
     if not groups:
@@ -105,16 +104,6 @@ def import_rows(
         radius=radius or float("nan"),
         sources=tuple(str(log[0].file) for log in logs),
         map_name=log_map.source,
-    )
-
-
-def _shared_errors(
-    log_map: LogMap, wheel: WheelMap, rows: Sequence[WindowRow]
-) -> tuple[dict[str, Noise], list[SharedError]]:
-    means = means_of(rows)
-    return shared_errors(
-        lambda constants: quantities_of(means, log_map, wheel, constants),
-        constants_of(wheel, log_map.vehicle),
     )
 
 

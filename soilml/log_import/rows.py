@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import gear_of
 from soilml.log_import.channels.inputs import Inputs
 from soilml.log_import.channels.runs import Run
+from soilml.log_import.channels.shared_errors import SharedError, shared_errors
 from soilml.log_import.channels.wheel_quantities import constants_of, wheel_quantities
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
@@ -89,6 +91,19 @@ def quantities_of(
     """The quantities of windows from the means of their channels."""
     found = wheel_quantities(means, wheel, log_map.vehicle, constants)
     return {name: np.asarray(values, dtype=np.float64) for name, values in found.items()}
+
+
+def shared_errors_of(
+    log_map: LogMap, wheel: WheelMap, rows: Sequence[WindowRow]
+) -> tuple[dict[str, Noise], list[SharedError]]:
+    """The errors that rows of a wheel share by its constants; see `shared_errors`."""
+    if not rows:
+        return {}, []
+    means = means_of(rows)
+    return shared_errors(
+        lambda constants: quantities_of(means, log_map, wheel, constants),
+        constants_of(wheel, log_map.vehicle),
+    )
 
 
 def window_row(

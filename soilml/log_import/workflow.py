@@ -15,8 +15,7 @@ from soilml.errors import FitError, InputError
 from soilml.log_import.channels.gear_of_run import wheels_by_gear
 from soilml.log_import.channels.inputs import Inputs, wheel_inputs
 from soilml.log_import.channels.runs import Run, runs_of
-from soilml.log_import.channels.shared_errors import largest_errors, shared_errors
-from soilml.log_import.channels.wheel_quantities import constants_of
+from soilml.log_import.channels.shared_errors import largest_errors
 from soilml.log_import.checks.column_units import differing_units, unit_hints
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.sensors import (
@@ -38,11 +37,11 @@ from soilml.log_import.rows import (
     WindowRow,
     add_stated_errors,
     irregular_windows,
-    means_of,
     plain_constants,
     pool_errors,
     quantities_of,
     rows_as_table,
+    shared_errors_of,
     unusable,
     values_of,
     window_row,
@@ -122,7 +121,9 @@ def import_log(
     table = rows_as_table([(a.wheel, run, a.kept[k]) for run, a, k in by_run], found)
     if len(table) == 0:
         raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(analyses)}")
-    bias, parts = largest_errors([analysis.shared_errors() for analysis in analyses])
+    bias, parts = largest_errors(
+        [shared_errors_of(found, a.wheel, [row for own in a.kept for row in own]) for a in analyses]
+    )
     radii = {a.wheel.radius.value if a.wheel.radius else None for a in analyses}
     radius = radii.pop() if len(radii) == 1 else None
     remarks = [remark for analysis in analyses for remark in analysis.remarks()]
@@ -222,17 +223,6 @@ class _Wheel:
         hints = unit_hints(self.log_map, self.wheel, self.runs[0])
         hints += map_hints(self.log_map, self.wheel, windows)
         return with_other_columns(hints, self.wheel, liveliest(self.runs[:_LOOKED]))
-
-    def shared_errors(self) -> Any:
-        """The errors that the rows share."""
-        rows = [row for rows in self.kept for row in rows]
-        if not rows:
-            return {}, []
-        means = means_of(rows)
-        return shared_errors(
-            lambda constants: quantities_of(means, self.log_map, self.wheel, constants),
-            constants_of(self.wheel, self.log_map.vehicle),
-        )
 
     def remarks(self) -> list[Remark]:
         """Dead and untared sensors."""

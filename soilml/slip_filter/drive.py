@@ -15,7 +15,7 @@ from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.remarks import Remark
-from soilml.slip_filter.filter import CHANGE, SlipFilter
+from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import SOILS, force_table
 
 WIDE = 0.3  # Width of a 90 % interval of slip from which on the slip is not determined
@@ -177,15 +177,12 @@ def _by_wheel(table: Table, wheels: Sequence[str]) -> NDArray[np.int64]:
     return order
 
 
-def slip_of_drive(
-    case: Case, rows: Rows | DriveRows, *, soils: int = SOILS, change: float = CHANGE
-) -> DriveSlip:
+def slip_of_drive(case: Case, rows: Rows | DriveRows, *, soils: int = SOILS) -> DriveSlip:
     """Slip of each wheel, body speed and soil along a drive, from torque and force balance.
 
     case: With a rover, priors of the soil, noise of the torque, and errors of the drives.
     rows: A table as `read_drive` takes it, or its rows.
     soils: Number of draws of the prior that stand for all soils.
-    change: Probability that a row is on another soil than the row before.
 
     Each answer knows the rows up to its own. Raises as `read_drive` and `force_table` do. Equations
     and where they do not hold: `SlipFilter`.
@@ -195,7 +192,7 @@ def slip_of_drive(
     table = force_table(case, (float(drive.load.min()), float(drive.load.max())), soils)
     own = case.noise.get("torque_Nm")
     noise = (0.0, 0.02) if own is None else (own.constant, own.share)
-    filter_ = SlipFilter(table, case.rover.weight, case.drive, noise, change)
+    filter_ = SlipFilter(table, case.rover.weight, case.drive, noise)
     n, k, p = len(drive.time), len(drive.wheels), len(table.names)
     speed, slip, soil = (np.full((n, 3, *size), np.nan) for size in ((), (k,), (p,)))
     no_soil, misfit, flags = np.full(n, np.nan), [], []

@@ -83,11 +83,10 @@ class SlipFilter:
         weight: float,
         errors: DriveErrors,
         noise: tuple[float, float] = (0.0, 0.02),
-        change: float = CHANGE,
     ) -> None:
         """`weight` of the rover, N; `noise` of a torque: N m, and a share of the reading."""
         self.table, self.weight, self.errors = table, weight, errors
-        self.noise, self.change = noise, change
+        self.noise = noise
         n, k = table.pull.shape[2], len(table.wheels)
         rng, normal = np.random.default_rng(0), Prior.normal(1.0).at((np.arange(n) + 0.5) / n)
         self._share = errors.pull_std * rng.permutation(normal)
@@ -193,8 +192,8 @@ class SlipFilter:
     def _mixed(self, belief: Belief) -> tuple[Floats, Floats, Floats]:
         """Weights, means and covariances before a row, on which another soil may have begun."""
         w, mean, cov = belief.weight, belief.mean, belief.cov
-        stays = (1.0 - self.change) * w
-        weight = stays + self.change * self._prior
+        stays = (1.0 - CHANGE) * w
+        weight = stays + CHANGE * self._prior
         same = (stays / weight)[:, None]
         middle = np.einsum("n,cnk->ck", w, mean)[:, None]
         apart = mean - middle

@@ -30,7 +30,7 @@ class MapAbility:
 
 
 def map_ability(
-    case: Case, soils: LocalSoils, mean: Floats, covariance: Floats, slope: Floats, seed: int = 0
+    case: Case, soils: LocalSoils, mean: Floats, covariance: Floats, slope: Floats
 ) -> MapAbility:
     r"""The rover of a case on the soils of n places, normal in scores.
 
@@ -46,7 +46,7 @@ def map_ability(
     References: Veach and Guibas, SIGGRAPH 1995 (weights by the mixture of all densities).
     """
     n, p = mean.shape
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     root = np.asarray(np.linalg.cholesky(covariance), dtype=np.float64)
     own = np.resize(rng.permutation(n), DRAWS)
     draws = mean[own] + np.einsum("kij,kj->ki", root[own], rng.standard_normal((DRAWS, p)))

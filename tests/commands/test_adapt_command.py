@@ -16,6 +16,7 @@ from training.adaptation import board_file
 from training.adaptation.supported_errors import CHECKED
 from training.adaptation.workflow import GAP_FILES, _read_gap
 from training.commands.adapt import FILES
+from training.set_posterior import validation
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 
 #: The packaged spec with a response that is learned in seconds.
@@ -29,6 +30,15 @@ designs = 600
 hidden = 24
 epochs = 60
 """
+
+
+@pytest.fixture
+def small_training(tmp_path, monkeypatch):
+    """Files are trained by the small spec, and calibrated on a tenth of the usual sets."""
+    (tmp_path / "small.toml").write_text(SMALL_SPEC)
+    monkeypatch.setattr(board_file, "SPEC", str(tmp_path / "small.toml"))
+    for name in ("LIMIT_SETS", "FIGURE_SETS", "LEAST_NEIGHBOURS"):
+        monkeypatch.setattr(validation, name, getattr(validation, name) // 10)
 
 
 def write_log(folder, *effects, loads=(40.0, 60.0, 80.0, 100.0, 120.0, 50.0)):
@@ -82,10 +92,7 @@ def test_without_a_gap_the_old_file_stays_and_that_is_a_result(tmp_path, capsys)
 
 
 @pytest.mark.slow
-def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monkeypatch):
-    spec = tmp_path / "small.toml"
-    spec.write_text(SMALL_SPEC)
-    monkeypatch.setattr(board_file, "SPEC", str(spec))
+def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, small_training):
     out = tmp_path / "out"
     words = [*write_log(tmp_path, SlipSinkage(n1=0.5)), "--out", str(out)]
     words += ["--rows", "3000", "--soil", str(tmp_path / "model.toml"), "--against", "wheel"]
@@ -118,10 +125,7 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, monke
 
 
 @pytest.mark.long
-def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys, monkeypatch):
-    spec = tmp_path / "small.toml"
-    spec.write_text(SMALL_SPEC)
-    monkeypatch.setattr(board_file, "SPEC", str(spec))
+def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys, small_training):
     out = tmp_path / "out"
     words = write_log(tmp_path, SlipSinkage(n1=0.5), loads=(40.0, 70.0, 110.0))
     assert main([*words, "--out", str(out), "--rows", "3000"]) == 0

@@ -75,11 +75,12 @@ def test_simulated_rows_can_be_identified(model_file, tmp_path, capsys):
 
 
 def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
-    assert main(["identify", str(model_file), str(runs_file), "--by", "run"]) == 0
+    command = ["identify", str(model_file), str(runs_file), "--method", "posterior"]
+    assert main([*command, "--by", "run"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
     assert content["runs"]["run_0"]["rows_used"] == 8
-    assert main(["identify", str(model_file), str(runs_file)]) == 0
+    assert main(command) == 0
     content = json.loads(capsys.readouterr().out)
     assert "runs-as-one-soil" in {one["code"] for one in content["warnings"]}
 
@@ -109,7 +110,7 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
 @pytest.mark.slow
 def test_identify_warns_of_one_load(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--where", "load_N=40"]
-    assert main(command) == 0
+    assert main([*command, "--method", "posterior"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert ("not-identified", ["cohesion"]) in [
         (w["code"], w["about"]) for w in content["warnings"]

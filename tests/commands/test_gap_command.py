@@ -106,6 +106,15 @@ def done(inputs, tmp_path_factory):
     return out
 
 
+@pytest.fixture(scope="module")
+def one_load(inputs, tmp_path_factory):
+    """The same of runs under one load."""
+    out = tmp_path_factory.mktemp("one_load")
+    command = ["gap", str(inputs / "model.toml"), str(inputs / "one.csv"), "--out", str(out)]
+    assert main(command) == 0
+    return out
+
+
 def content(folder):
     return json.loads((folder / "gap.json").read_text())
 
@@ -194,9 +203,9 @@ def test_two_rows_are_bad_data(inputs, tmp_path, capsys):
     assert text.strip() == "run,kind,what,separates_sigma,slip,load_N"
 
 
-def test_one_load_has_suspects_and_names_nothing(inputs, tmp_path, capsys):
-    files = (str(inputs / "model.toml"), str(inputs / "one.csv"))
-    found = analysed(inputs, tmp_path, capsys, *files)
+def test_one_load_has_suspects_and_names_nothing(one_load):
+    assert sorted(p.name for p in one_load.iterdir()) == sorted([*FILES, "model_suspected.toml"])
+    found = content(one_load)
     assert found["status"] == "suspected"
     assert found["effects"] == []
     assert found["reasons"][0]["code"] == "one-load"
@@ -210,15 +219,15 @@ def test_one_load_has_suspects_and_names_nothing(inputs, tmp_path, capsys):
     assert "inside-priors" in {condition["code"] for condition in found["conditions"]}
     first = found["suspects"][0]["effects"]
     assert found["best_unclaimed"] == first
-    assert "[[effect]]" not in (tmp_path / "out" / "model.toml").read_text()
-    suspected = (tmp_path / "out" / "model_suspected.toml").read_text()
+    assert "[[effect]]" not in (one_load / "model.toml").read_text()
+    suspected = (one_load / "model_suspected.toml").read_text()
     assert all(f'name = "{name}"' in suspected for name in first)
 
 
 def test_a_model_of_an_earlier_suspicion_does_not_stay(inputs, tmp_path, capsys):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "model_suspected.toml").write_text("of an earlier analysis")
-    analysed(inputs, tmp_path, capsys, str(inputs / "model.toml"), str(inputs / "runs.csv"))
+    analysed(inputs, tmp_path, capsys, str(inputs / "model.toml"), str(inputs / "two.csv"))
     assert not (tmp_path / "out" / "model_suspected.toml").exists()
 
 
@@ -276,16 +285,19 @@ def without_texts(found):
     return [without_texts(v) for v in found] if isinstance(found, list) else found
 
 
-@pytest.mark.parametrize("runs", ["runs.csv", "one.csv", "two.csv"])
-def test_no_decision_is_made_from_the_words_of_a_remark(inputs, tmp_path, monkeypatch, runs):
-    def analysed_into(folder):
-        names = [str(inputs / "model.toml"), str(inputs / runs)]
-        status = main(["gap", *names, "--out", str(tmp_path / folder)])
-        files = sorted(p.name for p in (tmp_path / folder).iterdir())
-        return status, files, without_texts(content(tmp_path / folder))
+def in_codes(folder):
+    """The files of an analysis, and what they say without sentences."""
+    return sorted(p.name for p in folder.iterdir()), without_texts(content(folder))
 
-    plain = analysed_into("plain")
+
+@pytest.mark.parametrize(("runs", "analysis"), [("runs.csv", "done"), ("one.csv", "one_load")])
+def test_no_decision_is_made_from_the_words_of_a_remark(
+    inputs, tmp_path, monkeypatch, request, runs, analysis
+):
+    plain = in_codes(request.getfixturevalue(analysis))
     nonsense = property(lambda self: "load Next runs is not identified", lambda self, text: None)
     monkeypatch.setattr(Remark, "text", nonsense, raising=False)
-    assert analysed_into("nonsense") == plain
+    names = [str(inputs / "model.toml"), str(inputs / runs)]
+    assert main(["gap", *names, "--out", str(tmp_path / "nonsense")]) == 0
+    assert in_codes(tmp_path / "nonsense") == plain
     assert "Next runs is not" in (tmp_path / "nonsense" / "gap.json").read_text()

@@ -85,7 +85,10 @@ def one_line(process, status, said):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "status"), [("SIGTERM", 143), ("SIGHUP", 129)])
+@pytest.mark.parametrize(
+    ("name", "status"),
+    [("SIGTERM", 143), pytest.param("SIGHUP", 129, marks=pytest.mark.long)],
+)
 def test_a_signal_to_stop_leaves_nothing_half_written(folder, name, status):
     number = getattr(signal, name)
     process = run_soilml(

@@ -111,6 +111,8 @@ def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkey
     assert main(["doctor"]) == 0
     assert "nothing is wrong" in capsys.readouterr().out
     monkeypatch.setattr("soilml.cli.commands.doctor._version", lambda name: "1.2.3")
+    one = {"wheel_linear": released_models()["wheel_linear"]}
+    monkeypatch.setattr("soilml.onboard.model_file.released_models", lambda: one)
     assert main(["doctor"]) == 1
     said = capsys.readouterr().out
     assert "! scipy is 1.2.3; needed is 1.15 or newer: pip install -U scipy" in said

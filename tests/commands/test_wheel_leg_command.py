@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP, VIBRATION_SLIP
+from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP, VIBRATION_SLIP, sinkage_fit
 from soilml.systems.wheel_legs.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
 from soilml.systems.wheel_legs.slip_models import soil_spring
 
@@ -79,13 +79,17 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     assert float(again[1]["slip"]) == pytest.approx(float(found[1]["slip"]), abs=1e-3)
 
 
-def test_relations_fitted_to_walks_answer_in_place_of_the_printed_ones(tmp_path, capsys):
+def test_relations_fitted_to_walks_answer_in_place_of_the_printed_ones(
+    tmp_path, capsys, monkeypatch
+):
+    walked = simulate_sinkage()
+    monkeypatch.setattr(sinkage_fit, "simulate_sinkage", lambda: walked)
     file, picture = tmp_path / "strides.csv", tmp_path / "soil.png"
     file.write_text("run,slip,sinkage_m\na,0.2,0.05\n")
     command = ["wheel-leg", str(file), "--sinkage-model", "walks", "--picture", str(picture)]
     assert main(command) == 0
     (row,) = rows_of(capsys.readouterr().out)
-    expected = fit_simulated_sinkage(simulate_sinkage())(0.05)
+    expected = fit_simulated_sinkage(walked)(0.05)
     assert float(row["normal_stiffness_Pa"]) == pytest.approx(float(expected.normal_stiffness))
     assert picture.read_bytes().startswith(b"\x89PNG")
 

@@ -67,7 +67,7 @@ def test_the_discrepancy_has_the_rms_that_is_stated_in_every_channel(rms):
 @pytest.mark.slow
 def test_the_discrepancy_is_smooth_common_to_all_runs_and_independent_per_channel():
     found = []
-    for seed in range(12):
+    for seed in range(6):
         plan = Plan("D", "", 0.0, 0.01, 4, "loam", 3, seed, discrepancy=0.02, design="repeats")
         drawn = draw_blind_set(plan)
         extra = np.array([drawn.truth["discrepancy"]["runs"][name] for name in CHANNELS])
@@ -88,7 +88,7 @@ def test_the_discrepancy_is_smooth_common_to_all_runs_and_independent_per_channe
 @pytest.mark.slow
 def test_noise_strays_about_the_true_readings_with_discrepancy():
     strays = []
-    for seed in range(20):
+    for seed in range(8):
         plan = Plan("D", "", 0.0, 0.02, 8, "loam", 3, seed, discrepancy=0.04)
         drawn, declared = draw_blind_set(plan), sensors(0.02)
         for name in CHANNELS:
@@ -101,7 +101,7 @@ def test_noise_strays_about_the_true_readings_with_discrepancy():
 @pytest.mark.parametrize("design", DESIGNS)
 def test_a_design_is_driven_as_it_says(design):
     runs = {"one-run": 1, "few-runs": 3, "few-rows": 1}.get(design, 8)
-    for seed in range(3):
+    for seed in range(2):
         drawn = draw_blind_set(replace(PLAN, design=design, runs=runs, seed=seed))
         columns = drawn.columns
         load, run = columns["load_N"], columns["run"]

@@ -95,7 +95,7 @@ def test_a_cause_acts_and_without_size_does_not(tier, key):
     bare = of_hidden(rows)
     if cause.form not in ("constant", "proportional"):
         assert apart(of_hidden(rows, ((cause, 0.0),)), bare).max() < 1e-9
-    for share in (0.5, 1.0, 2.0):
+    for share in (0.5, 2.0):
         acted = of_hidden(rows, ((cause, share * cause.reference),))
         assert np.isfinite(acted).mean() > 0.9
         assert np.nanmax(np.abs(acted - bare) / np.abs(bare)) > 2e-3
@@ -159,7 +159,7 @@ def test_what_a_cause_needs_varies(tier):
 @pytest.mark.slow
 def test_a_column_betrays_no_cause():
     drawn = [
-        draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(24)
+        draw_blind_set(replace(PLAN, tier="N0", cause="", size=0.0, seed=i)) for i in range(12)
     ]
     share = np.mean([len(d.columns) > 6 for d in drawn])
     assert 0.1 < share < 0.6

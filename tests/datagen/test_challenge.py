@@ -168,13 +168,11 @@ def test_a_report_without_a_gap_leaves_its_probability_to_none():
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 def test_entries_of_the_house_are_valid_and_repeatable(method, made, challenge, truth, tmp_path):
-    out, again = tmp_path / "a.json", tmp_path / "b.json"
-    for path in (out, again):
-        words = ["challenge", "enter", str(made[0]), "--method", method, "--out", str(path)]
-        assert main(words) == 0
-    assert out.read_bytes() == again.read_bytes()
+    out = tmp_path / "a.json"
+    words = ["challenge", "enter", str(made[0]), "--method", method, "--out", str(out)]
+    assert main(words) == 0
     read = Entry.read(out, challenge)
-    assert house_entry(challenge, method, 1).draws["s1"].shape == read.draws["s1"].shape
+    assert house_entry(challenge, method, 0).as_json(challenge) == json.loads(out.read_text())
     assert all(np.isfinite(v).all() for v in score(challenge, truth, read).by_set.values())
 
 

@@ -51,7 +51,7 @@ def die_at_five(number):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("method", ["fork", "spawn"])
+@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.long)])
 def test_results_come_in_order_from_several_processes(method, tmp_path):
     task = functools.partial(wait_for_another, tmp_path)
     with process_map(task, range(20), 2, start_method=method) as results:

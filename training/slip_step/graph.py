@@ -16,6 +16,7 @@ from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.onboard.slip_stream import FLAGS, JUDGED, QUANTILES, RECENT
 from soilml.slip_filter.drive import LIKELY, QUANTILE, WIDE
 from soilml.slip_filter.filter import (
+    CHANGE,
     FLOOR_NOISE,
     KEPT,
     MODEL_NOISE,
@@ -198,8 +199,7 @@ class _Step:
         known = enough.reduce("ReduceMax", 1, True)
         begin, second, rest = first.split([1, 1, m - 2], 1)
         hot = concat([second + begin, rest], 1)
-        last = np.zeros((1, m - 1))
-        last[0, -1] = 1.0
+        last = np.eye(1, m - 1, m - 2)
         hot = hot + (1.0 - known) * constant(graph, last)
         low = (_columns(pull, 0, m - 1) * hot).sum(1, True)
         high = (_columns(pull, 1, m) * hot).sum(1, True)
@@ -211,10 +211,10 @@ class _Step:
 
     def _mixed(self, grounds: Value) -> tuple[Value, list[list[Value]], list[list[Value]]]:
         """As `SlipFilter._mixed`: weight, means [2][k] and covariances [3][k], (n, 1) each."""
-        graph, k, stay = grounds.graph, self.k, 1.0 - self.filter.change
+        graph, k = grounds.graph, self.k
         old, *rest = grounds.split([1, *[k] * 5], 1)
-        kept = old * stay
-        weight = kept + constant(graph, self.filter.change * self.filter._prior[:, None])
+        kept = old * (1.0 - CHANGE)
+        weight = kept + constant(graph, CHANGE * self.filter._prior[:, None])
         same = kept / weight
         means, covs = rest[:2], rest[2:]
         middle = [(old * mean).sum(0, True) for mean in means]

@@ -13,6 +13,7 @@ from soilml.cli.options import (
     add_gravity_options,
     add_model_and_runs,
     add_output,
+    add_picture_option,
     add_row_options,
     gravity_change,
     number,
@@ -109,9 +110,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_exact_model_option(parser)
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(
-        parser, "--picture", "FILE.png", "draw maps of the expected width over slip and load"
-    )
+    add_picture_option(parser, "draw maps of the expected width over slip and load")
 
 
 def _with_noise_of_rows(case: Case, readings: Readings) -> Case:
@@ -147,11 +146,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.fitting.coordinates import select_free
     from soilml.fitting.usable_readings import usable_readings
     from soilml.io.read_table import RUNS
-    from soilml.optional_imports import need
     from soilml.remarks import Remark, texts
 
-    if args.picture is not None:
-        need("matplotlib", "advise --picture")
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
     if args.gravity is None:

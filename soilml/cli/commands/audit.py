@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     InputFile,
@@ -13,9 +12,6 @@ from soilml.cli.options import (
     add_output,
 )
 from soilml.io.atomic_files import save_text
-
-if TYPE_CHECKING:
-    pass
 
 HELP = "missing effects that planned runs could identify"
 DESCRIPTION = """\

@@ -88,11 +88,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
     from soilml.identification.bevameter.soil_section import missing_values, model_file_text
-    from soilml.optional_imports import need
     from soilml.report.page import json_text
 
-    if args.picture is not None:
-        need("matplotlib", "bevameter --picture")
     plates, shear, left = _tables(args)
     case = None if args.model is None else read_case(args.model, available_effects(args))
     with working("fitting the tests"):

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     InputFile,
     add_output,
     add_report_option,
-    need_for_report,
     number,
     parse_names,
     whole_number_from,
 )
 
 if TYPE_CHECKING:
-    from soilml.report.page import Report
     from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
@@ -106,9 +103,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("scipy", "design")
-    need_for_report(args, "design")
-    if args.picture is not None:
-        need("matplotlib", "design --picture")
     from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
     from soilml.rover_design.figures import SIZE
@@ -126,14 +120,13 @@ def run(args: argparse.Namespace) -> int:
         )
     content = found.as_json()
 
-    def draw(path: Path) -> None:
-        save_png(found.plot, 2, 2, SIZE, path)
-
-    def build() -> tuple[Report, Mapping[str, Any]]:
-        return design_page(found, args.study), content
-
-    text = json_text(content)
-    write_with_report(args, {args.out: text, args.picture: draw}, build, study.soil.files)
+    text, draw = json_text(content), partial(save_png, found.plot, 2, 2, SIZE)
+    write_with_report(
+        args,
+        {args.out: text, args.picture: draw},
+        lambda: (design_page(found, args.study), content),
+        study.soil.files,
+    )
     if args.out is not None or args.report is not None or is_terminal():
         show(design_text(found))
     else:

@@ -11,7 +11,6 @@ from soilml.cli.options import (
     add_output,
     add_report_option,
     add_row_options,
-    need_for_report,
 )
 from soilml.errors import InputError, TableError
 
@@ -123,7 +122,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("onnxruntime", "estimate")
-    need_for_report(args, "estimate")
     import numpy as np
 
     from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report

@@ -15,7 +15,6 @@ from soilml.cli.options import (
     add_output,
     add_report_option,
     add_row_options,
-    need_for_report,
 )
 from soilml.errors import InputError
 
@@ -121,7 +120,6 @@ def run(args: argparse.Namespace) -> int:
     if args.fresh is not None and not args.mean:
         raise InputError("--fresh predicts rows by the mean of groups: add --mean")
     need("scipy", "identify")
-    need_for_report(args, "identify")
     from soilml.experiment_design.advice_after_results import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify

@@ -18,7 +18,6 @@ from soilml.cli.options import (
     add_report_option,
     add_row_options,
     gravity_change,
-    need_for_report,
     slip_limit,
 )
 from soilml.errors import InputError
@@ -184,15 +183,10 @@ def _estimator(args: argparse.Namespace) -> Estimator | None:
 
 
 def _check(args: argparse.Namespace) -> None:
-    from soilml.optional_imports import need
-
-    need_for_report(args, "pull")
-    if args.picture is not None:
-        need("matplotlib", "pull --picture")
-        if args.by is not None:
-            raise InputError(
-                "--picture draws one soil; select it with --where run=NAME instead of --by"
-            )
+    if args.picture is not None and args.by is not None:
+        raise InputError(
+            "--picture draws one soil; select it with --where run=NAME instead of --by"
+        )
     if args.as_usual:
         raise InputError(
             "--as-usual is gone: the soil is averaged over typical errors, unless --exact-model "

@@ -9,7 +9,6 @@ from soilml.cli.options import (
     add_gear_option,
     add_output,
     add_picture_option,
-    need_for_picture,
     number,
 )
 from soilml.errors import InputError, TableError
@@ -70,7 +69,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.systems.force_sensor_wheel import MohrCoulomb, SensingWheel, SteadyRun
     from soilml.systems.force_sensor_wheel.runs_on_slopes import read_profiles, solve_runs
 
-    need_for_picture(args, "sensor-wheel")
     case = read_case_of_one_gear(args.model, EFFECTS, args.gear)
     gear, soil = case.model.gear, case.soil
     if not isinstance(gear, Wheel):

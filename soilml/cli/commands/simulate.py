@@ -12,7 +12,6 @@ from soilml.cli.options import (
     add_gear_option,
     add_output,
     add_picture_option,
-    need_for_picture,
     number,
 )
 from soilml.errors import InputError
@@ -112,7 +111,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.row_status import Status
     from soilml.systems.tracked_robot.robot import UNBALANCED, balanced_rows, settled_rows
 
-    need_for_picture(args, "simulate")
     if not args.balance and (args.hitch is not None or args.behind is not None):
         raise InputError("--hitch and --behind balance the moments of a track: add --balance")
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)

@@ -60,7 +60,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case
     from soilml.io.atomic_files import write_files
     from soilml.io.text_tables import csv_text
-    from soilml.optional_imports import need
     from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
     from soilml.slip_filter.drive import read_drive, slip_of_drive
@@ -72,8 +71,6 @@ def run(args: argparse.Namespace) -> int:
         plot_drive,
     )
 
-    if args.picture is not None:
-        need("matplotlib", "slip --picture")
     case = read_case(args.rover, available_effects(args))
     rows = read_drive(read_long_table(args.drive, ignore_extra=args.ignore_extra), case)
     with working(f"inferring from {len(rows.time)} rows"):

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from soilml.cli.options import (
     add_output,
     add_picture_option,
-    need_for_picture,
     number,
 )
 from soilml.errors import InputError
@@ -62,7 +61,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.systems.wheel_legs.walk_tables import walk_tables
 
-    need_for_picture(args, "walk")
     feet = parse_names(args.foot) or []
     counts = parse_numbers("--legs", args.legs)
     if np.any(counts != counts.round()):

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 from soilml.cli.options import (
     InputFile,
     add_by_option,
+    add_ignore_extra_option,
     add_output,
     add_picture_option,
-    need_for_picture,
     number,
 )
 from soilml.errors import InputError
@@ -83,9 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vibration-std", type=number, default=0.0, metavar="M_S2", help="std, m/s^2"
     )
     add_by_option(parser)
-    parser.add_argument(
-        "--ignore-extra", action="store_true", help="ignore columns whose names are not known"
-    )
+    add_ignore_extra_option(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
     add_picture_option(parser, "draw the soil by sensor, or the slip by stride")
 
@@ -94,7 +92,6 @@ def run(args: argparse.Namespace) -> int:
     """Estimate and write the table."""
     from soilml.io.read_table import read_table
 
-    need_for_picture(args, "wheel-leg")
     known = args.known is not None
     if known and args.by is not None:
         raise InputError("--by asks for a soil of each group; --known gives the slip of each row")

@@ -62,10 +62,10 @@ def _rms(values: Array) -> Array:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def compare_legs(ground: LinearGround, foot: str = "none", turns: float = 2.0) -> GaitMetrics:
-    """Wheel-legs of 1 to `MAX_LEGS` legs on one ground (Comin and Saaj 2017, fig. 5); (legs,)."""
+def compare_legs(ground: LinearGround, turns: float = 2.0) -> GaitMetrics:
+    """1 to `MAX_LEGS` legs without feet on one ground (Comin and Saaj 2017, fig. 5); (legs,)."""
     return gait_metrics(
-        walk([wheel_leg(foot, legs=n + 1) for n in range(MAX_LEGS)], ground, turns=turns)
+        walk([wheel_leg("none", legs=n + 1) for n in range(MAX_LEGS)], ground, turns=turns)
     )
 
 
@@ -94,11 +94,11 @@ class FeetComparison:
 
 
 def compare_feet(
-    stiffnesses: Sequence[float] = STIFFNESSES, feet: Sequence[str] = tuple(FEET), legs: int = 5
+    stiffnesses: Sequence[float] = STIFFNESSES, feet: Sequence[str] = tuple(FEET)
 ) -> FeetComparison:
-    """Wheel-legs with each of the feet, rolling freely on each of three or more grounds."""
+    """Five legs with each of the feet, rolling freely on each of three or more grounds."""
     cases = list(product(feet, stiffnesses))
-    wheels = [wheel_leg(foot, legs=legs) for foot, _ in cases]
+    wheels = [wheel_leg(foot) for foot, _ in cases]
     found = gait_metrics(walk(wheels, [LinearGround(stiffness=alpha) for _, alpha in cases]))
     shape = (len(feet), len(stiffnesses))
     return FeetComparison(

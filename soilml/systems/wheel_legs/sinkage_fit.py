@@ -10,7 +10,7 @@ import numpy as np
 from soilml.arrays import Array, Real
 from soilml.errors import FitError, InputError
 from soilml.systems.wheel_legs.gait_metrics import gait_metrics
-from soilml.systems.wheel_legs.geometry import WheelLeg, wheel_leg
+from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 from soilml.systems.wheel_legs.walk import walk
 
@@ -31,7 +31,7 @@ class SimulatedSinkage:
     status: Array
 
 
-def simulate_sinkage(wheel: WheelLeg | None = None, *, offset: bool = False) -> SimulatedSinkage:
+def simulate_sinkage(*, offset: bool = False) -> SimulatedSinkage:
     """Simulate walks on the four soils in three states (Comin and Saaj 2017, sec. IV-B, fig. 12).
 
     Normal stress is proportional to depth (eq. 4); with `offset` it starts at sigma_0 (eq. 3).
@@ -39,7 +39,7 @@ def simulate_sinkage(wheel: WheelLeg | None = None, *, offset: bool = False) -> 
     cases = [(soil, state) for soil in GROUNDS for state in STATES]
     grounds = [_scaled(GROUNDS[soil], STATES[state]) for soil, state in cases]
     walked_on = grounds if offset else [replace(ground, offset=0.0) for ground in grounds]
-    found = gait_metrics(walk(wheel_leg() if wheel is None else wheel, walked_on))
+    found = gait_metrics(walk(wheel_leg(), walked_on))
     return SimulatedSinkage(
         soil=tuple(soil for soil, _ in cases),
         state=tuple(state for _, state in cases),

@@ -145,7 +145,7 @@ def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, caps
     runs.write_text("run,slip,load_N,torque_Nm\n" + "\n".join(lines) + "\n")
     model = str(model_file)
     for command in (
-        ["identify", model, str(runs)],
+        ["identify", model, str(runs), "--method", "nonlinear"],
         ["gap", model, str(runs), "--out", str(tmp_path / "found")],
         ["estimate", "exported/any_wheel.onnx", str(runs), "--case", model, "--by", "run"],
     ):

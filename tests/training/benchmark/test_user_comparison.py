@@ -31,7 +31,7 @@ def test_data(tmp_path_factory):
 def scores(test_data, small_model):
     case = read_case(test_data / "model.toml")
     table = read_table(test_data / "test.parquet")
-    return compare(case, table, {"small": Estimator.load(small_model)}, analytic_sets=6)
+    return compare(case, table, {"small": Estimator.load(small_model)}, analytic_sets=2)
 
 
 def score(scores, rows, method):
