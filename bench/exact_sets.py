@@ -158,7 +158,7 @@ def log_likelihood(
     rows = sets.rows(index)
 
     def evaluate(x: Floats) -> Floats:
-        values = _si_values(sets, index, response(x))
+        values = si_values(sets, index, response(x))
         total = np.zeros(values.shape[1])
         for k, name in enumerate(RESPONSE_CHANNELS):
             read = rows[f"{name}_std"] < ABSENT_STD
@@ -177,7 +177,7 @@ def log_likelihood(
     return evaluate
 
 
-def _si_values(sets: SimulatedSets, index: int, y: Floats) -> Floats:
+def si_values(sets: SimulatedSets, index: int, y: Floats) -> Floats:
     """Torque, sinkage and drawbar pull (rows, n, 3) in SI units from a family's channels."""
     length, load = sets.origin.length[index], sets.rows(index)["load"][:, None]
     with np.errstate(over="ignore"):
@@ -222,7 +222,7 @@ def _fit_surrogate(unknowns: Unknowns, designs: Floats) -> Callable[[Floats], Fl
 
 def _rms_error_over_noise(sets: SimulatedSets, index: int, y: Floats, true: Floats) -> float:
     """Rms difference of two responses over the noise, of the channels that are read."""
-    a, b = _si_values(sets, index, y), _si_values(sets, index, true)
+    a, b = si_values(sets, index, y), si_values(sets, index, true)
     rows, squares = sets.rows(index), []
     for k, name in enumerate(RESPONSE_CHANNELS):
         read = rows[f"{name}_std"] < ABSENT_STD

@@ -266,7 +266,12 @@ def _run_file(
         for name in ("sinkage", "drawbar_pull"):
             rows[name] = np.where(rows[f"{name}_std"] < ABSENT_STD, rows[name], np.nan)
         exact = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
-        configured = estimator.on(None, **sets.context_of(0), **exact)
+        noise = {}
+        if reference.declares_noise:
+            del rows["torque_std"]
+            constant, share = sets.origin.noise["torque"]
+            noise = {"torque": (constant[0, 0], share[0, 0])}
+        configured = estimator.on(noise, **sets.context_of(0), **exact)
         estimate, memory = configured.step(configured.start(), **rows)
         estimates.append(estimate)
         system = memory.system.astype(np.float64)

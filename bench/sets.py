@@ -1,9 +1,8 @@
 """Set posteriors of the released files against the exact posteriors of the same sets.
 
 `python bench/sets.py [FOLDER]` prints the tables; with --limit the exact posteriors are recomputed
-and stored (six minutes on two cores). The simulated noise is a share of the true value, and the
-standard deviations of the sets are those at the true value; a rover computes them from the reading,
-which is measured as a case of its own.
+and stored (seven minutes on two cores). The simulated noise is a share of the true value, or
+constant. A file is fed standard deviations that are computed from the readings, as a rover's are.
 """
 
 from __future__ import annotations
@@ -11,6 +10,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -18,9 +18,12 @@ import numpy as np
 from benchmarks_file import ROOT
 from reference_sets import (
     ANY_WHEEL,
+    CONSTANT,
     ONE_WHEEL,
+    ReferenceSet,
     as_any_wheel_sets,
     compute_reference_posteriors,
+    constant_noise_sets,
     generate_reference_sets,
     packaged_posteriors,
     with_noise_of_reading,
@@ -53,23 +56,34 @@ QUANTILE_EDGES = (0.05, 0.25, 0.75, 0.95)
 @cache
 def measured(folder: Path) -> dict[str, list[PosteriorComparison]]:
     """Every file on its reference sets, by design."""
-    references = generate_reference_sets()
+    references = _all_sets()
     limit = load_limit(packaged_posteriors(), references, HINT)
-    first = sum(r.label == ONE_WHEEL for r in references)
-    one, any_ = slice(0, first), slice(first, len(references))
-    assert all(r.label == ANY_WHEEL for r in references[any_])
+    of_label: dict[str, list[int]] = {r.label: [] for r in references}
+    for index, reference in enumerate(references):
+        of_label[reference.label].append(index)
     wheel, any_wheel = folder / "wheel.onnx", folder / "any_wheel.onnx"
-    from_reading = with_noise_of_reading(references[any_])
-    cases = {
-        "wheel, reference wheel": (wheel, references[one], one),
-        "any_wheel, reference wheel": (any_wheel, as_any_wheel_sets(references[one]), one),
-        "any_wheel, any wheel": (any_wheel, references[any_], any_),
-        "any_wheel, any wheel, noise from reading": (any_wheel, from_reading, any_),
-    }
-    return {
-        name: compare_with_exact(file, sets, limit.subset(part))
-        for name, (file, sets, part) in cases.items()
-    }
+    cases: dict[str, list[PosteriorComparison]] = {}
+
+    def add(name: str, file: Path, label: str, sets: Sequence[ReferenceSet]) -> None:
+        index = of_label[label]
+        part = limit.subset(slice(index[0], index[-1] + 1))
+        cases[f"{file.stem}, {name}"] = compare_with_exact(file, sets, part)
+
+    own = {label: [references[i] for i in index] for label, index in of_label.items()}
+    from_reading = {label: with_noise_of_reading(sets) for label, sets in own.items()}
+    add(ONE_WHEEL, wheel, ONE_WHEEL, from_reading[ONE_WHEEL])
+    add(ONE_WHEEL, any_wheel, ONE_WHEEL, as_any_wheel_sets(from_reading[ONE_WHEEL]))
+    add(ANY_WHEEL, any_wheel, ANY_WHEEL, from_reading[ANY_WHEEL])
+    for file, label in ((wheel, ONE_WHEEL + CONSTANT), (any_wheel, ANY_WHEEL + CONSTANT)):
+        sets = from_reading[label]
+        add(label, file, label, [replace(one, declares_noise=True) for one in sets])
+        add(f"{label} fed by row", file, label, sets)
+    return cases
+
+
+def _all_sets() -> list[ReferenceSet]:
+    """Reference sets with noise that is a share of the true value, and with constant noise."""
+    return [*generate_reference_sets(), *constant_noise_sets()]
 
 
 def rmse_table(folder: Path) -> str:
@@ -196,7 +210,7 @@ def _binned_ranks(truth: np.ndarray, edges: np.ndarray, ends: Sequence[float]) -
 def _subsets(parts: Sequence[PosteriorComparison]) -> list[tuple[PosteriorComparison, str]]:
     """All sets, those of each size, of each condition, and of low and high torque noise."""
     whole = pool_comparisons(parts)
-    subsets = [(whole, "all")]
+    subsets = [(whole, "all")] if len(parts) > 1 else []
     subsets += [(part, f"{_rows(part)} row{'s' if _rows(part) > 1 else ''}") for part in parts]
     subsets += [
         (whole.subset(index), condition)
@@ -247,7 +261,7 @@ def _rows(part: PosteriorComparison) -> int:
 
 def recompute() -> None:
     """Compute and store the exact posteriors of all reference sets."""
-    references = generate_reference_sets()
+    references = _all_sets()
 
     def report(text: str, done: int, total: int) -> None:
         if done % 200 == 0 or done == total:

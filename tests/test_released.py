@@ -13,6 +13,7 @@ from datagen.simulation import simulate_pieces
 from soilml import Estimator, simulate
 from soilml.identification.trained_estimator import for_simulated_case
 from soilml.quantities import SHEAR, column
+from training.set_posterior.error_scales import ErrorScales
 from training.spec import read_any_wheel_spec, read_spec
 
 ROOT = Path(__file__).parents[1]
@@ -43,6 +44,13 @@ def test_every_released_file_is_listed_and_has_its_card():
     for name in (*FROM_DATA, *SIMULATED):
         assert (ROOT / "exported" / f"{name}.md").is_file()
         assert f"{name}.onnx" in page
+
+
+@pytest.mark.parametrize("name", ["wheel", "wheel_small", "kls1_wheel", *SIMULATED])
+def test_a_card_lists_the_scales_of_the_errors_of_its_model(name):
+    metadata = Estimator.load(ROOT / "exported" / f"{name}.onnx").metadata
+    scales = ErrorScales.of_list(json.loads(metadata["set"])["model_error_scales"])
+    assert "\n".join(scales.for_card()) in (ROOT / "exported" / f"{name}.md").read_text()
 
 
 @pytest.mark.parametrize("name", FROM_DATA)

@@ -107,7 +107,8 @@ class Estimator:
         ----------
         noise : mapping of str to (float, float), optional
             Replaces the file's own noise for sets: channel, or ``torque_bias``, to its constant
-            part in SI units and its share of the reading.
+            part in SI units and its share of the reading. Readings of torque with a constant part
+            are corrected for it where the file takes their logarithm.
         **given : float
             Wheel, bearing and ends of the prior in SI units, by the names of the file's card; and
             standard deviations of errors that all readings share, by `COMMON_ERROR_INPUTS`.
@@ -177,6 +178,8 @@ class Estimator:
             Every quantity in `inputs`, in SI units. A set posterior also takes ``sinkage`` and
             ``drawbar_pull``, NaN in rows without them, and ``torque_std``, ``sinkage_std`` and
             ``drawbar_pull_std`` where the noise is not the file's, ``slip_std`` and ``load_std``.
+            A standard deviation of torque is taken as a share of the reading, from which it is to
+            be computed. For a sensor whose noise has a constant part, give ``on`` the noise.
 
         Raises
         ------

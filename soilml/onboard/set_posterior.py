@@ -53,6 +53,8 @@ KNOWN = (*REQUIRED_READINGS, *OPTIONAL_READINGS, *STD_INPUTS, *OPERATING_STD_INP
 OUTPUTS = [*(SET_PREFIX + name for name in SET_OUTPUTS), *MEMORY_OUTPUTS]
 #: Stands for the smallest positive standard deviation: zero and negative values are refused.
 POSITIVE_STD = 1e-300
+#: The graph leaves out a torque whose constant noise is a larger share of it.
+MOST_CONSTANT_SHARE = 1.0 / 3.0
 
 
 @final
@@ -68,6 +70,10 @@ class SetPosterior:
     common_errors: Standard deviations of errors that all rows share, by `COMMON_ERROR_INPUTS`; none
         in a file of an earlier version. They have `error_columns` columns in the residual system.
     least_share_in_range: Share of a set's rows that must be in range; the others are set aside.
+    log_torque: Whether the graph takes the logarithm of torque: where the noise of torque has no
+        constant part, and in a file for any wheel.
+    constant_noise: Constant part of the noise of torque that a user has set, N m; the graph takes
+        the noise as a share of the reading.
     """
 
     terms: int
@@ -78,20 +84,25 @@ class SetPosterior:
     common_errors: dict[str, float] = field(default_factory=dict)
     error_columns: int = 1
     least_share_in_range: float = FORMER_SHARE_IN_RANGE
+    log_torque: bool = True
+    constant_noise: float = 0.0
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
         """From the entry `set` of a file's metadata."""
         context = metadata["context"].items()
+        noise = {str(k): (float(v[0]), float(v[1])) for k, v in metadata["noise"].items()}
+        constant, _ = noise.get("torque", (0.0, 0.0))
         return SetPosterior(
             terms=int(metadata["terms"]),
-            noise={str(k): (float(v[0]), float(v[1])) for k, v in metadata["noise"].items()},
+            noise=noise,
             context_ranges={str(k): (float(v[0]), float(v[1])) for k, v in context},
             context_values={},
             common_errors=read_common_errors(metadata),
             error_columns=error_columns(metadata),
             sets_only=bool(metadata["alone"]),
             least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
+            log_torque=metadata.get("kind") == "any wheel" or not constant,
         )
 
     @property
@@ -127,8 +138,14 @@ class SetPosterior:
                     f"{name} is {value:g}; the range of this file is {low:g} to {high:g}"
                 )
         values = self.context_values | values
-        noise = self.noise | parts
-        return replace(self, context_values=values, noise=noise, common_errors=common)
+        constant, _ = parts.get("torque", (self.constant_noise, 0.0))
+        return replace(
+            self,
+            context_values=values,
+            noise=self.noise | parts,
+            common_errors=common,
+            constant_noise=constant if self.log_torque else 0.0,
+        )
 
     def start(self, file: str = "") -> Memory:
         """The memory before the first reading, of the file with this identity."""
@@ -168,6 +185,9 @@ class SetPosterior:
                 rows[name] = std
             else:
                 check_takes_errors(self.common_errors, name, float(std.max(initial=0.0)))
+        if self.constant_noise and "torque_std" not in measured:
+            factor = constant_noise_factor(rows["torque"], self.constant_noise)
+            rows |= {name: rows[name] * factor for name in ("torque", "torque_std")}
         if len(measured) == len(REQUIRED_READINGS):
             return rows
         for name in measured.keys() & rows.keys() - READABLE.keys():  # others are positive
@@ -231,6 +251,21 @@ class SetPosterior:
         memory = memory.packed()
         outputs = session.run(OUTPUTS, self.feed(last, memory))
         return outputs[: len(SET_OUTPUTS)], memory.grown(*outputs[len(SET_OUTPUTS) :])
+
+
+def constant_noise_factor(torque: Floats, constant: float) -> Floats:
+    r"""Factors (m,) of torque readings (m,) whose noise has this constant part, N m.
+
+    The graph weights the logarithm of a reading y by :math:`w = (y / \sigma)^2`. With
+    :math:`\sigma^2 = a^2 + b^2 y^2` the weight rises with the error of the reading unless a is 0:
+    :math:`d \log w / d \log y = 2 a^2 / \sigma^2`. The weighted mean of the logarithm is then too
+    large by that times its variance :math:`(\sigma / y)^2`, to second order in the noise. Readings
+    are reduced by this, their standard deviations as well:
+
+    .. math:: y' = y \, e^{-2 (a / y)^2}
+    """
+    share = constant / np.maximum(np.abs(torque), POSITIVE_STD)
+    return np.asarray(np.exp(-2.0 * np.minimum(share, MOST_CONSTANT_SHARE) ** 2))
 
 
 def _items(name: str, value: Any) -> list[tuple[Any, Any]]:

@@ -18,6 +18,7 @@ from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
 from training.export.model_file import write_model
 from training.onnx_graph.builder import IR_VERSION, OPSET, Graph
+from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.graph import SetPosteriorGraph
 from training.set_posterior.posterior_summary import prior_summary
 from training.set_posterior.validation import (
@@ -157,11 +158,13 @@ def any_wheel_card(
         "own answer has errors of the model.",
         "",
         *table_of(figures, list(SHEAR)),
+        *ErrorScales.of_list(sets["model_error_scales"]).for_card(),
+        "",
         "## Made by",
         "",
         f"- spec sha256 `{metadata['spec_sha256']}`",
         f"- spec: `{metadata['spec']}`",
-        f"- opset {OPSET}, IR {IR_VERSION}; soilml {__version__}",
+        f"- opset {OPSET}, IR {IR_VERSION}; soilml {metadata['soilml_version']}",
         "",
     ]
     return "\n".join(lines)

@@ -9,7 +9,6 @@ from typing import Any
 from soilml.onboard.held_out_errors import HeldOutErrors
 from training.calibration.recalibration import Metrics
 from training.regressors.gaussian_regressor import FeatureSubset
-from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.validation import table_of
 from training.train import TrainedModel
 
@@ -63,11 +62,6 @@ SET_POSTERIOR = (
     "(`model_error` 0), as it is in the simulation; the file's own answer has errors of the model."
 )
 
-MODEL_ERRORS = (
-    "The file's own answer is averaged over sizes of the errors of its model, as multiples of the "
-    "usual ones, each weighted by how well it explains the set:"
-)
-
 
 def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) -> str:
     """The card of a model file as Markdown, from its model, metadata and name."""
@@ -88,7 +82,7 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
     ]
     if trained.set_posterior is not None:
         lines += [SET_POSTERIOR, "", *table_of(trained.set_figures, targets)]
-        lines += [MODEL_ERRORS, "", *_error_scales(trained.set_posterior.scales), ""]
+        lines += [*trained.set_posterior.scales.for_card(), ""]
     elif not trained.spec.per_row and trained.pooled_scores:
         lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]
     elif trained.pooling.held_out is not None:
@@ -104,16 +98,6 @@ def _judged_on(trained: TrainedModel) -> list[str]:
         return [MEASURED.format(rows=rows)]
     text = LEFT_OUT.format(rows=rows, runs=left.runs, freedom=left.freedom.min() + 1.0)
     return [text] if left.runs > 1 else [text, "", ONE_RUN]
-
-
-def _error_scales(scales: ErrorScales) -> list[str]:
-    """Sizes of the errors of the model with their probabilities, as a table."""
-    rows = [
-        f"| {s.bearing:g} | {s.channels:g} | {s.laws:g} | {s.probability:.2f} |"
-        for s in scales.scales
-    ]
-    head = "| bearing and contact | single channels | laws of the soil | probability |"
-    return [head, "|---:|---:|---:|---:|", *rows]
 
 
 def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:

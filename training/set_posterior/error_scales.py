@@ -21,6 +21,11 @@ GROUPS = (
 )
 MOST_SCALES = 8  # Each takes time on board
 TOLERANCE = 1e-6  # Of the sum of probabilities
+#: What a card says of the scales.
+ON_CARD = (
+    "The file's own answer is averaged over sizes of the errors of its model, as multiples of the "
+    "usual ones, each weighted by how well it explains the set:"
+)
 
 
 @dataclass(frozen=True)
@@ -96,6 +101,15 @@ class ErrorScales:
     def as_list(self) -> list[dict[str, float]]:
         """As in a spec, and in the metadata of a file."""
         return [asdict(scale) for scale in self.scales]
+
+    def for_card(self) -> list[str]:
+        """Sizes and probabilities as a table with a sentence, lines of Markdown."""
+        rows = [
+            f"| {s.bearing:g} | {s.channels:g} | {s.laws:g} | {s.probability:.2f} |"
+            for s in self.scales
+        ]
+        head = "| bearing and contact | single channels | laws of the soil | probability |"
+        return [ON_CARD, "", head, "|---:|---:|---:|---:|", *rows]
 
     @staticmethod
     def of_list(entries: list[dict[str, Any]]) -> ErrorScales:

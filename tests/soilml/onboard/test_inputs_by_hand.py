@@ -25,7 +25,7 @@ from soilml.onboard.multi_sensor import (
     fuse_estimates,
 )
 from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
-from soilml.onboard.set_posterior import SetPosterior, _broadcast
+from soilml.onboard.set_posterior import SetPosterior, _broadcast, constant_noise_factor
 
 SETS = SetPosterior(
     terms=4,
@@ -73,6 +73,53 @@ def test_standard_deviations_are_those_of_the_noise_model_or_as_measured():
     alone = SETS.rows(ROWS | {"sinkage_std": 0.002})
     assert alone["sinkage"].tolist() == [ABSENT_READING] * 2
     assert alone["sinkage_std"].tolist() == [ABSENT_STD] * 2
+
+
+def test_torques_with_constant_noise_are_reduced_where_their_logarithm_is_taken():
+    found = SETS.with_context({}, {"torque": (0.3, 0.04)}).rows(ROWS)
+    factor = np.exp(-2.0 * np.asarray([0.03, 0.06]) ** 2)
+    assert found["torque"] == pytest.approx(ROWS["torque"] * factor)
+    assert found["torque_std"] == pytest.approx(SETS.rows(ROWS)["torque_std"] * factor)
+    later = SETS.with_context({}, {"torque": (0.3, 0.04)}).with_context({}, {"slip": (0.0, 0.0)})
+    assert later.rows(ROWS)["torque"].tolist() == found["torque"].tolist()
+    unchanged = (
+        (SETS, {}),  # the noise of the file
+        (SETS.with_context({}, {"torque": (0.0, 0.04)}), {}),  # a share of the reading
+        (SETS.with_context({}, {"torque": (0.3, 0.04)}), {"torque_std": 0.3}),
+        (replace(SETS, log_torque=False).with_context({}, {"torque": (0.3, 0.04)}), {}),
+    )
+    for sets, given in unchanged:
+        assert sets.rows(ROWS | given)["torque"].tolist() == ROWS["torque"].tolist()
+
+
+@pytest.mark.parametrize("kind, constant, log_torque", [
+    ("one wheel", 0.0, True), ("one wheel", 0.1, False), ("any wheel", 0.1, True),
+])  # fmt: skip
+def test_torque_has_a_logarithm_unless_a_file_for_one_wheel_has_constant_noise(
+    kind, constant, log_torque
+):
+    noise = {"torque": [constant, 0.02]}
+    entry = {"terms": 4, "noise": noise, "context": {}, "alone": True, "kind": kind}
+    assert SetPosterior.of(entry).log_torque is log_torque
+
+
+@pytest.mark.parametrize("constant, share", [(0.05, 0.0), (0.1, 0.0), (0.06, 0.08), (0.15, 0.02)])
+def test_the_weighted_logarithm_of_torques_with_constant_noise_has_no_bias(constant, share):
+    """Against a quadrature over the noise of a torque of 1 N m, weighted as the graph does."""
+    nodes, weights = np.polynomial.hermite_e.hermegauss(40)
+    near = np.abs(nodes) < 6.0
+    true_std = np.hypot(constant, share)
+    reading = 1.0 + true_std * nodes[near]
+
+    def bias(factor):
+        relative = np.hypot(constant, share * reading) / reading
+        log_torque = np.log(reading * factor) + 0.5 * relative**2
+        total = weights[near] / relative**2
+        return (total @ log_torque) / total.sum()
+
+    before, after = bias(1.0), bias(constant_noise_factor(reading, constant))
+    assert before > 1.8 * constant**2
+    assert abs(after) < 0.1 * before
 
 
 @pytest.mark.parametrize("name, value, said", [

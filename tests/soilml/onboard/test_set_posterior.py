@@ -125,6 +125,18 @@ def test_less_noise_reduces_the_covariance(estimator, wheel_posterior):
     assert np.linalg.det(estimator.run(**run).covariance) < np.linalg.det(coarse.covariance)
 
 
+def test_a_declared_constant_noise_is_fed_as_the_interface_says(estimator, wheel_posterior):
+    run, _ = simulated_run(wheel_posterior, 8)
+    constant, share = 0.2, 0.01
+    declared = estimator.on(noise={"torque": (constant, share)}).run(**run)
+    std = np.hypot(constant, share * run["torque"])
+    factor = np.exp(-2.0 * (constant / run["torque"]) ** 2)
+    fed = run | {"torque": run["torque"] * factor, "torque_std": std * factor}
+    assert_similar(declared, estimator.run(**fed), 1e-5)
+    by_row = estimator.run(**run, torque_std=std)
+    assert (np.abs(declared.mean - by_row.mean) > 1e-3 * by_row.std).any()
+
+
 def test_a_sensor_bias_increases_the_covariance(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 16)
     biased = estimator.run(**run, torque_bias=0.05 * run["torque"])
