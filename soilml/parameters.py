@@ -162,17 +162,22 @@ def _with_elements(tree: tuple[Any, ...], changed: Mapping[Any, Any]) -> Any:
 def check(tree: Any, where: str = "") -> None:
     """Raise `InputError` where a parameter is no number or lies outside its bounds."""
     for path, (parameter, value) in located(tree).items():
-        if type(value) is float and parameter.lower <= value <= parameter.upper:
-            continue
-        numbers = as_numbers(where + path, value)
-        bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
-        if np.any(bad):
-            worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
-            raise InputError(
-                f"{where}{path} is {worst:g} {unit_text(parameter.unit)}".rstrip()
-                + f"; it must lie {_range_text(parameter)}"
-                + _hint(parameter, worst)
-            )
+        check_number(where + path, parameter, value)
+
+
+def check_number(path: str, parameter: Parameter, value: Any) -> None:
+    """Raise `InputError` where a value is no number or lies outside the bounds of its parameter."""
+    if type(value) is float and parameter.lower <= value <= parameter.upper:
+        return
+    numbers = as_numbers(path, value)
+    bad = ~((numbers >= parameter.lower) & (numbers <= parameter.upper))
+    if np.any(bad):
+        worst = float(numbers[bad].flat[0]) if numbers.ndim else float(numbers)
+        raise InputError(
+            f"{path} is {worst:g} {unit_text(parameter.unit)}".rstrip()
+            + f"; it must lie {_range_text(parameter)}"
+            + _hint(parameter, worst)
+        )
 
 
 def as_numbers(path: str, value: Any) -> np.ndarray[Any, np.dtype[np.float64]]:

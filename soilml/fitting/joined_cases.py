@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cache
 from graphlib import TopologicalSorter
 from itertools import pairwise
 from typing import Any
@@ -12,12 +13,11 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.parameters import check
+from soilml.parameters import Parameter, check, check_number, located, mapped
 from soilml.parameters import values as parameter_values
 from soilml.physics.contact import Resolution
 from soilml.physics.effects.base import Effect
 from soilml.physics.load_case import LoadCase
-from soilml.physics.model import flattened
 from soilml.physics.operating_point import COVARIATES, Operating
 
 
@@ -69,33 +69,53 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     """
     cases = list({id(part.case): part.case for part in parts}.values())
     effects = _joined_effects(cases)
-    whole = _with_effects(cases[0], effects)
     neutral: dict[str, Any] = {}
     for effect in effects.values():
-        unchanged = parameter_values(effect())  # at which it changes nothing
-        neutral |= {f"{effect.name}.{path}": value for path, value in unchanged.items()}
+        neutral |= _neutral_parameters(effect)
     sets = np.asarray([part.sets for part in parts])
     points = np.asarray([part.points for part in parts])
     set_ends = np.cumsum(sets)
     set_of_row = np.repeat(np.arange(set_ends[-1]), np.repeat(points, sets))
     known = {id(case): neutral | case.numbers for case in cases}
     varied = {path for part in parts for path in part.values}
-    values: dict[str, Any] = {}
-    for path, first in whole.numbers.items():
-        if path not in varied and all(own[path] == first for own in known.values()):
-            continue
+    first, *others = known.values()
+
+    def number(path: str, shown: str, parameter: Parameter) -> Floats:
+        """The checked value of a parameter in all rows, or of shape () where they share it."""
+        value = first[path]
+        if path not in varied and all(own[path] == value for own in others):
+            check_number(shown, parameter, value)
+            return np.asarray(value, dtype=np.float64)
         by_set = np.empty(set_ends[-1])
         for part, end in zip(parts, set_ends, strict=True):
             own = known[id(part.case)][path]
             by_set[end - part.sets : end] = part.values.get(path, own)
-        values[path] = by_set[set_of_row]
-    whole = whole.with_values(values)
+        check_number(shown, parameter, by_set)
+        return np.asarray(by_set[set_of_row])
+
     at = _joined_operating(parts)
     check(at)
-    check(whole.soil, "soil ")
-    check(whole.model)
-    joined = LoadCase(whole.model.gear, whole.soil, at, whole.model.effects, Resolution.FIT)
-    return flattened(joined)[0]
+    model = cases[0].model
+    own_effects = {effect.name: effect for effect in model.effects}
+    joined_effects = tuple(own_effects.get(name, effect()) for name, effect in effects.items())
+    joined = LoadCase(model.gear, cases[0].soil, at, joined_effects, Resolution.FIT)
+    numbers: list[Any] = []
+    for path, (parameter, value) in located(joined).items():
+        part, _, name = path.partition(".")
+        if part == "at":
+            numbers.append(value)
+        elif part == "soil":
+            numbers.append(number(name, f"soil {name}", parameter))
+        else:
+            numbers.append(number(path.removeprefix("effects."), path, parameter))
+    in_order = iter(numbers)
+    return mapped(joined, lambda _: next(in_order))
+
+
+@cache
+def _neutral_parameters(effect: type[Effect]) -> dict[str, Any]:
+    """The parameters of an effect, by path, at which it changes nothing."""
+    return {f"{effect.name}.{path}": value for path, value in parameter_values(effect()).items()}
 
 
 def _joined_effects(cases: Sequence[Case]) -> dict[str, type[Effect]]:
@@ -110,13 +130,6 @@ def _joined_effects(cases: Sequence[Case]) -> dict[str, type[Effect]]:
         for earlier, later in pairwise(names):
             order.add(later, earlier)
     return {name: effects[name] for name in order.static_order()}
-
-
-def _with_effects(case: Case, effects: Mapping[str, type[Effect]]) -> Case:
-    """The case with these effects in this order: its own, and others at neutral parameters."""
-    own = {effect.name: effect for effect in case.model.effects}
-    joined = tuple(own.get(name, effect()) for name, effect in effects.items())
-    return replace(case, model=replace(case.model, effects=joined))
 
 
 def _joined_operating(parts: Sequence[CaseSets]) -> Operating:

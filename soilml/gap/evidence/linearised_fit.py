@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
+from soilml.arrays import Floats, Integers
 
 KEPT = 64  # Divisions that are kept: fits share them, because amplitudes are those of a grid
 
@@ -96,6 +96,14 @@ class LinearisedFit:
 
     def along(self, amplitude: Floats, channel: int) -> Floats:
         """Evidence (b,) with each of `AMPLITUDES` in one channel, others at `amplitude`."""
+        every = np.arange(len(self.plain))[None, :]
+        return np.asarray(self.along_each(amplitude, channel, every)[0])
+
+    def along_each(self, amplitude: Floats, channel: int, columns: Integers) -> Floats:
+        """The same of k models, (k, b), each with some columns of Jacobian and residual.
+
+        columns (k, r): Numbers of the coordinates, and that of the residual last.
+        """
         trials = np.tile(amplitude, (len(AMPLITUDES), 1))
         trials[:, channel] = AMPLITUDES
         part = self.divisions.at(amplitude, channel)
@@ -106,13 +114,25 @@ class LinearisedFit:
         plain = self.plain - beside.T @ beside
         explained = (shrink[:, None, :] * rotated.T) @ rotated  # (b, p + 1, p + 1)
         growth = np.log1p(square * part.value).sum(axis=1)
-        value = self._solve(plain - explained)[0] + part.log_determinant + growth
+        value = self._solve(plain - explained, columns)[0] + part.log_determinant + growth
         return np.asarray(value + amplitude_penalty(trials))
+
+    def of_columns(self, columns: Integers) -> LinearisedFit:
+        """The model with some columns (r,), as in `along_each`."""
+        own = columns[:-1]
+        return replace(
+            self,
+            cross=self.cross[:, columns],
+            plain=self.plain[np.ix_(columns, columns)],
+            precision=self.precision[np.ix_(own, own)],
+            prior_gradient=self.prior_gradient[own],
+            movable=self.movable[own],
+        )
 
     def step_and_precision(self, product: Floats) -> tuple[Floats, Floats]:
         """Step (p,) to the optimum, and marginal precisions (p,); see `product`."""
-        _, step, h = self._solve(product[None])
-        return step[0], 1.0 / np.diag(np.linalg.inv(h[0]))
+        _, step, h = self._solve(product[None], np.arange(len(product))[None, :])
+        return step[0, 0], 1.0 / np.diag(np.linalg.inv(h[0, 0]))
 
     def slope_and_curvature(self, product: Floats) -> tuple[Floats, Floats]:
         """Gradient (p,) and curvature (p, p) of ln p, bounds ignored; see `product`."""
@@ -124,21 +144,22 @@ class LinearisedFit:
         reduced = self.divisions.reduce(amplitude) @ self.cross
         return np.asarray(self.plain - reduced.T @ reduced)
 
-    def _solve(self, product: Floats) -> tuple[Floats, Floats, Floats]:
-        """Evidence (b,) without ln|V|, steps (b, p) and curvature (b, p, p).
+    def _solve(self, product: Floats, columns: Integers) -> tuple[Floats, Floats, Floats]:
+        """Evidence (k, b) without ln|V|, steps (k, b, r - 1) and curvature (k, b, r - 1, r - 1).
 
         `product`, (b, p + 1, p + 1), has the products of Jacobian and residual under each
-        covariance.
+        covariance; `columns`, (k, r), are those of each of k models.
         """
-        p = len(self.prior_gradient)
-        h = product[:, :p, :p] + self.precision
-        gradient = np.where(self.movable, product[:, :p, p] - self.prior_gradient, 0.0)
-        both = self.movable[:, None] & self.movable
-        inner = np.where(both, h, np.eye(p))  # coordinates at a bound stay there
-        step = np.linalg.solve(inner, gradient[:, :, None])[:, :, 0] if p else gradient
-        value = product[:, p, p] - (gradient * step).sum(axis=1)
-        if p:
-            value += np.linalg.slogdet(h)[1]
+        own, last = columns[:, :-1], len(product[0]) - 1
+        inner = own[:, :, None], own[:, None, :]
+        movable = self.movable[own]  # (k, r - 1)
+        h = np.moveaxis(product[:, inner[0], inner[1]], 0, 1) + self.precision[inner][:, None]
+        gradient = np.moveaxis(product[:, own, last], 0, 1) - self.prior_gradient[own][:, None]
+        gradient = np.where(movable[:, None], gradient, 0.0)
+        both = (movable[:, :, None] & movable[:, None, :])[:, None]
+        held = np.where(both, h, np.eye(own.shape[1]))  # coordinates at a bound stay there
+        step = np.linalg.solve(held, gradient[..., None])[..., 0]
+        value = product[:, last, last] - (gradient * step).sum(axis=-1) + np.linalg.slogdet(h)[1]
         return value + self.constant, step, h
 
 

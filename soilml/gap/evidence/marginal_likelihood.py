@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats
+from soilml.arrays import Floats, Integers
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import DiscrepancyProcess, Whitening
 from soilml.fitting.least_squares import Solution
@@ -103,9 +103,7 @@ class DiscrepancyModel:
         scaled = self.process.columns * amplitude[self.process.channel]
         return np.asarray(self.covariance.matrix + scaled @ scaled.T)
 
-    def evidence(
-        self, fit: Solution, start: Floats | None = None, extra: Floats | None = None
-    ) -> Evidence:
+    def evidence(self, fit: Solution, start: Floats | None = None) -> Evidence:
         r"""Evidence of a fit by Laplace's approximation, at the best amplitudes of discrepancy.
 
         .. math::
@@ -116,36 +114,82 @@ class DiscrepancyModel:
         improvement by a step to the optimum under V, where the fit was made under another one.
 
         start (channels,): Amplitudes at which the search begins.
-        extra (m, k): Signatures of further effects, in the readings' unit per reference size, which
-            are treated as linear.
 
         References: MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992, section 2.
         """
+        problem = linearised(self, fit)
+        every = np.arange(len(fit.x) + 1)[None, :]
+        (value,), (amplitude,), known = self._best_amplitudes(problem, every, start)
+        expected = _expected_amplitude(problem, amplitude, {i: own[0] for i, own in known.items()})
+        return replace(_at_amplitude(problem, fit, value, amplitude), expected_amplitude=expected)
+
+    def evidence_with_each(
+        self, fit: Solution, extra: Floats, start: Floats | None = None
+    ) -> list[Evidence]:
+        """Evidence of a fit with each of k further effects alone; see `evidence`.
+
+        The effects are treated as linear.
+
+        extra (m, k): Signatures of the effects, in the readings' unit per reference size.
+        """
         problem = linearised(self, fit, extra)
-        amplitude = np.zeros(len(self.process.usual)) if start is None else start.copy()
-        value = np.inf
-        known: dict[int, Floats] = {}  # evidence along each channel, at the others' amplitudes
-        for i in tuple(range(len(amplitude))) * SWEEPS:
+        p, k = len(fit.x), extra.shape[1]
+        columns = np.column_stack(
+            [np.tile(np.arange(p), (k, 1)), p + np.arange(k), np.full(k, p + k)]
+        )
+        values, amplitudes, _ = self._best_amplitudes(problem, columns, start)
+        return [
+            _at_amplitude(problem.of_columns(own), fit, value, amplitude)
+            for own, value, amplitude in zip(columns, values, amplitudes, strict=True)
+        ]
+
+    def _best_amplitudes(
+        self, problem: LinearisedFit, columns: Integers, start: Floats | None
+    ) -> tuple[Floats, Floats, dict[int, Floats]]:
+        """Evidence (k,) of k models, and amplitudes (k, channels), found channel by channel.
+
+        columns (k, r): Those of each model; see `LinearisedFit.along_each`.
+
+        Returns too the evidence (k, b) along channels, where the others' amplitudes are the final
+        ones.
+        """
+        count = len(self.process.usual)
+        amplitude = np.tile(np.zeros(count) if start is None else start, (len(columns), 1))
+        values = np.full((len(columns), len(AMPLITUDES)), np.inf)
+        known: dict[int, Floats] = {}
+        for i in tuple(range(count)) * SWEEPS:
             if i in known:
                 continue
-            values = problem.along(amplitude, i)
-            best = int(np.argmin(values))
-            if AMPLITUDES[best] != amplitude[i]:
+            values = np.empty_like(values)
+            _, first, group = np.unique(
+                np.delete(amplitude, i, axis=1), axis=0, return_index=True, return_inverse=True
+            )
+            for number, one in enumerate(first):
+                own = np.ravel(group) == number
+                values[own] = problem.along_each(amplitude[one], i, columns[own])
+            best = AMPLITUDES[values.argmin(axis=1)]
+            if (best != amplitude[:, i]).any():
                 known = {}
-            value, amplitude[i], known[i] = float(values[best]), AMPLITUDES[best], values
-        expected = amplitude
-        if extra is None:
-            expected = _expected_amplitude(problem, amplitude, known)
-        product = problem.product(amplitude)
-        step, precision = problem.step_and_precision(product)
-        for size, own in zip(step[len(fit.x) :], precision[len(fit.x) :], strict=True):
-            curvature, _, density = _size_prior(float(size), two_sided=False)
-            value += density + float(np.log((own - WEAK_PRECISION + curvature) / own))
-        value += outside_bounds(fit, *problem.slope_and_curvature(product))
-        return Evidence(value, amplitude, step, expected)
+            amplitude[:, i], known[i] = best, values
+        return values.min(axis=1), amplitude, known
 
 
-def linearised(discrepancy: DiscrepancyModel, fit: Solution, extra: Floats | None) -> LinearisedFit:
+def _at_amplitude(
+    problem: LinearisedFit, fit: Solution, value: float, amplitude: Floats
+) -> Evidence:
+    """Evidence at the best amplitudes; `value` is without bounds and priors of further sizes."""
+    product = problem.product(amplitude)
+    step, precision = problem.step_and_precision(product)
+    for size, own in zip(step[len(fit.x) :], precision[len(fit.x) :], strict=True):
+        curvature, _, density = _size_prior(float(size), two_sided=False)
+        value += density + float(np.log((own - WEAK_PRECISION + curvature) / own))
+    value += outside_bounds(fit, *problem.slope_and_curvature(product))
+    return Evidence(float(value), amplitude, step, amplitude)
+
+
+def linearised(
+    discrepancy: DiscrepancyModel, fit: Solution, extra: Floats | None = None
+) -> LinearisedFit:
     """A fit's neighbourhood as a linear model, beside a discrepancy.
 
     extra (m, k): Signatures of further effects, in the readings' unit per reference size.
@@ -247,13 +291,15 @@ def outside_bounds(fit: Solution, gradient: Floats, curvature: Floats) -> float:
     high = np.asarray([c.upper for c in fit.coordinates])
     fixed = (fit.x <= low + AT_BOUND) | (fit.x >= high - AT_BOUND)
     movable = np.concatenate([~fixed, np.ones(len(gradient) - len(fixed), dtype=np.bool_)])
-    value = 0.0
+    value, inside = 0.0, np.linalg.inv(curvature[np.ix_(movable, movable)])
     for i, c in enumerate(fit.coordinates):
         if c.effect:
             continue
-        free = movable.copy()
-        free[i] = True
-        inverse = np.linalg.inv(curvature[np.ix_(free, free)])
+        free, inverse = movable, inside
+        if fixed[i]:
+            free = movable.copy()
+            free[i] = True
+            inverse = np.linalg.inv(curvature[np.ix_(free, free)])
         own = int(np.count_nonzero(free[:i]))
         precision = 1.0 / inverse[own, own]
         step = float(inverse[own] @ gradient[free])

@@ -35,11 +35,12 @@ def predicted_gains(
 
     An effect whose size would have an impossible sign gains nothing.
     """
+    if not signatures:
+        return {}
+    columns = np.column_stack([s.column for s in signatures])
+    found = problem.discrepancy.evidence_with_each(candidate.fit, columns, candidate.amplitude)
     gains = {}
-    for s in signatures:
-        evidence = problem.discrepancy.evidence(
-            candidate.fit, candidate.amplitude, s.column[:, None]
-        )
+    for s, evidence in zip(signatures, found, strict=True):
         possible = s.sign == 0 or float(evidence.step[-1]) * s.sign > 0.0
         penalty = problem.penalties[s.name]
         value = evidence.value + candidate.penalty + penalty

@@ -203,7 +203,7 @@ def weighed(problem: FitProblem, marginal: MarginalFit) -> tuple[float, list[Hyp
     base, fit, best = problem.discrepancy, marginal.fit, marginal.evidence.amplitude
     count = len(base.process.usual)
     patterns = [best, np.zeros(count), AMPLITUDES[np.searchsorted(AMPLITUDES, 0.4 * best)]]
-    alone = linearised(base, fit, None)
+    alone = linearised(base, fit)
     none = min(float(alone.along(p, i).min()) for p in patterns for i in range(count))
     whiten = base.noise_whitening
     block = whiten @ np.column_stack([fit.derivatives, fit.measured - fit.prediction])

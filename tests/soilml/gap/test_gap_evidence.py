@@ -118,9 +118,22 @@ def test_the_prior_of_a_size_is_a_density():
 
 def test_an_effect_that_changes_nothing_gains_nothing(problem, soil):
     plain = problem.discrepancy.evidence(soil)
-    nothing = problem.discrepancy.evidence(soil, extra=np.zeros((len(problem.readings), 1)))
+    none = np.zeros((len(problem.readings), 1))
+    (nothing,) = problem.discrepancy.evidence_with_each(soil, none)
     assert nothing.value == pytest.approx(plain.value, abs=2.5)  # Laplace at the prior's cusp
     assert nothing.step[-1] == 0.0
+
+
+def test_the_evidence_of_several_effects_is_that_of_each_alone(problem, soil):
+    model, start = problem.discrepancy, np.asarray([1.0, 0.0, 0.4])
+    columns = np.stack([s.column for s in problem.signatures_beside(soil)], axis=1)
+    found = model.evidence_with_each(soil, columns, start)
+    assert len({tuple(own.amplitude) for own in found}) > 1  # they are searched apart
+    for own, column in zip(found, columns.T, strict=True):
+        (alone,) = model.evidence_with_each(soil, column[:, None], start)
+        assert own.value == pytest.approx(alone.value, rel=1e-9)
+        np.testing.assert_array_equal(own.amplitude, alone.amplitude)
+        np.testing.assert_allclose(own.step, alone.step, rtol=1e-7, atol=1e-10)
 
 
 def test_a_smooth_discrepancy_is_recognised_by_its_size(problem):
