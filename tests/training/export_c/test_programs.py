@@ -39,6 +39,15 @@ def test_the_c_example(compiler, exported, library, tmp_path):
     assert last == "answered"
 
 
+@pytest.mark.parametrize("flag", ["-ffast-math", "-Ofast", "-ffinite-math-only"])
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_a_compiler_that_takes_no_nan_is_refused(compiler, flag, exported):
+    source = exported("wheel_linear") / "wheel_linear.c"
+    command = [compiler, "-std=c99", flag, "-c", source, "-o", "/dev/null"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode != 0 and "NAN marks what was not measured" in done.stderr
+
+
 @pytest.mark.parametrize("compiler", COMPILERS)
 def test_the_walk_through_of_the_page(compiler, exported, library, tmp_path):
     """The program of docs/c-export.md, which ends with a row that is set aside."""
