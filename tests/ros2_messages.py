@@ -74,12 +74,16 @@ class FakeNode:
     """What the node uses of rclpy.node.Node; parameters are those of `given`."""
 
     given = MappingProxyType(GIVEN)
+    namespace = ""
 
     def __init__(self, name):
         self.name, self.callbacks, self.published, self.lines = name, {}, {}, []
 
     def get_name(self):
         return self.name
+
+    def get_fully_qualified_name(self):
+        return f"{self.namespace}/{self.name}"
 
     def get_logger(self):
         return SimpleNamespace(info=self.lines.append, warning=self.lines.append)

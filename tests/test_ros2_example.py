@@ -167,6 +167,40 @@ def test_a_clock_that_is_set_back_begins_again_and_keeps_the_soil():
     assert again[-1].values["rows_remembered"] >= 36
 
 
+@pytest.mark.parametrize("clock", ["frozen", "backwards"])
+def test_stamps_that_do_not_advance_are_told(clock):
+    own, messages = logic(), contents(drive(20))
+    stamps = [content[1] for _, content in messages]
+    stamps = stamps[::-1] if clock == "backwards" else [stamps[0]] * len(stamps)
+    for stamp, (at, (kind, _, *parts)) in zip(stamps, messages, strict=True):
+        assert play(own, [(at, (kind, stamp, *parts))]) == []
+    told = own.inputs(messages[-1][0])
+    assert told.level is Level.WARN and told.message.startswith("stamps do not advance: ")
+
+
+def test_a_bag_that_is_played_three_times_counts_once(prompt):
+    """Also where odometry is late, so that its last messages come after the clock was set back."""
+    own, found = logic(), []
+    for loop in range(3):
+        for at, content in contents(drive(20), 0.3):
+            found += play(own, [(at + 21.0 * loop, content)])
+    assert len(found) >= 3 * 18
+    assert found[-1].values["event"] == "REPEATED" and found[-1].level is Level.OK
+    # a stretch at the seam may be cut differently
+    assert found[-1].values["rows_remembered"] <= 21
+    assert found[-1].values["friction_angle_std"] > 0.9 * found[18].values["friction_angle_std"]
+
+
+def test_rows_of_a_bag_that_were_forgotten_are_read_again():
+    """The bag has two soils: when it begins again, the first one is found again."""
+    other = replace(SAND, cohesion=300.0, friction_angle=0.75, shear_modulus=0.01)
+    bag = [*contents(drive(40)), *contents(drive(40, other, begin=140, seed=1))]
+    own = logic()
+    play(own, bag)
+    again = play(own, bag[: len(bag) // 2])
+    assert "SOIL_CHANGED" in [report.values["event"] for report in again[:10]]
+
+
 def test_single_wrong_stamps_change_nothing(prompt):
     messages = contents(drive())
     wrong = []
@@ -274,7 +308,11 @@ def test_each_parameter_that_is_missing_is_named_in_one_line(name):
         ({"joint": 3}, "the parameter joint is 3; needed"),
         ({"joint_sign": 2.0}, "joint_sign is 2; it is 1 or -1"),
         ({"period": 0.0}, "the parameter period is 0; it must be above zero"),
+        ({"period": 1e300}, r"period is 1e\+300 s; needed is a time above zero, a day at most"),
+        ({"patience": 1e305}, r"patience is 1e\+305 s; needed is a time above zero, a day at most"),
         ({"length": 5}, "the parameter length is 5; needed is a whole number"),
+        ({"state_file": "/nowhere/rows.npz"}, "state_file is /nowhere/rows.npz; needed is a file"),
+        ({"state_file": "/tmp"}, "state_file is /tmp; needed is a file in a folder that exists"),
         ({"n": 1.1}, "'n' is not a context input of this file"),
     ],
 )

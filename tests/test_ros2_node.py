@@ -111,6 +111,25 @@ def test_a_stamp_at_the_end_of_time_can_be_published(node_module, store):
     assert node.published["soil"]
 
 
+def test_nodes_of_two_wheels_are_told_apart_in_diagnostics(node_module, monkeypatch):
+    module = node_module()
+    monkeypatch.setattr(module.SoilNode, "namespace", "/front_left", raising=False)
+    node = module.SoilNode()
+    node.callbacks["timer"]()
+    (health,) = node.published["/diagnostics"]
+    assert health.status[0].name == "front_left/soil_estimator: inputs"
+
+
+def test_a_state_file_that_cannot_be_written_ends_it_with_one_line(node_module, tmp_path, capsys):
+    folder = tmp_path / "state"
+    folder.mkdir()
+    module = node_module(state_file=str(folder / "rows.npz"))
+    module.rclpy.spin = lambda node: folder.rmdir()
+    assert module.main() == 1
+    told = capsys.readouterr().err
+    assert told.startswith("soil_estimator: the rows are lost") and told.count("\n") == 1
+
+
 def test_a_wrong_parameter_ends_it_with_one_line(node_module, capsys):
     assert node_module(joint=None).main() == 2
     told = capsys.readouterr().err

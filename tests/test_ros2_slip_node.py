@@ -130,6 +130,13 @@ def test_a_message_without_an_orientation_is_no_attitude(node_module, store):
         ({"joints": ["a"]}, "names 1; "),
         ({"joint_signs": [1.0, 1.0, 2.0, 1.0]}, "other numbers than 1.0 and -1.0"),
         ({"wheel_radius": 0.0}, "wheel_radius is 0; it must be above zero"),
+        ({"wheel_radius": "wide"}, "wheel_radius is 'wide'; needed: radius of the wheels, m"),
+        ({"joints": "flfr"}, "the parameter joints is 'flfr'; needed is a list"),
+        ({"joints": 4}, "the parameter joints is 4; needed is a list"),
+        ({"joints": ["fl", "fr", "fl", "rr"]}, "the parameter joints names a joint twice"),
+        ({"joint_signs": [1.0, 1.0, "x", 1.0]}, "the parameter joint_signs is 'x'; needed: "),
+        ({"period": 1e300}, "the parameter period is 1e+300 s; needed is a time above zero"),
+        ({"model": 3}, "the parameter model is 3; needed is a text"),
         ({"model": str(ROOT / "exported" / "wheel.onnx")}, "no file of soilml export-slip"),
     ],
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from math import isfinite
 from pathlib import Path
@@ -19,6 +19,8 @@ from soilml.onboard.tracking import Event, TrackerState
 MOST_NAMED = 6
 #: Events of rows that leave no doubt.
 USED = (Event.ACCEPTED, Event.REPEATED)
+#: Words of a row that has the stamp and the values of one that is remembered.
+READ_BEFORE = "the row of this stamp was read before, and counts once"
 
 
 class Level(IntEnum):
@@ -80,6 +82,8 @@ class SoilLogic:
         self._joints: tuple[str, ...] = ()
         self._unstamped = 0
         self._last: Stretch | None = None
+        self._closed_at: float | None = None
+        self._remembered: list[Stretch] = []
         self._events = dict.fromkeys(Event, 0)
         self._tracker, self.remark = self._restored()
 
@@ -118,6 +122,7 @@ class SoilLogic:
         """Forget all rows: the wheel is known to be on another soil."""
         self._tracker.restart()
         self._rows.forget()
+        self._remembered = []
 
     def save(self) -> None:
         """Write the rows that are remembered to the state file, where there is one.
@@ -152,6 +157,10 @@ class SoilLogic:
                 f"{SOURCES[behind[0]]} is stamped {lags[behind[0]]:.3g} s before the others, and "
                 f"patience is {self._settings.patience:g} s: a clock is wrong, or messages are late"
             )
+            return SoilReport(Level.WARN, text, values)
+        waited = now - (self._closed_at or self._began or now)
+        if waited > 2.0 * self._settings.period + self._settings.patience:
+            text = f"stamps do not advance: no stretch of them was complete for {waited:.1f} s"
             return SoilReport(Level.WARN, text, values)
         if self._last is not None and self._last.row is None and not self._last.standing:
             return SoilReport(
@@ -206,7 +215,10 @@ class SoilLogic:
             return []
         finite = {name: value for name, value in samples.items() if isfinite(value)}
         self._arrived |= dict.fromkeys(finite, now)
-        return self._read(self._rows.add(stamp, finite))
+        stretches = self._rows.add(stamp, finite)
+        if stretches:
+            self._closed_at = now
+        return self._read(stretches)
 
     def _read(self, stretches: Iterable[Stretch]) -> list[SoilReport]:
         """Reports on the rows of stretches that are complete."""
@@ -214,10 +226,19 @@ class SoilLogic:
         for stretch in stretches:
             self._last = stretch
             if stretch.row is not None:
-                state = self._tracker.read(**stretch.row)
+                state = self._state_after(stretch, stretch.row)
                 self._events[state.event] += 1
                 reports.append(self._report(state, stretch.end, stretch.row))
         return reports
+
+    def _state_after(self, stretch: Stretch, row: Mapping[str, float]) -> TrackerState:
+        """The tracker's state; a row of a bag that is played again counts once."""
+        if stretch in self._remembered:
+            return replace(self._tracker.state, event=Event.REPEATED, words=READ_BEFORE)
+        state = self._tracker.read(**row)
+        kept = state.rows_remembered + state.rows_in_question
+        self._remembered = [*self._remembered, stretch][-kept:] if kept else []
+        return state
 
     def _report(
         self, state: TrackerState, stamp: int, row: Mapping[str, float] | None = None

@@ -49,6 +49,8 @@ class SoilNode(Node):
         if self.logic.remark:
             self.get_logger().warning(self.logic.remark)
         self._of_joint = settings.joint
+        # /diagnostics is shared: nodes of several wheels have one name, in namespaces of their own
+        self._full_name = self.get_fully_qualified_name().lstrip("/")
         self._soil = self.create_publisher(DiagnosticArray, "soil", 10)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         quality = qos_profile_sensor_data
@@ -101,7 +103,7 @@ class SoilNode(Node):
     def _status(self, part: str, report: SoilReport) -> DiagnosticStatus:
         status = DiagnosticStatus()
         status.level = getattr(DiagnosticStatus, report.level.name)
-        status.name, status.message = f"{self.get_name()}: {part}", report.message
+        status.name, status.message = f"{self._full_name}: {part}", report.message
         status.hardware_id = self._of_joint
         status.values = [
             KeyValue(key=k, value=v if isinstance(v, str) else f"{v:.9g}")
@@ -120,9 +122,9 @@ def _stamp_of(report: SoilReport) -> tuple[int, int]:
 
 
 def main() -> int:
-    """Run the node until it is interrupted; 2 for a wrong parameter."""
+    """Run the node until it is interrupted; 2 for a wrong parameter, 1 where rows are lost."""
     rclpy.init()
-    node = None
+    node, status = None, 0
     try:
         node = SoilNode()
         rclpy.spin(node)
@@ -133,7 +135,17 @@ def main() -> int:
         pass
     finally:
         if node is not None:
-            node.logic.save()
+            status = _saved(node)
             node.destroy_node()
         rclpy.try_shutdown()
+    return status
+
+
+def _saved(node: SoilNode) -> int:
+    """Keep the rows; 1 where they cannot be written."""
+    try:
+        node.logic.save()
+    except OSError as error:
+        print(f"soil_estimator: the rows are lost, state_file: {error}", file=sys.stderr)
+        return 1
     return 0

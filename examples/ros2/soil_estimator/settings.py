@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isclose, isfinite
 from numbers import Real
+from pathlib import Path
 from typing import Any
 
 from soilml import Estimator
@@ -46,6 +48,8 @@ CONTEXT = {
 PARAMETERS = REQUIRED | {name: text for name, (text, _) in DEFAULTS.items()} | CONTEXT
 NOISE = {"torque_noise": "torque", "slip_noise": "slip", "load_noise": "load"}
 POSITIVE = ("wheel_radius", "period", "patience", "least_speed")
+#: Longest period and patience, s: stamps of messages are whole nanoseconds.
+LONGEST = 86400.0
 
 
 @dataclass(frozen=True)
@@ -87,15 +91,19 @@ def settings_of(given: Mapping[str, Any]) -> NodeSettings:
     for name in ("model", "joint"):
         if not texts[name]:
             raise InputError(f"the parameter {name} is empty; needed: {REQUIRED[name]}")
-    number = {name: _number(name, values[name]) for name in (*POSITIVE, "wheel_y", "joint_sign")}
+    number = {name: as_number(name, values[name]) for name in (*POSITIVE, "wheel_y", "joint_sign")}
     for name in POSITIVE:
         if number[name] <= 0.0:
             raise InputError(f"the parameter {name} is {number[name]:g}; it must be above zero")
+    for name in ("period", "patience"):
+        check_time(name, number[name])
     if abs(number["joint_sign"]) != 1.0:
         raise InputError(f"the parameter joint_sign is {number['joint_sign']:g}; it is 1 or -1")
     length = values["length"]
     if isinstance(length, bool) or not isinstance(length, int) or length < 16:
         raise InputError(f"the parameter length is {length!r}; needed is a whole number from 16 on")
+    if texts["state_file"]:
+        _check_place(texts["state_file"])
     return NodeSettings(
         estimator=_estimator(texts["model"], values, number["wheel_radius"]),
         joint=texts["joint"],
@@ -113,7 +121,7 @@ def _estimator(model: str, values: Mapping[str, Any], radius: float) -> Estimato
     if estimator.sets is None:
         raise InputError(f"{model} has no set posterior; train it with [set_posterior]")
     needed = estimator.sets.context_ranges
-    context = {n: _number(n, values[n]) for n in CONTEXT if values[n] is not None}
+    context = {n: as_number(n, values[n]) for n in CONTEXT if values[n] is not None}
     if "wheel_radius" in needed:
         context["wheel_radius"] = radius
     missing = [name for name in needed if name not in context]
@@ -129,12 +137,30 @@ def _estimator(model: str, values: Mapping[str, Any], radius: float) -> Estimato
     return estimator.on(noise=noise, **context)
 
 
+def check_time(name: str, seconds: float) -> None:
+    """Raises `InputError` for a time that is not between 1 ns and a day."""
+    if not 1e-9 <= seconds <= LONGEST:
+        raise InputError(
+            f"the parameter {name} is {seconds:g} s; needed is a time above zero, a day at most"
+        )
+
+
+def _check_place(state_file: str) -> None:
+    """A file that cannot be written is told at the start, not when the rows are lost."""
+    folder = Path(state_file).absolute().parent
+    if Path(state_file).is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(
+            f"the parameter state_file is {state_file}; needed is a file in a folder that exists "
+            "and can be written"
+        )
+
+
 def _load(value: Any) -> float | None:
     if value == TOPIC:
         return None
     if isinstance(value, str):
         raise InputError(f"the parameter load is {value!r}; needed is a number in N, or '{TOPIC}'")
-    number = _number("load", value)
+    number = as_number("load", value)
     if number <= 0.0:
         raise InputError(f"the parameter load is {number:g}; it must be above zero")
     return number
@@ -143,15 +169,16 @@ def _load(value: Any) -> float | None:
 def _noise(name: str, value: Any) -> tuple[float, float]:
     if isinstance(value, str) or not hasattr(value, "__len__") or len(value) != 2:
         raise InputError(f"the parameter {name} is {value!r}; needed: {REQUIRED[name]}")
-    constant, share = (_number(name, part) for part in value)
+    constant, share = (as_number(name, part) for part in value)
     if min(constant, share) < 0.0 or (name == "torque_noise" and constant + share == 0.0):
         raise InputError(f"the parameter {name} is {value!r}; a sensor has noise above zero")
     return constant, share
 
 
-def _number(name: str, value: Any) -> float:
+def as_number(name: str, value: Any, needed: Mapping[str, str] = PARAMETERS) -> float:
+    """A finite number; raises `InputError` with what is `needed`."""
     if isinstance(value, bool) or not isinstance(value, Real) or not isfinite(value):
-        raise InputError(f"the parameter {name} is {value!r}; needed: {PARAMETERS[name]}")
+        raise InputError(f"the parameter {name} is {value!r}; needed: {needed[name]}")
     return float(value)
 
 

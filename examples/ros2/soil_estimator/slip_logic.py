@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import asin, atan2, isfinite
+from typing import Any
 
 import numpy as np
 
 from soil_estimator.rows import SECOND, RowCollector, Stretch
+from soil_estimator.settings import as_number, check_time
 from soilml.errors import InputError
 from soilml.onboard.slip_stream import SlipStream
 
@@ -73,29 +75,38 @@ class SlipLogic:
         for name, text in PARAMETERS.items():
             if name not in values:
                 raise InputError(f"the parameter {name} is missing: {text}")
-        self.stream = SlipStream.load(str(values["model"]))
-        self.frame = str(values["frame"])
-        self._joints = list(values["joints"])  # type: ignore[call-overload]
+        for name in ("model", "frame"):
+            if not isinstance(values[name], str):
+                raise InputError(f"the parameter {name} is {values[name]!r}; needed is a text")
+        self.stream, self.frame = SlipStream.load(str(values["model"])), str(values["frame"])
         wheels = len(self.stream.wheels)
-        signs = values["joint_signs"] or [1.0] * wheels
-        if len(self._joints) != wheels or len(signs) != wheels:  # type: ignore[arg-type]
+        self._joints = _list("joints", values["joints"])
+        signs = [1.0] * wheels
+        if values["joint_signs"] is not None:
+            signs = _list("joint_signs", values["joint_signs"])
+        if len(self._joints) != wheels or len(signs) != wheels:
             raise InputError(
                 f"the parameter joints names {len(self._joints)}; {values['model']} has {wheels} "
                 f"wheels: {', '.join(self.stream.wheels)}"
             )
-        if {abs(float(sign)) for sign in signs} != {1.0}:  # type: ignore[attr-defined]
+        if len({str(joint) for joint in self._joints}) < wheels:
+            raise InputError("the parameter joints names a joint twice")
+        self._signs = [as_number("joint_signs", sign, PARAMETERS) for sign in signs]
+        if {abs(sign) for sign in self._signs} != {1.0}:
             raise InputError("the parameter joint_signs has other numbers than 1.0 and -1.0")
-        self._signs = [float(sign) for sign in signs]  # type: ignore[attr-defined]
-        numbers = {n: float(values[n]) for n in ("wheel_radius", "period", "patience")}  # type: ignore[arg-type]
-        for name, number in numbers.items():
-            if not (isfinite(number) and number > 0.0):
-                raise InputError(f"the parameter {name} is {number:g}; it must be above zero")
-        self._radius = numbers["wheel_radius"]
+        times = {n: as_number(n, values[n], PARAMETERS) for n in ("period", "patience")}
+        for name, seconds in times.items():
+            check_time(name, seconds)
+        self._radius = as_number("wheel_radius", values["wheel_radius"], PARAMETERS)
+        if self._radius <= 0.0:
+            raise InputError(
+                f"the parameter wheel_radius is {self._radius:g}; it must be above zero"
+            )
         sources = {"pitch": "the inertial unit", "roll": "the inertial unit"}
         for i, joint in enumerate(self._joints):
             sources |= {f"speed_{i}": f"velocity of {joint}", f"torque_{i}": f"effort of {joint}"}
         self._rows = RoverCollector(
-            self._radius, 0.0, numbers["period"], numbers["patience"], LEAST_SPEED, sources=sources
+            self._radius, 0.0, times["period"], times["patience"], LEAST_SPEED, sources=sources
         )
         self.restart()
 
@@ -156,3 +167,12 @@ class SlipLogic:
         )
         speed = answer.speed if answer.answered else None
         return Twist(stretch.end, speed, answer.speed_std**2, answer.flags)
+
+
+def _list(name: str, values: Any) -> list[Any]:
+    """The elements of a parameter; a text is not the list of its letters."""
+    if isinstance(values, str) or not hasattr(values, "__len__"):
+        raise InputError(
+            f"the parameter {name} is {values!r}; needed is a list, one for each wheel"
+        )
+    return list(values)
