@@ -1,5 +1,6 @@
 """What the ROS 2 example does without ROS: messages of all kinds in, rows and reports out."""
 
+import ast
 import math
 import sys
 from dataclasses import replace
@@ -337,8 +338,11 @@ def test_the_settings_are_printed_and_the_defaults_are_among_them():
     text = settings_of(GIVEN).text
     assert all(f"{name}=" in text for name in (*REQUIRED, *DEFAULTS))
     example = (ROOT / "examples" / "ros2" / "config" / "wheel.yaml").read_text()
-    used = [line.split(":")[0].strip() for line in example.splitlines()[2:]]
-    assert set(REQUIRED) <= set(used) <= set(PARAMETERS)
+    pairs = dict(line.strip().split(": ", 1) for line in example.splitlines()[2:])
+    assert set(REQUIRED) <= set(pairs) <= set(PARAMETERS)
+    words = ("model", "joint", "load", "state_file")
+    used = {n: v if n in words else ast.literal_eval(v) for n, v in pairs.items()}
+    assert settings_of(used).load is None  # the node starts with them, wherever it is
 
 
 def test_rows_are_kept_in_the_state_file(tmp_path):

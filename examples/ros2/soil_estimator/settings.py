@@ -18,7 +18,7 @@ from soilml.errors import InputError
 TOPIC = "topic"
 #: Parameters without a default: the node does not start without them.
 REQUIRED = {
-    "model": "path of a model file with a set posterior",
+    "model": "path of a model file with a set posterior, or the short name of a released one",
     "joint": "name of the wheel's joint in joint_states",
     "wheel_radius": "radius of the wheel, m",
     "wheel_y": "distance of the wheel to the left of the point that odometry follows, m",
