@@ -1,21 +1,29 @@
-"""A day of driving: the tracker beside plain steps, `python bench/run.py streams`."""
+"""A day of driving: the tracker beside plain steps, `python bench/run.py streams`.
+
+`python bench/streams.py [DAYS [WORLD...]]` prints coverage and flags of the tracker over many days,
+with standard errors.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from benchmarks_file import ROOT
 from driven_days import SLIP_STD, TORQUE_NOISE, Day, Floats, Kind, simulate_day
 
 from soilml import Estimator, SoilTracker
+from soilml.io.text_tables import format_table
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.tracking import Event
 
-#: Days of each line.
-DAYS = 12
+#: Days of each line, of a table of many days, and the first seed. Limits of the tracker were chosen
+#: on days of other seeds.
+DAYS, MANY_DAYS, SEED = 12, 100, 100
 #: Rows after a change from which the soil counts as steady.
 SETTLED = 20
 #: A soil that changed is found if the tracker says so within so many rows.
@@ -29,6 +37,8 @@ WORLDS = (
     ("grousers of 10 mm", "grousers", 0.01, 0.0),
     ("all typical errors", "", 0.0, 1.0),
 )
+#: Those of the table of many days: a right model, and errors as the averaged answer expects them.
+LONG_WORLDS = ("as modelled", "all typical errors")
 #: Deviation in standard deviations of a soil that the estimate is wrong about.
 FAR = 3.0
 
@@ -162,6 +172,13 @@ def _line(name: str, tally: Tally) -> str:
     return f"| {' | '.join(cells)} |"
 
 
+def _driven(days: int, mechanism: str, size: float, errors: float) -> list[Day]:
+    return [
+        simulate_day(seed, ("friction", "zero")[seed % 2], mechanism, size, errors)
+        for seed in range(SEED, SEED + days)
+    ]
+
+
 def table(file: Path, days: int = DAYS) -> str:
     """The table of its page."""
     noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
@@ -184,12 +201,54 @@ def table(file: Path, days: int = DAYS) -> str:
     )
     lines = [f"| {' | '.join(heads)} |", "|---|" + "---:|" * (len(heads) - 1)]
     for name, mechanism, size, errors in WORLDS:
-        driven = [
-            simulate_day(seed, ("friction", "zero")[seed % 2], mechanism, size, errors)
-            for seed in range(100, 100 + days)
-        ]
+        driven = _driven(days, mechanism, size, errors)
         lines.append(_line(f"{name}, tracker, `model_error` 0", tracked(estimator, driven)))
         lines.append(_line(f"{name}, tracker, averaged", tracked(averaged, driven)))
         lines.append(_line(f"{name}, `step`, `model_error` 0", stepped(estimator, driven)))
         lines.append(_line(f"{name}, `step`, averaged", stepped(averaged, driven)))
     return "\n".join(lines)
+
+
+def table_of_many_days(file: Path, days: int, worlds: Sequence[str] = LONG_WORLDS) -> str:
+    """Coverage and flags of the averaged answer, with standard errors over days."""
+    noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
+    averaged = Estimator.load(file).on(noise=noise)
+    heads = "many days", "days", "c", "phi", "K", "in range", "alarms", "slip stuck", "torque stuck"
+    lines = []
+    for name, *world in WORLDS:
+        if name in worlds:
+            tallies = []
+            for day in _driven(days, *world):
+                tallies.append(tracked(averaged, [day]))
+                print(name, len(tallies), _long_line(tallies), file=sys.stderr, flush=True)
+            lines.append((name, *_long_line(tallies)))
+    return format_table(heads, lines)
+
+
+def _long_line(tallies: Sequence[Tally]) -> tuple[str, ...]:
+    """Numbers of some days: shares in per cent, alarms per 1000 rows, most rows of a stuck slip."""
+
+    def percent(part: str) -> str:
+        return f"{100 * np.mean(np.concatenate([getattr(one, part) for one in tallies])):.1f}"
+
+    covered = 100 * np.asarray([np.mean(one.covered, axis=0) for one in tallies])
+    error = covered.std(axis=0, ddof=len(tallies) > 1) / np.sqrt(len(tallies))
+    return (
+        str(len(tallies)),
+        *(f"{c:.1f} +- {e:.1f}" for c, e in zip(covered.mean(axis=0), error, strict=True)),
+        percent("answered"),
+        f"{1000 * np.mean(np.concatenate([one.false_alarms for one in tallies])):.1f}",
+        f"{max(rows for one in tallies for rows in one.slip_stuck):.0f}",
+        percent("stuck"),
+    )
+
+
+def main() -> None:
+    """Print the table of many days."""
+    number = int(sys.argv[1]) if len(sys.argv) > 1 else MANY_DAYS
+    wheel = ROOT / "exported" / "wheel.onnx"
+    print(table_of_many_days(wheel, number, sys.argv[2:] or LONG_WORLDS))
+
+
+if __name__ == "__main__":
+    main()

@@ -161,6 +161,14 @@ def _stream_order(script: ModuleType) -> None:
     script.CASES = ((0, 6, 3), (4, 8, 2))
 
 
+def _streams(script: ModuleType) -> None:
+    """One day on soils of 45 rows, with errors."""
+    days = sys.modules["driven_days"]
+    days.ROWS_PER_SOIL, days.ROWS_DRIFTING = 45, 20  # type: ignore[attr-defined]
+    days.ROWS_SLIP_STUCK, days.SLIP_STUCK_AT = 5, 30  # type: ignore[attr-defined]
+    script.LONG_WORLDS, script.MANY_DAYS, sys.argv = script.LONG_WORLDS[1:], 1, [""]
+
+
 def _few_rows(script: ModuleType) -> Callable[[], object]:
     script.SIZES, script.ROWS_OF_THE_TEST = ((20, 1),), 200
     whole = script.read_recipe
@@ -191,6 +199,7 @@ PROBES: dict[str, Shrink] = {
     "bench/coupled.py": _coupled,
     "bench/few_rows.py": _few_rows,
     "bench/stream_order.py": _stream_order,
+    "bench/streams.py": _streams,
 }
 
 
