@@ -36,7 +36,7 @@ _LIMITS: dict[str, Limits] = {
     "load_N": (1e-6, 1e7, "a load above zero and below 1e7, in N"),
     "torque_Nm": (-1e7, 1e7, "a torque between -1e7 and 1e7, in N m"),
     "drawbar_pull_N": (-1e7, 1e7, "a force between -1e7 and 1e7, in N"),
-    "sinkage_m": (-1.0, 10.0, "a sinkage in m"),
+    "sinkage_m": (-1.0, 10.0, "a sinkage between -1 and 10, in m and not in mm"),
     "speed_m_s": (-100.0, 100.0, "a speed between -100 and 100, in m/s"),
     "pass": (1.0 - 1e-9, 1e4, "the number of a pass, 1 or more"),
     "slip_angle_rad": (-1.6, 1.6, "an angle between -1.6 and 1.6, in rad"),

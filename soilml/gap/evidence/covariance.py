@@ -172,7 +172,7 @@ def estimate_covariance(
             components, value = _coordinate_search(likelihood, autocorrelation, grid)
             if value < lowest - AUTOCORRELATION_PENALTY:
                 best, lowest = components, value
-    degrees_of_freedom = max(float(len(readings) - basis.shape[1]), 2.0)
+    degrees_of_freedom = max(float(len(readings) - basis.shape[1]), PRIOR_DEGREES)
     best = replace(best, degrees_of_freedom=degrees_of_freedom)
     return assemble_covariance(readings, columns, best)
 
@@ -259,6 +259,9 @@ def _with_column(row: Floats, index: int, values: Floats) -> Floats:
 #: Prior standard deviations of the run-to-run variation, in units of `RUN_EFFECT_UNITS` in
 #: `soilml.gap.evidence.covariance`, and of the logarithm of a channel's noise scale.
 RUN_EFFECT_PRIOR_STD, LOG_NOISE_SCALE_PRIOR_STD = 1.0, 0.3
+#: Degrees of freedom that know a noise scale as well as its prior does, the least that are counted:
+#: the logarithm of a scale from k residuals has a standard deviation of sqrt(1 / (2 k)).
+PRIOR_DEGREES = 0.5 / LOG_NOISE_SCALE_PRIOR_STD**2
 
 
 @dataclass(frozen=True)

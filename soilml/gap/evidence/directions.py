@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product
 
@@ -18,8 +17,9 @@ from soilml.fitting.readings import Readings
 SLIP_DEGREE, LOAD_DEGREE = 4, 2
 #: Readings of a channel per smooth function, so that noise cannot be fitted.
 READINGS_PER_FUNCTION = 4
-#: Bins along slip and along load of the discrepancy map, and readings that a region needs.
+#: Bins along slip and along load of the discrepancy map at most, and readings that a region needs.
 SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
+MOST_LEFT_OUT = 0.1  # Share of the readings in regions with too few for which fewer bins are made
 
 
 def smooth_basis(readings: Readings) -> Floats:
@@ -67,18 +67,32 @@ class ReadingsRegion:
     selected: NDArray[np.bool_]  # (m,)
 
 
-def regions(readings: Readings) -> Iterator[ReadingsRegion]:
-    """Channel by slip bin by load bin, those with enough readings."""
-    slips = _bins(readings.slip, readings.slip_levels, SLIP_BINS)
+def regions(readings: Readings) -> list[ReadingsRegion]:
+    """Channel by slip bin by load bin, those with enough readings.
+
+    In as many slip bins as leave no more than `MOST_LEFT_OUT` of the readings in none.
+    """
+    found = [_regions(readings, count) for count in range(SLIP_BINS, 0, -1)]
+
+    def excess(parts: list[ReadingsRegion]) -> float:
+        inside = sum(int(part.selected.sum()) for part in parts)
+        return max(1.0 - inside / len(readings), MOST_LEFT_OUT)
+
+    return min(found, key=excess)
+
+
+def _regions(readings: Readings, slip_bins: int) -> list[ReadingsRegion]:
+    """Those of at most `slip_bins` bins of slip."""
+    slips = _bins(readings.slip, readings.slip_levels, slip_bins)
     loads = _bins(readings.load, readings.load_levels, LOAD_BINS)
+    found = []
     for i, name in enumerate(readings.channels):
-        for low, high in slips:
-            for light, heavy in loads:
-                selected = (readings.channel == i) & (readings.slip >= low)
-                selected &= (readings.slip <= high) & (readings.load >= light)
-                selected &= readings.load <= heavy
-                if selected.sum() >= MIN_READINGS:
-                    yield ReadingsRegion(name, (low, high), (light, heavy), selected)
+        for (low, high), (light, heavy) in product(slips, loads):
+            selected = (readings.channel == i) & (readings.slip >= low) & (readings.slip <= high)
+            selected &= (readings.load >= light) & (readings.load <= heavy)
+            if selected.sum() >= MIN_READINGS:
+                found.append(ReadingsRegion(name, (low, high), (light, heavy), selected))
+    return found
 
 
 def _bins(values: Floats, levels: Levels, count: int) -> list[tuple[float, float]]:

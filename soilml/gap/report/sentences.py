@@ -32,6 +32,7 @@ _IN_SHORT = {
     "region-not-predicted": "one region is not predicted by the other rows",
     "soil-test": "rows and tests of the soil disagree",
     "excess-residuals": "residuals exceed the declared noise",
+    "soil-at-prior": "the soil is at ends of its priors",
     "nothing-is-better": "no effect or smooth discrepancy is better",
     "not-decisive": "the evidence is not decisive",
     "implausible-fault": "a sensor's fault would be implausibly large",
@@ -43,6 +44,12 @@ _IN_SHORT = {
     "one-run": "there is one run only",
     "one-load": "there is one load only",
     "few-slips": "there are too few slips",
+}
+
+#: What a headline says of residuals beyond the declared noise without a smooth gap, by the reason.
+_BEYOND_NOISE = {
+    "excess-residuals": "; these rows cannot tell a gap from understated noise",
+    "soil-at-prior": ", with the soil at ends of its priors: widen them, or an effect is missing",
 }
 
 
@@ -58,16 +65,22 @@ def headline(report: GapReport) -> str:
         case "no-gap":
             return _no_gap(report)
         case "undecided":
+            code = report.reasons[0].code if report.reasons else ""
+            if (found := report.misfit) and code in _BEYOND_NOISE:
+                size = excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
+                return f"R{size[1:]}{_BEYOND_NOISE[code]}."
             why = _short(report.reasons[:1])
             return f"No smooth gap was found, but the measurements disagree: {why}."
         case "not-testable":
             why = _short(report.reasons[:1])
             return f"There is a gap, but these runs cannot identify its cause: {why}."
         case "unknown":
-            return (
-                "There is a gap, and no effect of the catalogue explains it "
-                f"(mean squared residual {_before(report)}; noise alone gives 1)."
-            )
+            faults = [r for r in report.reasons if r.code == "implausible-fault"]
+            which = ", and no effect of the catalogue explains it"
+            if faults:
+                which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
+            size = f"mean squared residual {_before(report)}; noise alone gives 1"
+            return f"There is a gap{which} ({size})."
         case "suspected":
             first = report.suspects[0] if report.suspects else None
             names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
@@ -178,7 +191,7 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     if found := report.misfit:
         size = excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
         text = f"{size} by the soil alone"
-        if found.grants_scatter:
+        if found.grants_scatter and found.granted <= found.declared:
             text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
         parts.append(text)
     count = len(report.candidates)

@@ -41,7 +41,7 @@ def open_priors(problem: FitProblem, result: SearchResult) -> OpenedPriors | Non
     if not result.has_gap:
         return None
     best = next((c for c in result.accepted if c.names), result.likeliest)
-    pressed = _pressed(result.soil if best is None else best.fit)
+    pressed = pressed_priors(result.soil if best is None else best.fit)
     left = best is None or float(best.amplitude.max()) >= LARGE_LEFT
     wide = {c.path: c.prior for c in select_free(replace(problem.case, prior={}), OPENED)}
     known = problem.case.prior
@@ -63,7 +63,7 @@ def _both(wide: Prior, own: Prior) -> Prior:
     return Prior(lower, upper, log=wide.log and lower > 0.0)
 
 
-def _pressed(fit: Solution) -> dict[str, str]:
+def pressed_priors(fit: Solution) -> dict[str, str]:
     """The soil parameters that a fit has at an end of their prior, by path, in words."""
     found = {}
     for c, x in zip(fit.coordinates, fit.x, strict=True):

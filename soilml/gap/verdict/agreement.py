@@ -10,13 +10,19 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.effect_signatures import effect_signatures
-from soilml.fitting.misfit import declared_misfit, excess_residuals_remark
+from soilml.fitting.misfit import (
+    declared_misfit,
+    excess_residuals,
+    excess_residuals_remark,
+    misfit_limit,
+)
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.order_trend import TREND_LEVEL
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import NoiseAgreement, SoilTrend
 from soilml.gap.search.analysis import Analysis
+from soilml.gap.search.opened_priors import pressed_priors
 from soilml.gap.search.stepwise import GAP_LEVEL, SearchResult
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -53,11 +59,25 @@ def noise_agreement(
 
 
 def misfit_remarks(found: NoiseAgreement | None, case: Case, analysis: Analysis) -> list[Remark]:
-    """Residuals beyond the declared noise that neither scatter nor outliers account for."""
-    if found is None or not found.exceeds_noise or found.grants_scatter or analysis.outliers:
+    """Residuals beyond the declared noise that neither scatter nor outliers account for.
+
+    The score test does not see those that another soil beyond the priors would explain.
+    """
+    if found is None or not found.exceeds_noise:
         return []
+    left = max(len(analysis.problem.readings) - len(analysis.problem.soil), 1)
+    if (found.grants_scatter or analysis.outliers) and found.granted <= misfit_limit(left):
+        return []
+    factor = float(np.sqrt(found.declared))
+    if pressed := pressed_priors(analysis.result.soil):
+        text = (
+            f"{excess_residuals(factor, bool(case.discrepancy))} with "
+            f"{'; '.join(pressed.values())}: widen these priors in [soil.prior], or the model "
+            "lacks an effect"
+        )
+        return [Remark("soil-at-prior", text, tuple(pressed))]
     consequence = "no scatter from run to run accounts for them"
-    return [excess_residuals_remark(float(np.sqrt(found.declared)), case, consequence)]
+    return [excess_residuals_remark(factor, case, consequence)]
 
 
 def trend_remarks(trends: Sequence[SoilTrend]) -> list[Remark]:
@@ -99,10 +119,12 @@ def hidden_effect(problem: FitProblem, result: SearchResult) -> list[Remark]:
             white = problem.covariance.whiten @ tested[s.name]
             change = change - rates @ np.linalg.solve(soil.information, soil.jacobian.T @ white)
         change = np.abs(sizes[s.name] * np.nan_to_num(change))
-        by_channel = {n: float(change[others.channel == i].max()) for i, n in enumerate(names)}
-        share = change[others.channel == 0] / (others.load[others.channel == 0])
-        if float(share.max()) > worst[0]:
-            worst = float(share.max()), s.name, by_channel
+        share = float((change / others.load)[others.channel == 0].max())
+        if share > 1.0:  # no wheel pulls more than its load
+            change, sizes[s.name], share = change / share, sizes[s.name] / share, 1.0
+        if share > worst[0]:
+            by_channel = {n: float(change[others.channel == i].max()) for i, n in enumerate(names)}
+            worst = share, s.name, by_channel
     _, name, by_channel = worst
     if not name or max(by_channel[n] / NOTABLE_CHANGE[n] for n in names) < 1.0:
         return []

@@ -37,8 +37,9 @@ LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
 #: smaller one lists it first among the suspects. That of right names lies near `IN_CATALOGUE`.
 NAMED_PROBABILITY = 0.9
 #: Why an explanation that the evidence supports is not claimed.
-IMPLAUSIBLE_FAULT = Remark(
-    "implausible-fault", "the fault of a sensor or of the rig would have to be implausibly large"
+IMPLAUSIBLE_FAULT = (
+    "{} would explain the gap, but would have to be implausibly large for a fault of a sensor or "
+    "of the rig: check that first"
 )
 NOT_PREDICTIVE = (
     "{} fits the rows, but predicts rows that were kept back no better than the soil alone does"
@@ -94,10 +95,11 @@ def decide(
             return Decision("unknown", (), None)
         return Decision("suspected", (), _first_suspect(result))
     best = accepted[0]
+    if faults := _implausible_faults(best.fit):
+        text = IMPLAUSIBLE_FAULT.format(" + ".join(faults))
+        return Decision("unknown", (), None, Remark("implausible-fault", text, faults))
     if not suspects:  # many weak rivals share the probability that the soil alone lacks
         return Decision("unknown", (), None)
-    if _implausible(best.fit):
-        return Decision("unknown", (), None, IMPLAUSIBLE_FAULT)
     not_proven = result.posterior.unlisted | result.posterior.unproven
     if best.names in not_proven:
         text = NOT_PREDICTIVE.format(" + ".join(best.names))
@@ -190,7 +192,9 @@ def with_refused_outside(
     gains: Log density of the rows kept back, above that of the soil alone, as far as it is known.
     """
     candidates = [c for c in result.candidates if c.names]
-    unlisted = {c.names for c in candidates if _implausible(c.fit) or _implausibly_large(c.fit)}
+    unlisted = {
+        c.names for c in candidates if _implausible_faults(c.fit) or _implausibly_large(c.fit)
+    }
     unlisted |= {names for names, gain in gains.items() if gain.is_worse}
     unproven = frozenset(names for names, gain in gains.items() if not gain.is_better)
     far = unlisted | {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
@@ -219,11 +223,14 @@ def _far_from_catalogue(problem: FitProblem, result: SearchResult, best: Explana
     return by_catalogue >= soil_alone.objective and best.names[0] in only_channels(problem, result)
 
 
-def _implausible(fit: Solution) -> bool:
-    """Whether a fault of a sensor or the rig is far larger than its prior allows."""
-    sizes = [c.effect and not c.is_shape for c in fit.coordinates]
+def _implausible_faults(fit: Solution) -> tuple[str, ...]:
+    """Faults of sensors and the rig that are far larger than their priors allow."""
     deviation = np.abs(fit.x) * np.sqrt(fit.precision)
-    return bool(np.any(deviation[np.asarray(sizes, dtype=np.bool_)] > MAX_SIZE_DEVIATION))
+    return tuple(
+        c.effect
+        for c, d in zip(fit.coordinates, deviation, strict=True)
+        if c.effect and not c.is_shape and d > MAX_SIZE_DEVIATION
+    )
 
 
 def _implausibly_large(fit: Solution) -> bool:

@@ -140,7 +140,7 @@ def discrepancy_map(problem: FitProblem, fit: Solution, seed: int) -> list[Regio
 
     The score is positive where the mean reading is above the prediction.
     """
-    parts = list(regions(problem.readings))
+    parts = regions(problem.readings)
     if not parts:
         return []
     std = problem.covariance.std

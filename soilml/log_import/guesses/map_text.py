@@ -237,7 +237,7 @@ class _MapDrafting:
             "# CHANGE and NEEDED first, then at the units. Values take a unit and an uncertainty:",
             '# "0.15 m +- 1 %". Forward is positive for rotation, travel and torque.',
             "#",
-            "# The columns, with the unit that the log states and the range of their values:",
+            "# The columns, with the unit that the log states and where 98 % of their values lie:",
         ]
         listed = self.columns
         if len(listed) > _MOST_LISTED:

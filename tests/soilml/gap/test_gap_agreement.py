@@ -11,6 +11,7 @@ from soilml.gap import gap
 from soilml.gap.evidence.order_trend import FEWEST_RUNS, TREND_LEVEL, order_trends
 from soilml.gap.report.results import NoiseAgreement
 from soilml.gap.verdict.agreement import trend_remarks
+from soilml.numerics.prior import Prior
 from soilml.traction.soil_draws import measured_soil
 
 CASE = case_of()
@@ -84,6 +85,17 @@ def test_gap_identify_and_pull_state_the_same_residuals():
     warnings = measured_soil(CASE, table, exact_model=True).warnings
     (said,) = [w.text for w in warnings if w.code == "excess-residuals"]
     assert factor in said
+
+
+@pytest.mark.parametrize("name", ["friction_angle", "shear_modulus"])
+def test_a_prior_without_the_true_soil_is_no_agreement(name):
+    """What another friction angle explains, no effect does: the priors are doubted."""
+    true = getattr(CASE.soil, name)
+    prior = replace(CASE, prior={**CASE.prior, name: Prior(1.25 * true, 1.4 * true)})
+    report = gap(prior, driven(CASE, seed=4))
+    assert report.status == "undecided" and report.reasons[0].code == "soil-at-prior"
+    assert name in report.reasons[0].about
+    assert report.sentence.endswith("widen them, or an effect is missing.")
 
 
 @pytest.mark.slow

@@ -228,6 +228,17 @@ def test_friction_angle_and_bearing_are_told_apart(rig, angle, bearing):
     assert found.degrees_of_freedom == len(sign)
 
 
+def test_a_few_readings_know_the_noise_as_well_as_its_prior_does(rig):
+    """The scatter of its logarithm from so many normal residuals is that of the prior."""
+    readings, columns, _ = rig
+    everything = np.diag(readings.std)
+    nothing_left = np.zeros(len(readings))
+    found = estimate_covariance(readings, columns, nothing_left, everything).components
+    count = found.degrees_of_freedom
+    scale = np.sqrt(np.random.default_rng(3).chisquare(count, 100_000) / count)
+    assert np.std(np.log(scale)) == pytest.approx(LOG_NOISE_SCALE_PRIOR_STD, rel=0.15)
+
+
 def test_the_covariance_of_some_readings_is_their_part(rig):
     readings, columns, _ = rig
     truth = VarianceComponents(np.asarray([1.0, 2.0, 0.5]), 0.02, 0.1, 0.3, 9.0)

@@ -182,6 +182,18 @@ def test_the_regions_of_the_map_cover_every_reading(clean):
     assert covered.all()
 
 
+@pytest.mark.parametrize(
+    ("slips", "loads", "bins"),
+    [(6, (40.0, 70.0, 100.0), 3), (5, (60.0,), 2), (3, (50.0, 90.0), 1), (8, (40.0, 70.0), 4)],
+)
+def test_no_slip_is_missing_in_the_map_of_few_rows(slips, loads, bins):
+    case = case_of()
+    readings = fit_problem(case, driven(case, slips=slips, loads=loads)).readings
+    found = regions(readings)
+    assert np.any([region.selected for region in found], axis=0).all()
+    assert len({region.slip for region in found}) == bins
+
+
 def test_a_region_holds_the_readings_of_its_channel_slips_and_loads(clean):
     readings, seen = clean.readings, np.zeros(len(clean.readings), dtype=int)
     for region in regions(readings):

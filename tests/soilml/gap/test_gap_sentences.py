@@ -67,6 +67,8 @@ def test_granted_scatter_is_named_with_its_size():
     assert lines("no-gap", misfit=SCATTER)["tried"] == (
         f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
     )
+    larger = replace(SCATTER, granted=3.0)  # scatter does not make residuals larger
+    assert "scatter" not in lines("no-gap", misfit=larger)["tried"]
     none = replace(SCATTER, friction_angle_std=0.0, bearing_std=0.0)
     assert "scatter" not in said("no-gap", misfit=none)
     assert "scatter" not in lines("no-gap", misfit=none)["tried"]
@@ -82,6 +84,29 @@ def test_without_a_cause_the_first_reason_is_stated():
     assert found["why"] == "Why no cause is named: there is one load only; runs differ."
     assert found["left"] == REMAINDER
     assert "left" not in lines("unknown", discrepancy={"torque_Nm": LEFT["torque_Nm"]})
+
+
+def test_residuals_beyond_the_noise_are_no_disagreement_of_measurements():
+    misfit = NoiseAgreement(6.25, True, 6.25, 0.0, 0.0)
+    excess = Remark("excess-residuals", "residuals are 2.5 times the declared noise")
+    assert said("undecided", misfit=misfit, reasons=(excess, remark("runs differ"))) == (
+        "Residuals are 2.5 times the declared noise; these rows cannot tell a gap from understated "
+        "noise."
+    )
+    assert "disagree" in said("undecided", misfit=misfit, reasons=(remark("runs differ"), excess))
+    pressed = Remark("soil-at-prior", "n at 1.4, the upper end of its prior", ("n",))
+    assert said("undecided", misfit=misfit, reasons=(pressed,)) == (
+        "Residuals are 2.5 times the declared noise, with the soil at ends of its priors: widen "
+        "them, or an effect is missing."
+    )
+
+
+def test_an_implausibly_large_fault_is_named_in_the_headline():
+    fault = Remark("implausible-fault", "...", ("drawbar-offset",))
+    assert said("unknown", reasons=(fault,)) == (
+        "There is a gap, which only an implausibly large drawbar-offset explains (mean squared "
+        "residual 8.80; noise alone gives 1)."
+    )
 
 
 def test_suspects_have_their_odds_and_the_first_three_are_listed():

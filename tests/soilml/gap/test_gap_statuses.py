@@ -23,7 +23,6 @@ from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.verdict import decision
 from soilml.gap.verdict.decision import (
     DECISIVE_GAIN,
-    IMPLAUSIBLE_FAULT,
     LARGE_REMAINDER,
     MAX_SIZE_DEVIATION,
     SUSPECT_MARGIN,
@@ -146,7 +145,16 @@ def test_a_fault_of_an_implausible_size_is_not_claimed():
         far = candidate("dig", 20.0, coordinates=[size("dig")], x=[-x * MAX_SIZE_DEVIATION])
         made = decide(PROBLEM, searched(NONE, far), (), ())
         assert made.status == found
-        assert made.reason == (None if found == "named" else IMPLAUSIBLE_FAULT)
+        assert (made.reason is not None) == (found == "unknown")
+    assert (made.reason.code, made.reason.about) == ("implausible-fault", ("dig",))
+
+
+def test_an_implausible_fault_is_the_reason_also_where_no_other_effect_is_suspected():
+    far = candidate("dig+plough", 20.0, coordinates=[size("dig"), size("plough")], x=[9.0, 1.0])
+    result = with_refused_outside(PROBLEM, searched(NONE, far), {})
+    assert result.likeliest_suspect is None
+    made = decide(PROBLEM, result, (), ())
+    assert (made.status, made.reason.about) == ("unknown", ("dig",))
 
 
 @pytest.mark.parametrize(
