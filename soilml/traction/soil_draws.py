@@ -21,6 +21,7 @@ from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
+from soilml.identification.averaged import AveragedSamples
 from soilml.identification.averaged_fit import soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
@@ -38,6 +39,7 @@ from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark
+from soilml.report.numbers import format_probability
 from soilml.traction.draws import SoilDraws
 
 #: Number of draws: the probability below a 5 % quantile of as many has a standard error of 1.1 %.
@@ -198,4 +200,13 @@ def measured_soil(
     if samples.noise_inflated:
         consequence = "bands are widened and may be biased"
         warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
+    if isinstance(samples, AveragedSamples) and not any(e.exact for e in samples.explanations):
+        first = samples.explanations[0]
+        likeliest = str(first) if first.effect else "errors of sensors and model"
+        text = (
+            f"the rows speak against the model as in its file, and first for {likeliest} "
+            f"(probability {format_probability(first.probability)}), which the bands leave out: "
+            "run soilml gap"
+        )
+        warnings.append(Remark("against-model", text, (first.effect,) if first.effect else ()))
     return MeasuredSoil(draws, unknown, tuple(warnings), samples.noise_scale)

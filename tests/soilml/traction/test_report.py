@@ -8,6 +8,7 @@ from soilml import Operating, SlipSinkage, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
 from soilml.traction.report import pull_report
+from soilml.traction.soil_draws import measured_soil
 
 pytestmark = pytest.mark.slow
 
@@ -34,3 +35,16 @@ def test_a_sinkage_that_the_model_cannot_explain_is_said_and_widens_the_band(cas
     assert not remarked(same.warnings, "lacks an effect")
     assert remarked(digging.warnings, "lacks an effect")
     assert digging.by_load[0].remaining_fraction[0] > 2.0 * same.by_load[0].remaining_fraction[0]
+
+
+def test_rows_that_speak_against_the_model_are_said_beside_its_bands(case):
+    """The averaged soil accounts for the effect; the model that the bands are of lacks it."""
+    case.noise["sinkage_m"] = Noise(constant=0.0005)
+    slip, load = np.tile([0.1, 0.3, 0.5], 2), np.repeat([40.0, 90.0], 3)
+    columns = {"run": np.repeat(["a", "b"], 3), "slip": slip, "load_N": load}
+    for digging in (False, True):
+        model = case.model + SlipSinkage(n1=0.4) if digging else case.model
+        force = model(case.soil, Operating(slip=slip, load=load))
+        columns |= {"torque_Nm": force.torque, "sinkage_m": force.sinkage}
+        soil = measured_soil(case, Table(columns))
+        assert ("against-model" in {w.code for w in soil.warnings}) == digging
