@@ -22,6 +22,7 @@ HEADLINE_WORDS, MOST_LINES, REASON_WORDS = 25, 5, 12
 LISTED_SUSPECTS = 3  # Suspects that a line lists
 #: Logarithm of odds below which they are called even, and the largest odds that are stated.
 EVEN_ODDS, MOST_ODDS = 0.1, 10_000
+UNLIKELY_SUSPECT = 0.1  # Probability of the first suspect below which the headline doubts it
 NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
 
 #: Reasons in a few words, by their codes; the report lists them in full.
@@ -85,7 +86,9 @@ def headline(report: GapReport) -> str:
             first = report.suspects[0] if report.suspects else None
             names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
             sure = f" (probability {format_probability(first.probability)})" if first else ""
-            return f"A gap of uncertain cause: first suspect is {names}{sure}{_shrinks(report)}."
+            likely = first is None or first.probability >= UNLIKELY_SUSPECT
+            which = "first suspect is" if likely else "no effect is likely, the first is"
+            return f"A gap of uncertain cause: {which} {names}{sure}{_shrinks(report)}."
     names = " + ".join(e.name for e in report.effects)
     sure = _sure(report)
     if report.status == "class":

@@ -124,6 +124,12 @@ def test_suspects_have_their_odds_and_the_first_three_are_listed():
     assert found["why"].endswith("the evidence is not decisive.")
 
 
+def test_a_first_suspect_of_little_probability_is_doubted():
+    for probability, words in ((0.1, "first suspect is a"), (0.01, "no effect is likely, the")):
+        suspects = (Suspect(("a",), -3.0, probability),)
+        assert said("suspected", suspects=suspects).startswith(f"A gap of uncertain cause: {words}")
+
+
 @pytest.mark.parametrize(
     "log_odds, words",
     [
