@@ -71,7 +71,7 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     effects = _joined_effects(cases)
     neutral: dict[str, Any] = {}
     for effect in effects.values():
-        neutral |= _neutral_parameters(effect)
+        neutral |= _neutral_parameters(effect)  # type: ignore[arg-type]  # a class is hashable
     sets = np.asarray([part.sets for part in parts])
     points = np.asarray([part.points for part in parts])
     set_ends = np.cumsum(sets)

@@ -160,7 +160,7 @@ class LinearisedFit:
         held = np.where(both, h, np.eye(own.shape[1]))  # coordinates at a bound stay there
         step = np.linalg.solve(held, gradient[..., None])[..., 0]
         value = product[:, last, last] - (gradient * step).sum(axis=-1) + np.linalg.slogdet(h)[1]
-        return value + self.constant, step, h
+        return np.asarray(value + self.constant), np.asarray(step), np.asarray(h)
 
 
 #: Amplitudes of the discrepancy that are tried, in usual ones: none, then steps of a factor of
