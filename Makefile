@@ -78,7 +78,7 @@ bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md and
 bench-gap: $(VENV)/.ready ## 446 sets with hidden effects against gates and baselines; goes on where it was ended
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
 	  --disable-pip-version-check --editable '.[bench]'
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 4 --write \
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 4 --enlarge 25 --write \
 	  --keep build/gap_records.json
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap_hybrid.py \
 	  --seed 10 11 --sets 10 --write

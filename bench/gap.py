@@ -12,11 +12,13 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import gap_enlarged
 import gap_pages
 import gap_reliability
 from benchmarks_file import ROOT, TITLES, machine, page_file, source_state
@@ -31,8 +33,9 @@ from soilml.processes import process_map
 #: Seeds of the published sets, on which nothing was tuned; the method was tuned on sets of others
 #: (0, 1, 2, 3, 4, 5, 7).
 SEEDS = (10, 11)
-#: Of each so many plans, `make bench-gap` takes one.
-USUAL_EVERY = 4
+#: Of each so many plans, `make bench-gap` takes one, and so many sets with a nameable cause has each
+#: group of `gap_enlarged` at least.
+USUAL_EVERY, USUAL_LEAST = 4, 25
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 
@@ -43,7 +46,8 @@ def run() -> None:
     if args.table:
         sets = [s for file in args.table for s in from_json(json.loads(Path(file).read_text()))]
     else:
-        sets = _judge(_plans(args), args.jobs, args.keep)
+        sample = _plans(args)
+        sets = _judge(sample, _added(args, sample), args.jobs, args.keep)
     text = gap_pages.text(sets, from_json(_read(args.before)), _command(args))
     print(text)
     if args.write:
@@ -65,7 +69,14 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--before", metavar="FILE.json", help="records of an earlier state, for a column beside"
     )
-    parser.add_argument("--every", type=int, default=1, metavar="K", help="take each K-th plan")
+    parser.add_argument("--every", type=int, default=1, metavar="K", help="take one of K plans")
+    parser.add_argument(
+        "--enlarge",
+        type=int,
+        default=0,
+        metavar="N",
+        help="add plans until groups of which the sample has few have N with a nameable cause",
+    )
     parser.add_argument("--tier", help="only sets of this tier")
     parser.add_argument("--design", help="only sets of this design")
     parser.add_argument("--jobs", type=int, help="analyses at a time (default: cores)")
@@ -91,37 +102,59 @@ def _command(args: argparse.Namespace) -> str:
     words += [f"--seed {' '.join(map(str, args.seed))}"] if tuple(args.seed) != SEEDS else []
     words += [f"--{n} {v}" for n in ("tier", "design") if (v := getattr(args, n)) is not None]
     words += ["--factorial"] if args.factorial else []
-    usual = words == [f"--every {USUAL_EVERY}"]
+    words += [f"--enlarge {args.enlarge}"] if args.enlarge else []
+    usual = words == [f"--every {USUAL_EVERY}", f"--enlarge {USUAL_LEAST}"]
     return "`make bench-gap`" if usual else f"`python bench/gap.py {' '.join(words)} --write`"
 
 
 def _plans(args: argparse.Namespace) -> list[Plan]:
-    drawn = [
-        plan_matrix(True, seed) if args.factorial else benchmark_plans(seed) for seed in args.seed
-    ]
-    return [
-        plan
-        for plans in drawn
-        for plan in plans[:: args.every]
-        if args.tier in (None, plan.tier) and args.design in (None, plan.design)
-    ]
+    """The sample of all plans, and of it those that were asked for."""
+    every = [plan for plans in _drawn(args) for plan in thinned(plans, args.every)]
+    return [p for p in every if args.tier in (None, p.tier) and args.design in (None, p.design)]
 
 
-def _judge(plans: list[Plan], processes: int | None, keep: str | None) -> list[Judged]:
+def _drawn(args: argparse.Namespace) -> list[list[Plan]]:
+    """All plans of each seed."""
+    return [plan_matrix(True, s) if args.factorial else benchmark_plans(s) for s in args.seed]
+
+
+def thinned(plans: Sequence[Plan], every: int) -> list[Plan]:
+    """One of each `every` plans, each time the next one of them.
+
+    Plans repeat with the discrepancies and designs of a cause, four at a time: each fourth plan
+    would have the same ones for all causes.
+    """
+    return [p for i, p in enumerate(plans) if i % every == i // every % every]
+
+
+def _added(args: argparse.Namespace, sample: Sequence[Plan]) -> list[tuple[Plan, str]]:
+    """Plans beside the sample, with the groups that they enlarge."""
+    every = [plan for plans in _drawn(args) for plan in plans]
+    return list(gap_enlarged.added(every, sample, args.enlarge)) if args.enlarge else []
+
+
+def _judge(
+    plans: Sequence[Plan],
+    added: Sequence[tuple[Plan, str]],
+    processes: int | None,
+    keep: str | None,
+) -> list[Judged]:
     """The records of all plans, in their order; those that were kept are not made again."""
-    state = source_state()
+    state, groups = source_state(), {_key(asdict(plan)): group for plan, group in added}
     kept = {_key(s): s for s in _read(keep) if s.get("state") == state}
-    jobs = [job for job in enumerate(plans) if _key(asdict(job[1])) not in kept]
+    every = [*enumerate(plans), *((1, plan) for plan, _ in added)]  # 1: without other methods
+    jobs = [job for job in every if _key(asdict(job[1])) not in kept]
     with (
         process_map(judged, jobs, processes) as records,
         progress_bar("analysing", len(jobs)) as done,
     ):
         for count, record in enumerate(records, 1):
-            kept[_key(record)] = record | {"state": state}
+            key = _key(record)
+            kept[key] = record | {"state": state, "added_to": groups.get(key, "")}
             done(count)
             if keep and (count % KEEP_EVERY == 0 or count == len(jobs)):
                 save_text(keep, json.dumps(list(kept.values())))
-    return from_json([kept[_key(asdict(plan))] for plan in plans])
+    return from_json([kept[_key(asdict(plan))] for _, plan in every])
 
 
 def _read(file: str | None) -> list[Judged]:

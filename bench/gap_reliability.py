@@ -13,8 +13,10 @@ from gap_records import Judged, interval
 BIN = 50
 #: Edges of the wide bins; neighbours are joined until each has `BIN` statements.
 WIDE_EDGES = (0.0, 0.02, 0.1, 0.2, 0.35, 0.5, 0.65, 0.8, 0.9, 0.98, 1.0)
-#: Simulations of an analyst whose probabilities are exact.
+#: Simulations of an analyst whose probabilities are exact, and draws of the sets with replacement.
 SIMULATIONS = 400
+#: Stated probability from which a statement is one that a user acts on.
+NOTABLE = 0.02
 
 
 @dataclass(frozen=True)
@@ -33,14 +35,20 @@ class Bin:
 
 def statements(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
     """(n,) stated probabilities, ascending, and (n,) whether the effect was hidden in that set."""
+    stated, true = _pairs(sets)
+    order = np.argsort(stated, kind="stable")
+    return stated[order], true[order]
+
+
+def _pairs(sets: Sequence[Judged]) -> tuple[np.ndarray, np.ndarray]:
+    """The same in the order of the sets."""
     pairs = [
         (p, name in s["truth"] or (s["tier"] in ("T", "C") and name in s.get("relatives", ())))
         for s in sets
         for name, p in s.get("probabilities", {}).items()
     ]
     stated = np.asarray([p for p, _ in pairs], dtype=np.float64)
-    order = np.argsort(stated, kind="stable")
-    return stated[order], np.asarray([true for _, true in pairs], dtype=bool)[order]
+    return stated, np.asarray([true for _, true in pairs], dtype=bool)
 
 
 def equal_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
@@ -54,15 +62,22 @@ def equal_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
 
 def wide_bins(stated: np.ndarray, true: np.ndarray) -> list[Bin]:
     """Bins between `WIDE_EDGES`, joined with the next until each has `BIN` statements."""
-    inner = np.searchsorted(stated, WIDE_EDGES[1:-1], side="right")
+    cuts = _wide_cuts(stated)
+    if cuts is None:
+        return []
+    return [_bin(p, t) for p, t in zip(np.split(stated, cuts), np.split(true, cuts), strict=True)]
+
+
+def _wide_cuts(stated: np.ndarray) -> list[int] | None:
+    """Where the wide bins of ascending probabilities begin, but the first; None for too few."""
+    if len(stated) < BIN:
+        return None
     cuts, last = [], 0
-    for cut in inner:
+    for cut in np.searchsorted(stated, WIDE_EDGES[1:-1], side="right"):
         if cut - last >= BIN and len(stated) - cut >= BIN:
             cuts.append(int(cut))
             last = int(cut)
-    if len(stated) < BIN:
-        return []
-    return [_bin(p, t) for p, t in zip(np.split(stated, cuts), np.split(true, cuts), strict=True)]
+    return cuts
 
 
 def largest(bins: Sequence[Bin]) -> float:
@@ -80,6 +95,65 @@ def chance(bins: Sequence[Bin]) -> tuple[float, float]:
     drawn = generator.binomial(count, stated, (SIMULATIONS, len(bins))) / count
     worst = np.abs(drawn - stated).max(axis=1)
     return float(np.median(worst)), float(np.quantile(worst, 0.95))
+
+
+def chance_of_as_much(stated: np.ndarray, true: np.ndarray) -> float:
+    r"""Share of analysts with exact probabilities whose wide bins deviate as much, in all.
+
+    .. math:: \sum_b \frac{(O_b - \sum p)^2}{\sum p (1 - p)}
+
+    with O_b effects that were hidden in bin b. The effects of one set exclude each other for the
+    most part, so that independent ones deviate a little more. NaN without bins.
+
+    References: Hosmer and Lemeshow, Communications in Statistics A9(10), 1980.
+    """
+    cuts = _wide_cuts(stated)
+    if cuts is None:
+        return float("nan")
+    first = [0, *cuts]
+    expected = np.add.reduceat(stated, first)
+    variance = np.add.reduceat(stated * (1.0 - stated), first)
+
+    def deviation(hidden: np.ndarray) -> float:
+        found = np.add.reduceat(hidden.astype(np.float64), first)
+        return float(np.sum((found - expected) ** 2 / np.maximum(variance, 1e-9)))
+
+    generator, own = np.random.default_rng(0), deviation(true)
+    drawn = [deviation(generator.random(len(stated)) < stated) for _ in range(SIMULATIONS)]
+    return float(np.mean([value >= own for value in drawn]))
+
+
+def calibration_error(
+    sets: Sequence[Judged],
+) -> tuple[float, tuple[float, float], tuple[float, float]]:
+    """Expected calibration error of statements from `NOTABLE` on, in their wide bins.
+
+    The mean of |stated - frequency| over these statements; its 95 % interval over sets that are
+    drawn with replacement; and its median and 95 % quantile for exact probabilities.
+    """
+    pairs = [_pairs([s]) for s in sets]
+    own = [(p[p >= NOTABLE], t[p >= NOTABLE]) for p, t in pairs if np.any(p >= NOTABLE)]
+    stated, true = statements(sets)
+    stated, true = stated[stated >= NOTABLE], true[stated >= NOTABLE]
+    cuts = _wide_cuts(stated)
+    if cuts is None:
+        return float("nan"), (float("nan"),) * 2, (float("nan"),) * 2
+    edges = stated[cuts]
+
+    def error(p: np.ndarray, t: np.ndarray) -> float:
+        at = np.searchsorted(edges, p, side="right")
+        off = np.bincount(at, p - t, minlength=len(edges) + 1)
+        return float(np.abs(off).sum() / len(p))
+
+    generator = np.random.default_rng(0)
+    again = []
+    for _ in range(SIMULATIONS):
+        drawn = [own[i] for i in generator.integers(len(own), size=len(own))]
+        again.append(error(*(np.concatenate(part) for part in zip(*drawn, strict=True))))
+    exact = [error(stated, generator.random(len(stated)) < stated) for _ in range(SIMULATIONS)]
+    low, high = np.quantile(again, (0.025, 0.975))
+    usual, seldom = np.quantile(exact, (0.5, 0.95))
+    return error(stated, true), (float(low), float(high)), (float(usual), float(seldom))
 
 
 def save_picture(sets: Sequence[Judged], file: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
+import gap_enlarged
 import gap_families
 import gap_held_out
 import gap_reliability
@@ -39,13 +40,14 @@ REGION_GAP = 2.0
 
 
 def figures(sets: Sequence[Judged]) -> list[Figure]:
-    """Every figure of the benchmark with its gate."""
+    """Every figure of the benchmark with its gate; added sets count in those of their group."""
+    every, sets = sets, gap_enlarged.sampled(sets)
     usual = [s for s in sets if not own_figures(s)]
     return [
-        *_naming(usual),
+        *_naming(usual, gap_enlarged.sampled(every, gap_enlarged.LARGE)),
         *_false_names(usual),
         *_silence(usual),
-        *_suspects(usual),
+        *_suspects(usual, gap_enlarged.sampled(every, gap_enlarged.ONE_LOAD)),
         *gap_families.figures(sets),
         *_probabilities(sets),
         *gap_held_out.figures(sets),
@@ -60,8 +62,9 @@ def named_designs(sets: Sequence[Judged]) -> list[Judged]:
     return [s for s in sets if s["design"] not in SUSPECT_DESIGNS and not own_figures(s)]
 
 
-def _naming(sets: Sequence[Judged]) -> Iterator[Figure]:
-    own = [s for s in named_designs(sets) if nameable(s)]
+def _naming(sets: Sequence[Judged], enlarged: Sequence[Judged]) -> Iterator[Figure]:
+    """Of the sample, and of the sample with what was added at the largest discrepancy."""
+    own = [s for s in named_designs(enlarged) if nameable(s)]
     for level, goal in ((0.0, ">= 0.95"), (0.01, ">= 0.93"), (0.02, ">= 0.90"), (0.04, ">= 0.85")):
         part = [s for s in own if s["discrepancy"] == level]
         text = f"right cause in the cause set, SNR >= 3, discrepancy {level:.0%}"
@@ -97,13 +100,18 @@ def _silence(sets: Sequence[Judged]) -> Iterator[Figure]:
     yield share("analysis ended by an error", hits, len(sets), "<= 0.0")
 
 
-def _suspects(sets: Sequence[Judged]) -> Iterator[Figure]:
-    every = [s for s in sets if s["design"] in SUSPECT_DESIGNS and s["catalogued"]]
+def _suspects(sets: Sequence[Judged], enlarged: Sequence[Judged]) -> Iterator[Figure]:
+    """Of the sample with what was added at one load, and of the sample."""
+
+    def at_one_load(given: Sequence[Judged]) -> list[Judged]:
+        own = (s for s in given if s["design"] in SUSPECT_DESIGNS and not own_figures(s))
+        return [s for s in own if s["catalogued"]]
+
     for most, place, goal in ((1, "first", ">= 0.75"), (3, "in the first three", ">= 0.95")):
-        own = [s for s in every if nameable(s)]
+        own = [s for s in at_one_load(enlarged) if nameable(s)]
         hits = sum(suspected(s, most) for s in own)
         yield share(f"one load, SNR >= 3: truth {place} among suspects", hits, len(own), goal)
-        own = [s for s in every if s["signal"] >= 2.0 * 3.0]
+        own = [s for s in at_one_load(sets) if s["signal"] >= 2.0 * 3.0]
         hits = sum(suspected(s, most) for s in own)
         yield share(f"one load, signature of 6 sigma: truth {place}", hits, len(own))
 
@@ -118,6 +126,23 @@ def _probabilities(sets: Sequence[Judged]) -> Iterator[Figure]:
         text = f"{worst:.3f}; by chance alone {usual:.3f} (95 %: {seldom:.3f})" if bins else "-"
         met = worst <= 0.05 if bins else None
         yield Figure(f"stated probabilities, largest deviation, {name}", text, "<= 0.05", met)
+    share_of_exact = gap_reliability.chance_of_as_much(stated, true)
+    there = bool(np.isfinite(share_of_exact))
+    yield Figure(
+        "stated probabilities, share of exact ones that deviate as much in all wide bins",
+        f"{share_of_exact:.3f}" if there else "-",
+        ">= 0.05",
+        share_of_exact >= 0.05 if there else None,
+    )
+    found, (low, high), (usual, seldom) = gap_reliability.calibration_error(sets)
+    there = bool(np.isfinite(found))
+    text = f"{found:.3f} ({low:.3f}-{high:.3f}); by chance alone {usual:.3f} (95 %: {seldom:.3f})"
+    yield Figure(
+        f"stated probabilities from {gap_reliability.NOTABLE:g}, expected calibration error",
+        text if there else "-",
+        "<= 0.05",
+        found <= 0.05 if there else None,
+    )
 
 
 def median_ratio(sets: Sequence[Judged], key: str) -> float:

@@ -134,14 +134,14 @@ def test_records_of_the_same_state_are_not_made_again(tmp_path, monkeypatch):
 
     monkeypatch.setattr(gap, "judged", judge)
     file = str(tmp_path / "kept.json")
-    first = gap._judge(plans[:2], 1, file)
+    first = gap._judge(plans[:2], (), 1, file)
     assert made == [0, 1] and [s["seed"] for s in first] == [p.seed for p in plans[:2]]
-    again = gap._judge(plans, 1, file)
+    again = gap._judge(plans, (), 1, file)
     assert made == [0, 1, 2] and [s["seed"] for s in again] == [p.seed for p in plans]
     assert gap._key(again[0]) == gap._key(first[0])
     assert again[0]["truth"] == ("slip-sinkage",)
     monkeypatch.setattr(gap, "source_state", lambda: "another")
-    gap._judge(plans[:1], 1, file)
+    gap._judge(plans[:1], (), 1, file)
     assert made == [0, 1, 2, 0]
     assert {s["state"] for s in json.loads(Path(file).read_text())} >= {"another"}
 
@@ -159,7 +159,7 @@ def test_a_page_names_the_command_that_made_its_records(monkeypatch):
         monkeypatch.setattr(sys, "argv", ["bench/gap.py", *words])
         return gap._command(gap._arguments())
 
-    assert said("--every", "4", "--write", "--keep", "a.json") == "`make bench-gap`"
+    assert said("--every", "4", "--enlarge", "25", "--write", "--keep", "a.json") == "`make bench-gap`"
     other = said("--every", "30", "--tier", "L", "--seed", "1", "2")
     assert other == "`python bench/gap.py --every 30 --seed 1 2 --tier L --write`"
     assert "Written by another: 1 sets" in gap_pages.text([record()], (), "another")
