@@ -33,8 +33,8 @@ from soilml.processes import process_map
 #: Seeds of the published sets, on which nothing was tuned; the method was tuned on sets of others
 #: (0, 1, 2, 3, 4, 5, 7).
 SEEDS = (10, 11)
-#: Of each so many plans, `make bench-gap` takes one, and so many sets with a nameable cause has each
-#: group of `gap_enlarged` at least.
+#: Of each so many plans, `make bench-gap` takes one. Each group of `gap_enlarged` has at least so
+#: many sets with a cause that can be named, as far as there are any.
 USUAL_EVERY, USUAL_LEAST = 4, 25
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5

@@ -57,9 +57,9 @@ SAME_CAUSE = (
 )
 #: What the sets are that were added to the sample.
 ENLARGED = (
-    " The sample has few sets with a cause that can be named at one load or beside a discrepancy of "
-    "4 %. {more} more plans of the same seeds, with an SNR of 3 or more before any analysis, were "
-    "drawn at random. They count in the gates of these two groups at SNR >= 3, and nowhere else."
+    " The sample has few sets with a cause that can be named at one load, or beside a discrepancy "
+    "of 4 %. {more} more plans of the same seeds, with an SNR of 3 or more before any analysis, "
+    "were drawn at random. They count in the gates of these two groups at SNR >= 3 alone."
 )
 PICTURE = "docs/gap_reliability.png"
 
@@ -186,19 +186,25 @@ def _reliability(sets: Sequence[Judged]) -> str:
     bins = gap_reliability.wide_bins(stated, true)
     if not bins:
         return ""
+    mixed = gap_reliability.at_expected_mix(sets) or [None] * len(bins)
     rows = [
         (
             f"{b.stated:.3f}",
             rate(round(b.frequency * b.count), b.count),
             f"{b.frequency - b.stated:+.3f}",
+            f"{m.frequency - m.stated:+.3f}" if m else "-",
         )
-        for b in bins
+        for b, m in zip(bins, mixed, strict=True)
     ]
     return (
         f"## Reliability of stated probabilities\n\n![reliability](../{Path(PICTURE).name})\n\n"
         f"{len(stated)} statements, one for each effect that a set could test. A statement is true "
-        "if the effect was hidden in that set.\n\n"
-        + table(("stated, mean", "hidden", "difference"), rows)
+        "if the effect was hidden in that set. A bin of 50 statements deviates by more than 0.05 "
+        "by chance alone, so that the largest deviation of any bin is shown beside what chance "
+        "does, and two figures judge all bins together. The prior expects one cause that the model "
+        "lacks, and none in 37 % of sets; fewer sets here lack a cause of the catalogue. The last "
+        "column weights them to that share.\n\n"
+        + table(("stated, mean", "hidden", "difference", "at the mix that is expected"), rows)
     )
 
 

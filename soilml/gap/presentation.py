@@ -41,6 +41,8 @@ def gap_files(
     if report.suspected_model is not None:
         first = " + ".join(report.best_unclaimed)
         heading = f"With {first}, which is suspected, not named. {report.sentence}"
+        if report.predictive_model is report.suspected_model:
+            heading += " Rows kept back are predicted better with it than by model.toml."
         content[SUSPECTED_FILE] = case_as_toml(report.suspected_model, [heading])
     return content
 

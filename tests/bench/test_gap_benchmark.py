@@ -3,6 +3,7 @@
 import json
 import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from soilml.io.table import Table
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import gap_case
+import gap_enlarged
 import gap_pages
 import gap_records
 import gap_reliability
@@ -117,6 +119,75 @@ def test_exact_probabilities_deviate_by_chance_alone_and_wrong_ones_by_more():
     assert 0.05 < usual < seldom and gap_reliability.largest(small) < 1.2 * seldom
     sure = gap_reliability.wide_bins(stated, generator.random(4000) < stated**2)
     assert gap_reliability.largest(sure) > 0.15
+
+
+def test_probabilities_are_judged_by_all_their_bins_and_by_what_chance_does():
+    generator = np.random.default_rng(1)
+    stated = np.sort(generator.random(3000) ** 2)
+    exact, low = generator.random((2, 3000)) < [stated, np.sqrt(stated)]
+    assert gap_reliability.chance_of_as_much(stated, exact) > 0.05
+    assert gap_reliability.chance_of_as_much(stated, low) == 0.0
+    assert np.isnan(gap_reliability.chance_of_as_much(stated[:20], exact[:20]))
+
+    def sets(hidden):
+        names = [f"e{i}" for i in range(10)]
+        for p, t in zip(stated.reshape(300, 10), hidden.reshape(300, 10), strict=True):
+            given = dict(zip(names, p.tolist(), strict=True))
+            yield record(
+                probabilities=given, truth=tuple(n for n, h in zip(names, t, strict=True) if h)
+            )
+
+    error, (below, above), (usual, seldom) = gap_reliability.calibration_error(list(sets(exact)))
+    assert below <= error <= above and usual < seldom and error < 1.2 * seldom
+    worse, (below, _), (_, seldom) = gap_reliability.calibration_error(list(sets(low)))
+    assert worse > below > seldom
+    name = "stated probabilities, share of exact ones"
+    assert figure(list(sets(exact)), name).met and not figure(list(sets(low)), name).met
+    assert np.isnan(gap_reliability.calibration_error([record()])[0])
+
+
+def test_the_mix_that_the_prior_expects_has_more_sets_without_a_cause():
+    hidden = [record(probabilities={"slip-sinkage": 0.6, "slope": 0.1}) for _ in range(90)]
+    empty = [null(probabilities={"slip-sinkage": 0.5, "slope": 0.1}) for _ in range(10)]
+    low, high = gap_reliability.wide_bins(*gap_reliability.statements([*hidden, *empty]))
+    assert high.frequency == pytest.approx(0.9) and low.frequency == 0.0
+    _, mixed = gap_reliability.at_expected_mix([*hidden, *empty])
+    assert mixed.frequency == pytest.approx(1.0 - np.exp(-1.0)) and mixed.count == 100
+    assert mixed.stated == pytest.approx(0.6 - 0.1 * np.exp(-1.0))
+    assert gap_reliability.at_expected_mix(hidden) == []
+    name = "stated probabilities, the same at the mix"
+    assert figure([*hidden, *empty], name).measured == "0.100"
+
+
+def test_sets_that_were_added_count_in_the_figures_of_their_group_alone():
+    large, one_load = gap_enlarged.LARGE, gap_enlarged.ONE_LOAD
+    more = [record(discrepancy=0.04, added_to=large) for _ in range(3)]
+    suspects = {"status": "suspected", "cause_set": [], "suspects": [("slip-sinkage",)]}
+    more += [record(design="one-load", added_to=one_load, **suspects)]
+    found = [record(), *more]
+    name = "right cause in the cause set, SNR >= 3, discrepancy "
+    assert figure(found, name + "4%").measured.endswith("3/3")
+    assert figure(found, name + "0%").measured.endswith("1/1")
+    assert figure(found, "one load, SNR >= 3: truth first").measured.endswith("1/1")
+    assert figure(found, "one load, signature of 6 sigma: truth first").measured == "-"
+    assert figure(found, "`unknown`").measured.endswith("0/1")
+    page = gap_pages.text(found)
+    assert "1 sets of at most" in page and "4 more plans" in page
+
+
+def test_a_group_is_enlarged_until_it_has_enough_sets():
+    plan = Plan("A", "slip-sinkage", 1.0, 0.02, 8, "dry-sand", 3, 0, discrepancy=0.04)
+    plans = [replace(plan, seed=i) for i in range(40)]
+    plans += [replace(plan, seed=50, discrepancy=0.02), replace(plan, seed=51, tier="D", cause="")]
+    sample = plans[:4]
+
+    def snr(given):
+        return 4.0 if given.seed % 2 else 1.0
+
+    found = list(gap_enlarged.added(plans, sample, 10, snr))
+    assert {group for _, group in found} == {gap_enlarged.LARGE} and len(found) == 8
+    assert all(snr(p) > 3.0 and p not in sample and p.discrepancy == 0.04 for p, _ in found)
+    assert len(list(gap_enlarged.added(plans, sample, 99, snr))) == 18  # as far as there are any
 
 
 def test_statements_are_those_of_every_effect_that_was_tested():

@@ -12,6 +12,7 @@ import gap
 import gap_case
 import gap_families
 import gap_held_out
+import gap_hybrid
 import gap_pages
 import gap_table
 
@@ -146,6 +147,32 @@ def test_records_of_the_same_state_are_not_made_again(tmp_path, monkeypatch):
     assert {s["state"] for s in json.loads(Path(file).read_text())} >= {"another"}
 
 
+def test_a_sample_has_every_discrepancy_of_the_causes_of_a_tier():
+    sample = gap.thinned(benchmark_plans(0), 4)
+    assert len(sample) == pytest.approx(len(benchmark_plans(0)) / 4, abs=1)
+    for tier in "ABCS":
+        levels = {p.discrepancy for p in sample if p.tier == tier and p.design == "sweep"}
+        assert levels == {0.0, 0.01, 0.02, 0.04}
+    assert gap.thinned(list("abcdefghi"), 3) == ["a", "e", "i"]
+    assert gap.thinned(list("abc"), 1) == ["a", "b", "c"]
+
+
+def heavier(**distances):
+    """A record of the comparison of rows kept back."""
+    usual = {"soil": 4.0, "effect": 2.0, "hybrid": 2.0, "predictive": 1.0, "process": 8.0}
+    usual |= {"soil + process": 3.0}
+    return {"discrepancy": 0.02, "kept": usual, "heavier": usual | distances}
+
+
+def test_how_often_a_model_is_no_worse_than_the_better_of_two_is_said():
+    sets = [heavier(), heavier(hybrid=2.4), heavier(hybrid=9.0, predictive=9.0, process=2.0)]
+    said = gap_hybrid.kept_promise(sets)
+    words = "The hybrid is no worse in 33%, at most 5% worse in 33%, at most 25% worse in 67%."
+    assert words in said and "The predictive model is no worse in 67%" in said
+    assert "the better one is 0.25 times" in said
+    assert gap_hybrid.text(sets).endswith(said)
+
+
 def test_a_plan_is_told_from_every_other():
     plan = benchmark_plans(0)[0]
     other = Plan(**{**gap.asdict(plan), "seed": plan.seed + 1})
@@ -159,7 +186,9 @@ def test_a_page_names_the_command_that_made_its_records(monkeypatch):
         monkeypatch.setattr(sys, "argv", ["bench/gap.py", *words])
         return gap._command(gap._arguments())
 
-    assert said("--every", "4", "--enlarge", "25", "--write", "--keep", "a.json") == "`make bench-gap`"
+    assert (
+        said("--every", "4", "--enlarge", "25", "--write", "--keep", "a.json") == "`make bench-gap`"
+    )
     other = said("--every", "30", "--tier", "L", "--seed", "1", "2")
     assert other == "`python bench/gap.py --every 30 --seed 1 2 --tier L --write`"
     assert "Written by another: 1 sets" in gap_pages.text([record()], (), "another")

@@ -357,6 +357,20 @@ class GapReport:
         return plot_gap(self.gap, ax, part)
 
     @property
+    def predictive_model(self) -> Case:
+        """The model to predict with: that of the first suspect where it predicts better.
+
+        It does where its `predictive_gain` is above zero: rows that were kept back are likelier by
+        it than by the soil alone. Else it is `model`, as for all other statuses. A suspect is no
+        name: what is wrong with the model and what predicts best are two questions.
+        """
+        gains = (s.predictive_gain for s in self.suspects if s.effects == self.best_unclaimed)
+        gain = next(gains, None)
+        if self.suspected_model is None or gain is None or gain <= 0.0:
+            return self.model
+        return self.suspected_model
+
+    @property
     def soil_tests(self) -> list[SoilTestAgreement]:
         """The tests of the model's soil, beside the soil before and after."""
         return soil_test_agreement(self.model, self.soil_before, self.soil_after)

@@ -55,7 +55,9 @@ def with_fitted_lengths(
     over lengths l and amplitudes a on a grid. V is that of the problem, or independent noise of
     a size that is fitted too: what changes fast with slip or load is no noise, and the variance
     components of a search take it for noise or for scatter between runs. Soil and effects stay as
-    they are, and so does the process of a channel whose discrepancy the case declares.
+    they are, and so does the process of a channel whose discrepancy the case declares. A process
+    that predicts readings of its channel no better than none does, each from the others, is left
+    out: see `_predicts`.
 
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.8.
     """
@@ -106,10 +108,11 @@ def _likeliest(
             continue
         own = np.flatnonzero(readings.channel == i)
         own = own[:: -(-len(own) // MOST_READINGS)]
-        factor = np.linalg.cholesky(covariance.matrix[np.ix_(own, own)])
+        known = covariance.matrix[np.ix_(own, own)]
+        factor = np.linalg.cholesky(known)
         root = np.linalg.inv(factor)
         same_gear = gear[own][:, None] == gear[own]
-        found[i] = _of_channel(
+        likeliest = _of_channel(
             root @ residual[own],
             usual[i] * root,
             readings.slip[own],
@@ -119,7 +122,39 @@ def _likeliest(
             2.0 * float(np.log(np.diag(factor)).sum()),
             0.0 if marginal.evidence.amplitude[i] > 0.0 else LEAST_GAIN,
         )
+        z = slip_load_points(
+            readings.slip[own], readings.load[own], likeliest.slip_length, likeliest.log_load_length
+        )
+        process = np.where(same_gear, squared_exponential(z, z), 0.0)
+        process *= (likeliest.amplitude * usual[i]) ** 2
+        if not _predicts(residual[own], known * likeliest.noise**2, process):
+            likeliest = replace(likeliest, amplitude=0.0)
+        found[i] = likeliest
     return found
+
+
+def _predicts(residual: Floats, noise: Floats, process: Floats) -> bool:
+    r"""Whether a process predicts each residual (m,) from the others better than none does.
+
+    .. math:: e_i = [V^{-1} r]_i / [V^{-1}]_{ii}
+
+    is the error of the prediction of residual i under the covariance V of all. The sum of its
+    squares, over the variances of the noise, has to fall by more than the standard error of that
+    sum. What changes with a quantity that is neither slip nor load, such as the pass, can be
+    likelier as a process of slip than as noise, and still predicts nothing.
+
+    noise, process (m, m): Covariances of noise and scatter, and of the process.
+
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.12;
+    Vehtari, Gelman and Gabry, Statistics and Computing 27, 2017, eq. 24.
+    """
+    squares = []
+    for covariance in (noise, noise + process):
+        inverse = np.linalg.inv(covariance)
+        error = inverse @ residual / np.diag(inverse)
+        squares.append(error**2 / np.diag(noise))
+    gain = squares[0] - squares[1]
+    return bool(gain.sum() > np.sqrt(len(gain) * np.var(gain)))
 
 
 def _of_channel(

@@ -209,3 +209,18 @@ def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
     assert status(20.0, 4.0) == ("suspected", ("a", "drawbar_pull_N"))
     assert status(20.0, 2.5) == ("partly-named", None)
     assert status(30.0, 4.0) == ("partly-named", None)
+
+
+def test_the_model_to_predict_with_is_that_of_a_suspect_that_predicts_better():
+    case = case_of()
+    other = replace(case, noise={})
+
+    def chosen(gain, effects=("a",), suspected=other):
+        suspects = (Suspect(("b",), 1.0, 0.5, 9.0), Suspect(effects, 0.0, 0.45, gain, 1.0))
+        report = GapReport("suspected", "", case, suspects=suspects, best_unclaimed=("a",))
+        return replace(report, suspected_model=suspected).predictive_model
+
+    assert chosen(2.0) is other
+    assert chosen(-2.0) is case and chosen(0.0) is case and chosen(None) is case
+    assert chosen(2.0, effects=("c",)) is case  # another suspect than the one of the model
+    assert chosen(2.0, suspected=None) is case

@@ -8,9 +8,11 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.config.measurement_noise import LOG_LOAD_LENGTH, SLIP_LENGTH, Discrepancy
 from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
 from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.verdict import remainder_lengths
 from soilml.gap.verdict.learned_remainder import learned_remainder
 from soilml.gap.verdict.remainder_lengths import with_fitted_lengths
 from soilml.io.table import Table
+from soilml.numerics.smooth_process import squared_exponential
 
 
 def changed(shape, amplitude=(1.0, 0.0, 0.0), **declared):
@@ -78,3 +80,28 @@ def test_a_channel_without_a_remainder_gets_one_where_it_is_decisive():
     assert marginal.evidence.amplitude[0] > 0.0
     quiet = changed(lambda s, w: 0.0 * s, amplitude=(0.0, 0.0, 0.0))
     assert not with_fitted_lengths(*quiet)[1].evidence.amplitude.any()
+
+
+def test_what_changes_with_the_pass_is_no_remainder_of_slip(monkeypatch):
+    """At one load, readings of the second pass differ from those of the first at the same slips."""
+    case, runs, slips = case_of(), 4, 16
+    table = driven(case, loads=(80.0,) * runs, slips=slips)
+    again = np.repeat(np.arange(runs) >= runs // 2, slips) - 0.5
+    added = 0.3 * np.ptp(table["torque_Nm"]) * again * np.sin(np.pi * table["slip"])
+    columns = dict(table.columns) | {"torque_Nm": table["torque_Nm"] + added}
+    problem = fit_problem(case, Table(columns))
+    soil = problem.fit_soil([np.full(len(problem.soil), 0.5)])
+    evidence = replace(problem.discrepancy.evidence(soil), amplitude=np.zeros(3))
+    given = problem, MarginalFit(soil, evidence)
+    assert with_fitted_lengths(*given)[1].evidence.amplitude[0] == 0.0
+    monkeypatch.setattr(remainder_lengths, "_predicts", lambda *_: True)
+    assert with_fitted_lengths(*given)[1].evidence.amplitude[0] > 0.0
+
+
+def test_a_process_counts_where_each_residual_follows_from_the_others():
+    z = np.arange(8.0)[:, None]
+    process, noise = squared_exponential(z / 3.0, z / 3.0), 0.01 * np.eye(8)
+    assert remainder_lengths._predicts(np.sin(z[:, 0] / 3.0), noise, process)
+    alternating = np.where(z[:, 0] % 2.0, 1.0, -1.0)
+    assert not remainder_lengths._predicts(alternating, noise, process)
+    assert not remainder_lengths._predicts(alternating, noise, 0.0 * process)
