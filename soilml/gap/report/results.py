@@ -364,11 +364,9 @@ class GapReport:
         it than by the soil alone. Else it is `model`, as for all other statuses. A suspect is no
         name: what is wrong with the model and what predicts best are two questions.
         """
-        gains = (s.predictive_gain for s in self.suspects if s.effects == self.best_unclaimed)
-        gain = next(gains, None)
-        if self.suspected_model is None or gain is None or gain <= 0.0:
-            return self.model
-        return self.suspected_model
+        gains = {s.effects: s.predictive_gain for s in self.suspects}
+        better = (gains.get(self.best_unclaimed) or 0.0) > 0.0
+        return (self.suspected_model if better else None) or self.model
 
     @property
     def soil_tests(self) -> list[SoilTestAgreement]:
