@@ -187,7 +187,8 @@ def text(records: Sequence[Mapping[str, Any]]) -> str:
     head = (
         "discrepancy", "sets", "hybrid over soil", "effect over soil", "hybrid over process",
         "hybrid over soil + process", "heavier: over soil", "heavier: over the better",
-        "predictive over soil", "heavier: predictive over soil", "heavier: over the better",
+        "predictive over soil", "heavier: predictive over soil",
+        "heavier: predictive over the better",
     )  # fmt: skip
     lines = [head, ("---",) * len(head), *rows]
     written = "\n".join(f"| {' | '.join(cells)} |" for cells in lines)
