@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from training.export_c.fixed_points import with_fixed_points
 from training.export_c.integrated_errors import (
     APART,
     FACTOR,
@@ -40,11 +38,11 @@ def joined(nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str
     """
     kept = frozenset(outputs)
     found = with_errors_integrated_out(_with_sums_of_squares(nodes, kept), known, outputs)
-    found = _with_gauss_newton_sums(_with_products_of_rows(found, known), known)
+    found = with_fixed_points(_with_products_of_rows(found, known), known)
+    found = _with_gauss_newton_sums(found, known)
     found = _with_factors(_with_errors_apart(found, known), known)
     found = with_solved_polynomials(found, known)
-    found = _without_zeros(_without_repeats(found, kept), known)
-    return needed_nodes(found, list(outputs))[0]
+    return needed_nodes(_without_repeats(found, kept), list(outputs))[0]
 
 
 def _with_sums_of_squares(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]:
@@ -87,49 +85,6 @@ def _without_repeats(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]
         else:
             same |= dict(zip(own.output, earlier.output, strict=True))
     return result
-
-
-def _without_zeros(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[Any]:
-    """The nodes, with rows of zeros left out of constant factors of sums, and columns with them."""
-    from onnx import helper
-
-    result = []
-    for node in nodes:
-        if node.op_type != SUMS:
-            result.append(node)
-            continue
-        new = type(node)()
-        new.CopyFrom(node)
-        for place in (1, 3):
-            constant = known.get(node.input[place])
-            if constant is None or constant.value is None:
-                continue
-            rows = np.flatnonzero(np.abs(constant.value).max(axis=1))
-            if len(rows) == len(constant.value):
-                continue
-            new.input[place] = _kept(node.input[place], rows, known)
-            if place == 1:
-                columns = f"{node.input[0]}_not_zero"
-                numbers = f"{columns}_numbers"
-                known[numbers] = Tensor.constant(rows.astype(np.int64), numbers)
-                result.append(
-                    helper.make_node("Gather", [node.input[0], numbers], [columns], axis=1)
-                )
-                new.input[0] = columns
-            else:
-                for of_slope in (4, 5):
-                    new.input[of_slope] = _kept(node.input[of_slope], rows, known)
-        result.append(new)
-    return result
-
-
-def _kept(name: str, rows: NDArray[np.intp], known: dict[str, Tensor]) -> str:
-    """The name of a constant with some rows of another one."""
-    values = known[name].value
-    assert values is not None
-    kept = f"{name}_not_zero"
-    known[kept] = Tensor.constant(values[rows], kept)
-    return kept
 
 
 def _with_products_of_rows(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any]:
