@@ -39,6 +39,7 @@ _MATH = {
     "SQRT": {"float": "sqrtf", "double": "sqrt"},
     "FEW_ROWS": {"float": str(FEW_ROWS), "double": str(FEW_ROWS)},
     "LEAST_REST": {"float": "1e-7f", "double": "1e-7"},
+    "REDUCED": {"float": "1e-3f", "double": "1e-3"},
 }
 #: Entries of the metadata that tell one file from another, and what they were trained from.
 IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")
@@ -191,8 +192,11 @@ def _argument(interface: Interface, name: str) -> str:
 
 def kernel_texts(shared: SharedParts, light: bool = False) -> list[str]:
     """Texts of the kernels of a file, those that others call first."""
-    # one that calls another has a name after it, but for this one
-    ordered = sorted(shared.kernels, key=lambda kernel: (kernel[0] == "factor_rows", kernel))
+    used = {*shared.kernels}
+    if not light:
+        used |= {("add_product_transposed", kind) for name, kind in used if name == "add_product"}
+    # one that calls others stands after them
+    ordered = sorted(used, key=lambda kernel: (kernel[0] in ("factor_rows", "add_product"), kernel))
     texts = [kernel_text(kernel, kind, light) for kernel, kind in ordered]
     helpers = []
     for kind in ("double", "float"):

@@ -189,22 +189,11 @@ def _with_errors_apart(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[A
     for node in nodes:
         name = next((name for name in node.input if name in one), None)
         if name is None:
-            mean = next((rest_of[x] for x in node.input if x in rest_of), None)
-            if mean is not None and node.op_type == "Div":
-                rest_of[node.output[0]] = f"{node.output[0]}_rest"
-                scaled = helper.make_node("Div", [mean, node.input[1]], [f"{node.output[0]}_rest"])
-                new[id(node)] = [node, scaled]
             continue
         copy = _of_one_matrix(node, one, known)
         if copy is not None:
             one[node.output[0]] = copy.output[0]
             new[id(node)] = [copy]
-            if copy.op_type == "Div" and one[name] in factors:
-                copy.input[0] = tops[one[name]]
-                tops[copy.output[0]] = copy.output[0]
-                rest = f"{copy.output[0]}_rest"
-                inputs = [factors[one[name]].output[0], node.input[1]]
-                factors[copy.output[0]] = helper.make_node("Div", inputs, [rest])
             continue
         (user,) = users[node.output[0]][:1]
         if one[name] not in factors:
@@ -254,7 +243,7 @@ def _of_one_matrix(node: Any, one: Mapping[str, str], known: dict[str, Tensor]) 
     from onnx import helper
 
     inputs, made = [one.get(name, name) for name in node.input], f"{node.output[0]}_apart"
-    if node.op_type in ("Mul", "Div") and node.input[1] not in one:
+    if node.op_type == "Mul" and node.input[1] not in one:
         return helper.make_node(node.op_type, inputs, [made])
     if node.op_type == "Concat" and node.input[0] in one and len(node.input) == 2:
         constant = known.get(node.input[1])
@@ -304,11 +293,7 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
                 new.input[place] = f"{node.input[place]}_factor"
         result.append(new)
         for name in wanted.intersection(node.output):
-            if node.op_type == "Div" and node.input[0] in wanted:  # by a number: rows stay few
-                given = [f"{node.input[0]}_factor", node.input[1]]
-                result.append(helper.make_node("Div", given, [f"{name}_factor"]))
-            else:
-                result.append(helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0))
+            result.append(helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0))
     return result
 
 
