@@ -226,8 +226,6 @@ def translate_factor(program: Program, node: Node) -> list[Tensor]:
     system = program.new(x.kind, x.shape)
     rest, change = program.new(x.kind, (n,)), program.new(x.kind, (n,))
     program.emit(element_loops(system.name, x.shape, Expression("{0}", (x,))), system, x)
-    for called in ("reflect", "largest_column"):
-        program.shared.kernel(called, x.kind)
     kernel = program.shared.kernel("factor_rows", x.kind)
     code = (
         f"    int {count} = 0;\n    {count} = "
