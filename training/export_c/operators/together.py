@@ -176,10 +176,10 @@ def translate_errors_apart(program: Program, node: Node) -> list[Tensor]:
     program.emit(code, system, own, columns)
     # a row that has no error takes a monomial, so that the other rows are fewer
     code = f"""    for (int error = 0; error < {e}; ++error) {{
-        int pivot = {n.c} + error, row = error;
-        while (row < {count} && !{not_zero}({system.name}[row * {step} + pivot]))
-            ++row;
-        if (row == {count})
+        int pivot = {n.c} + error, given = 0;
+        for (int i0 = error; i0 < {count}; ++i0)
+            given += {not_zero}({system.name}[i0 * {step} + pivot]) ? 1 : 0;
+        if (given == 0)
             pivot = {largest}({count}, {n.c}, {step}, error, {system.name}, {change.name});
         {reflect}({count}, {width}, {step}, error, pivot, {system.name}, {change.name});
     }}

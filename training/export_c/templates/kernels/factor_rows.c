@@ -15,8 +15,9 @@ static int factor_rows_REAL(int m, int n, REAL *a, REAL *rest, REAL *change)
     for (int k = 0; k < most; ++k) {
         int pivot = 0;
         REAL total = 0;
-        for (int j = 0; k > 0 && j < n; ++j) {
-            rest[j] -= a[(k - 1) * n + j] * a[(k - 1) * n + j];
+        for (int j = 0; j < n; ++j) {
+            const REAL before = k > 0 ? a[(k - 1) * n + j] : 0;
+            rest[j] = k > 0 ? rest[j] - before * before : 0;
             total += rest[j];
             pivot = rest[j] > rest[pivot] ? j : pivot;
         }
