@@ -33,12 +33,23 @@ BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
 #: Rows that one call takes, unless the user wants another number.
 ROWS_PER_CALL = 32
 TEMPLATES = Path(__file__).parent / "templates"
+KERNELS = TEMPLATES / "kernels"
+LIGHT = KERNELS / "light"  # Versions for a processor without vector instructions
 #: Functions of the C library in the kernels, by element type.
 _MATH = {
     "EXP": {"float": "expf", "double": "exp"},
     "SQRT": {"float": "sqrtf", "double": "sqrt"},
     "FEW_ROWS": {"float": str(FEW_ROWS), "double": str(FEW_ROWS)},
     "LEAST_REST": {"float": "1e-7f", "double": "1e-7"},
+    "REDUCED": {"float": "1e-3f", "double": "1e-3"},
+}
+#: Kernels that others call, where these have no light version; of others, one that calls another
+#: has a name after it.
+CALLED = {
+    "add_product": ("add_product_transposed",),
+    "factor_rows": ("largest_column", "reflect"),
+    "integrate_out": ("sum_of_rows",),
+    "reflect": ("sum_of_rows",),
 }
 #: Entries of the metadata that tell one file from another, and what they were trained from.
 IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")
@@ -191,8 +202,16 @@ def _argument(interface: Interface, name: str) -> str:
 
 def kernel_texts(shared: SharedParts, light: bool = False) -> list[str]:
     """Texts of the kernels of a file, those that others call first."""
-    # one that calls another has a name after it, but for this one
-    ordered = sorted(shared.kernels, key=lambda kernel: (kernel[0] == "factor_rows", kernel))
+    ordered: dict[tuple[str, str], None] = {}
+
+    def add(name: str, kind: str) -> None:
+        if not (light and LIGHT.joinpath(f"{name}.c").exists()):
+            for called in CALLED.get(name, ()):
+                add(called, kind)
+        ordered[name, kind] = None
+
+    for name, kind in sorted(shared.kernels):
+        add(name, kind)
     texts = [kernel_text(kernel, kind, light) for kernel, kind in ordered]
     helpers = []
     for kind in ("double", "float"):
@@ -209,9 +228,8 @@ def kernel_text(name: str, kind: str, light: bool = False) -> str:
 
     light: Whether it is for a processor without vector instructions, where there are two versions.
     """
-    folder = TEMPLATES / "kernels"
-    lighter = folder / "light" / f"{name}.c"
-    text = (lighter if light and lighter.exists() else folder / f"{name}.c").read_text()
+    lighter = LIGHT / f"{name}.c"
+    text = (lighter if light and lighter.exists() else KERNELS / f"{name}.c").read_text()
     for mark, functions in _MATH.items():
         text = text.replace(mark, functions.get(kind, mark))
     return text.replace("REAL", kind)

@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from training.export_c.fixed_points import with_fixed_points
 from training.export_c.integrated_errors import (
     APART,
     FACTOR,
@@ -40,11 +38,11 @@ def joined(nodes: Sequence[Any], known: dict[str, Tensor], outputs: Iterable[str
     """
     kept = frozenset(outputs)
     found = with_errors_integrated_out(_with_sums_of_squares(nodes, kept), known, outputs)
-    found = _with_gauss_newton_sums(_with_products_of_rows(found, known), known)
+    found = with_fixed_points(_with_products_of_rows(found, known), known)
+    found = _with_gauss_newton_sums(found, known)
     found = _with_factors(_with_errors_apart(found, known), known)
     found = with_solved_polynomials(found, known)
-    found = _without_zeros(_without_repeats(found, kept), known)
-    return needed_nodes(found, list(outputs))[0]
+    return needed_nodes(_without_repeats(found, kept), list(outputs))[0]
 
 
 def _with_sums_of_squares(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]:
@@ -87,49 +85,6 @@ def _without_repeats(nodes: Sequence[Any], outputs: frozenset[str]) -> list[Any]
         else:
             same |= dict(zip(own.output, earlier.output, strict=True))
     return result
-
-
-def _without_zeros(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[Any]:
-    """The nodes, with rows of zeros left out of constant factors of sums, and columns with them."""
-    from onnx import helper
-
-    result = []
-    for node in nodes:
-        if node.op_type != SUMS:
-            result.append(node)
-            continue
-        new = type(node)()
-        new.CopyFrom(node)
-        for place in (1, 3):
-            constant = known.get(node.input[place])
-            if constant is None or constant.value is None:
-                continue
-            rows = np.flatnonzero(np.abs(constant.value).max(axis=1))
-            if len(rows) == len(constant.value):
-                continue
-            new.input[place] = _kept(node.input[place], rows, known)
-            if place == 1:
-                columns = f"{node.input[0]}_not_zero"
-                numbers = f"{columns}_numbers"
-                known[numbers] = Tensor.constant(rows.astype(np.int64), numbers)
-                result.append(
-                    helper.make_node("Gather", [node.input[0], numbers], [columns], axis=1)
-                )
-                new.input[0] = columns
-            else:
-                for of_slope in (4, 5):
-                    new.input[of_slope] = _kept(node.input[of_slope], rows, known)
-        result.append(new)
-    return result
-
-
-def _kept(name: str, rows: NDArray[np.intp], known: dict[str, Tensor]) -> str:
-    """The name of a constant with some rows of another one."""
-    values = known[name].value
-    assert values is not None
-    kept = f"{name}_not_zero"
-    known[kept] = Tensor.constant(values[rows], kept)
-    return kept
 
 
 def _with_products_of_rows(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any]:
@@ -234,22 +189,11 @@ def _with_errors_apart(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[A
     for node in nodes:
         name = next((name for name in node.input if name in one), None)
         if name is None:
-            mean = next((rest_of[x] for x in node.input if x in rest_of), None)
-            if mean is not None and node.op_type == "Div":
-                rest_of[node.output[0]] = f"{node.output[0]}_rest"
-                scaled = helper.make_node("Div", [mean, node.input[1]], [f"{node.output[0]}_rest"])
-                new[id(node)] = [node, scaled]
             continue
         copy = _of_one_matrix(node, one, known)
         if copy is not None:
             one[node.output[0]] = copy.output[0]
             new[id(node)] = [copy]
-            if copy.op_type == "Div" and one[name] in factors:
-                copy.input[0] = tops[one[name]]
-                tops[copy.output[0]] = copy.output[0]
-                rest = f"{copy.output[0]}_rest"
-                inputs = [factors[one[name]].output[0], node.input[1]]
-                factors[copy.output[0]] = helper.make_node("Div", inputs, [rest])
             continue
         (user,) = users[node.output[0]][:1]
         if one[name] not in factors:
@@ -299,7 +243,7 @@ def _of_one_matrix(node: Any, one: Mapping[str, str], known: dict[str, Tensor]) 
     from onnx import helper
 
     inputs, made = [one.get(name, name) for name in node.input], f"{node.output[0]}_apart"
-    if node.op_type in ("Mul", "Div") and node.input[1] not in one:
+    if node.op_type == "Mul" and node.input[1] not in one:
         return helper.make_node(node.op_type, inputs, [made])
     if node.op_type == "Concat" and node.input[0] in one and len(node.input) == 2:
         constant = known.get(node.input[1])
@@ -349,11 +293,7 @@ def _with_factors(nodes: Sequence[Any], known: Mapping[str, Tensor]) -> list[Any
                 new.input[place] = f"{node.input[place]}_factor"
         result.append(new)
         for name in wanted.intersection(node.output):
-            if node.op_type == "Div" and node.input[0] in wanted:  # by a number: rows stay few
-                given = [f"{node.input[0]}_factor", node.input[1]]
-                result.append(helper.make_node("Div", given, [f"{name}_factor"]))
-            else:
-                result.append(helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0))
+            result.append(helper.make_node(FACTOR, [name], [f"{name}_factor"], skipped=0))
     return result
 
 

@@ -11,13 +11,15 @@ of t. So a step and the weights of its points need one product with the system t
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from training.export_c.fixed_points import FixedMonomials, FixedPoints
 from training.export_c.integrated_errors import (
     ROWS,
     SQUARES,
@@ -64,19 +66,16 @@ def with_solved_polynomials(nodes: Sequence[Any], known: dict[str, Tensor]) -> l
     from onnx import helper
 
     users, makers = users_of(nodes), makers_of(nodes)
-    fixed: list[_Monomials] = []  # those whose other coordinates are constant
+    points = FixedPoints(nodes, known)
     new: dict[int, list[Any]] = {}
-    for node in reversed(nodes):  # a step at a constant point comes before those that it resembles
+    for node in nodes:
         place = {SUMS: 1, SQUARES: 3, "MatMul": 1}.get(node.op_type)
-        if place is None:
+        if place is None or node.input[place] in known:
             continue
         found = _monomials(node.input[place], makers, known)
-        if found is None and node.op_type == SUMS:
-            found = next((m for own in fixed if (m := _at_zero(node, own, known))), None)
+        found = found or _of_fixed_points(points.monomials(node.input[place]), known)
         if found is None:
             continue
-        if not found.nodes and node.input[place] not in known:
-            fixed.append(found)
         groups = int(found.powers.max()) + 1
         if node.op_type == SUMS:
             if not _is_derivative(node, found.powers, known):
@@ -137,18 +136,24 @@ def _monomials(name: str, makers: Mapping[str, Any], known: dict[str, Tensor]) -
     for k, name in enumerate((by_power, f"{by_power}_left", f"{by_power}_right")):
         known[name] = Tensor.constant(order if k == 0 else terms[k - 1][order], name)
     made = [f"{stem}_{part}" for part in ("others", "pairs", by_power)]
-    nodes: tuple[Any, ...] = (
+    nodes = (
         helper.make_node("Concat", [*points.input[:-1], ones], [made[0]], axis=0),
         helper.make_node(ROWS, [made[0], *first.input[1:]], [made[1]]),
         helper.make_node(ROWS, [made[1], f"{by_power}_left", f"{by_power}_right"], [made[2]]),
     )
-    rows = [known[name].value if name in known else None for name in nodes[0].input]
-    if all(row is not None for row in rows):  # of a round that is drawn from the prior
-        values = np.concatenate([row for row in rows if row is not None])
-        for left, right in (pairs, terms[:, order]):
-            values = values[left] * values[right]
-        known[made[2]], nodes = Tensor.constant(values, made[2]), ()
     return _Monomials(made[2], points.input[-1], by_power, powers, nodes)
+
+
+def _of_fixed_points(found: FixedMonomials | None, known: dict[str, Tensor]) -> _Monomials | None:
+    """Of points whose other coordinates are constant."""
+    if found is None or not found.solved or len(found.values) < 2:
+        return None
+    order = np.argsort(found.powers, kind="stable").astype(np.int32)
+    values = np.ascontiguousarray(found.values[order])
+    name = f"monomials_{zlib.crc32(values.tobytes()):08x}"
+    known[name] = Tensor.constant(values, name)
+    known[f"{name}_order"] = Tensor.constant(order, f"{name}_order")
+    return _Monomials(name, found.solved, f"{name}_order", found.powers, ())
 
 
 def _numbers(node: Any, known: Mapping[str, Tensor]) -> NDArray[np.intp] | None:
@@ -165,18 +170,3 @@ def _is_derivative(node: Any, powers: NDArray[np.intp], known: Mapping[str, Tens
     found = np.zeros(len(powers))
     found[picked] = factors
     return np.array_equal(found, powers)
-
-
-def _at_zero(node: Any, like: _Monomials, known: dict[str, Tensor]) -> _Monomials | None:
-    """The monomials whose solved coordinate is zero, if those of a node are of the same points."""
-    basis, constant = (
-        known[name].value if name in known else None for name in (node.input[1], like.name)
-    )
-    order = known[like.order].value
-    if basis is None or constant is None or order is None or basis.shape != constant.shape:
-        return None
-    if not np.allclose(basis[order], np.where((like.powers[order] == 0)[:, None], constant, 0.0)):
-        return None
-    zero = f"{like.name}_zero"
-    known[zero] = Tensor.constant(np.zeros_like(constant[:1]), zero)
-    return replace(like, solved=zero)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +22,6 @@ from training.onnx_graph.value import (
     minimum,
     shortcuts,
     softmax,
-    sqrt,
     tanh,
     where,
 )
@@ -31,7 +31,7 @@ from training.set_posterior.misfit_test import Consistency
 from training.set_posterior.polynomial_residuals import (
     NearlyKnown,
     PolynomialResiduals,
-    gauss_newton,
+    ResidualsAtFixedPoints,
     order_of_axes,
     within_box,
 )
@@ -43,7 +43,7 @@ from training.set_posterior.sampling_rounds import (
     prior_draws,
     sample_round,
 )
-from training.set_posterior.scale_mixture import OneSystem, ScaleMixture
+from training.set_posterior.scale_mixture import OneSystem, PointMisfit, ScaleMixture
 from training.set_posterior.small_likelihood import SmallLikelihood
 
 #: Gauss-Newton steps along the solved axis: from 0 in the prior round, and from the regression on
@@ -77,6 +77,7 @@ class FirstRound:
     nearly_known: NearlyKnown | None
     limit: Value  # (1,) largest misfit of sound sets
     residuals: PolynomialResiduals
+    along_solved: ResidualsAtFixedPoints
     samples: WeightedRound
 
 
@@ -144,8 +145,10 @@ def _first_round(
     """The round of draws of the prior, for residuals `start` (m, terms)."""
     family = likelihood.family
     residuals = PolynomialResiduals.of(family, likelihood.response, nearly_known, start)
-    samples = _prior_round(family, residuals, prior_draws(family, residuals.order, sizes.prior))
-    return FirstRound(likelihood, nearly_known, limit, residuals, samples)
+    draws = prior_draws(family, residuals.order, sizes.prior)
+    along_solved = ResidualsAtFixedPoints.of(residuals, draws.others[:-1])
+    samples = _prior_round(family, residuals.order, along_solved, draws)
+    return FirstRound(likelihood, nearly_known, limit, residuals, along_solved, samples)
 
 
 def _with_errors(
@@ -163,7 +166,7 @@ def _with_errors(
         soil = soil * nearly_known.factors.node("Transpose")
     mixture, state = likelihood.mixture_at(soil)
     mixture = mixture.standardised(nearly_known)
-    misfit = mixture.misfit(samples.basis)
+    misfit = mixture.misfit(first.along_solved.basis(samples.solved))
     change = samples.misfit.least * 0.5 + misfit.log_likelihood
     samples = replace(
         samples,
@@ -189,28 +192,28 @@ def _adapted_rounds(
 ) -> list[Value]:
     """Points (1 + p, n), weights (1, n) and least misfit (1,) of all rounds."""
     family, residuals, limit = first.likelihood.family, first.residuals, first.limit
-    unknowns, graph = len(family.axes), limit.graph
+    unknowns = len(family.axes)
     draws = adapted_draws(unknowns, sizes.adapted)
     least = np.diag([0.0, *[VARIANCE_FLOOR] * unknowns])
     rounds, samples = [first.samples], _prior_samples(family, residuals, sizes, first.samples)
-    first_samples, variance = samples, constant(graph, np.ones(1))
+    first_samples, variance = samples, None
     for number in range(sizes.rounds):
         weights = rounds[-1].tempered_weights()[0]
         moments = _moments(samples, weights, least)
         residuals = posterior.proposal(residuals, rounds[-1].misfit, weights)
         if number == sizes.rounds - 1:
-            variance = excess_variance(least_misfit(rounds), limit, family.targets)
-            std = sqrt(variance)
-            posterior, residuals = posterior.divided_by(std), residuals.divided_by(std)
-            enlarged = softmax(first.samples.misfit.least * -0.5 / variance, axis=1)
+            least_before = least_misfit(rounds)
+            variance = excess_variance(least_before, limit, family.targets)
+            enlarged = softmax(first.samples.misfit.least * (-0.5 / variance), axis=1)
             again = _moments(first_samples, enlarged, least)
             moments = where(variance > 1.0, again, moments)
         points = cholesky_columns(moments, unknowns) @ draws.others
-        samples, current = _adapted_round(family, residuals, posterior, points, draws)
+        samples, current = _adapted_round(family, residuals, posterior, points, draws, variance)
         rounds.append(current)
-    misfit = minimum(least_misfit(rounds[:-1]), least_misfit(rounds[-1:]) * variance)
+    assert variance is not None
+    misfit = minimum(least_before, least_misfit(rounds[-1:]))
     # the rounds before the last are samples of the posterior with the noise as it was given
-    weights = pooled_weights(rounds, floor(1.0 / variance))
+    weights = pooled_weights(rounds, sizes, floor(1.0 / variance))
     return [concat([r.points for r in rounds], axis=1), weights, misfit]
 
 
@@ -229,7 +232,7 @@ def _moments(samples: Value, weights: Value, floor: Floats) -> Value:
     return gemm(samples * weights, samples, floor, transpose_b=True)
 
 
-def pooled_weights(rounds: Sequence[WeightedRound], of_earlier: Value) -> Value:
+def pooled_weights(rounds: Sequence[WeightedRound], sizes: SampleSizes, of_earlier: Value) -> Value:
     r"""Weights (1, n) of the points of all rounds, in proportion to effective sample sizes, sum 1.
 
     .. math:: n_{eff} = \frac{1}{\sum_i w_i^2}
@@ -238,21 +241,30 @@ def pooled_weights(rounds: Sequence[WeightedRound], of_earlier: Value) -> Value:
     of another distribution. The last round keeps its weight even if it had to be tempered: too wide
     an interval is safer than one that rests on a few samples. Weights of the others are multiplied
     by `of_earlier`.
+
+    All rounds are treated at once, as rows of as many points as divide the sizes of all.
     """
     weights, powers = zip(*(r.tempered_weights() for r in rounds), strict=True)
-    squares = concat([own.sum_of_squares(keepdims=True) for own in weights], axis=1)
-    earlier = floor(concat(powers[:-1], axis=1)) * of_earlier
-    used = concat([earlier, constant(earlier.graph, np.ones((1, 1)))], axis=1)
-    sizes = used / squares  # (1, rounds)
-    shares = sizes / sizes.sum(keepdims=True)
-    parts = zip(weights, shares.split(len(rounds), axis=1), strict=True)
-    return concat([own * share for own, share in parts], axis=1)
+    unit = math.gcd(sizes.prior, sizes.adapted)
+    rows = [sizes.prior // unit, *[sizes.adapted // unit] * sizes.rounds]
+    round_of_row = np.repeat(np.arange(len(rounds)), rows)
+    own = concat(weights, axis=1).reshape(-1, unit)
+    same_round = (round_of_row[:, None] == round_of_row).astype(float)
+    # (rows, 1), of the whole round
+    squares: Value = same_round @ own.sum_of_squares(axis=1, keepdims=True)
+    earlier = [powers[k] for k in round_of_row if k < len(rounds) - 1]
+    last = constant(of_earlier.graph, np.ones((rows[-1], 1)))
+    used = concat([floor(concat(earlier, axis=0)) * of_earlier, last], axis=0)
+    effective = used / squares
+    total: Value = (1.0 / same_round.sum(axis=0))[None] @ effective
+    return (own * (effective / total)).reshape(1, -1)
 
 
 def least_misfit(rounds: Sequence[WeightedRound]) -> Value:
     """The least sum of squared residuals of all points, (1,)."""
-    misfits = concat([r.misfit.least for r in rounds], axis=1)
-    return misfits.reduce("ReduceMin", keepdims=False).reshape(1)
+    first, *others = (r.misfit.least for r in rounds)
+    misfits = concat([first, *others], axis=1) if others else first
+    return misfits.reduce("ReduceMin", axis=1, keepdims=False)
 
 
 def excess_variance(misfit: Value, limit: Value, unknowns: int) -> Value:
@@ -269,17 +281,21 @@ def excess_variance(misfit: Value, limit: Value, unknowns: int) -> Value:
 
 
 def _prior_round(
-    family: WheelFamily, residuals: PolynomialResiduals, draws: ProposalDraws
+    family: WheelFamily,
+    order: tuple[int, ...],
+    along_solved: ResidualsAtFixedPoints,
+    draws: ProposalDraws,
 ) -> WeightedRound:
     """The round whose other coordinates are draws of the prior."""
-    residual, slope = residuals.at_fixed_points(draws.others)
     ones = np.ones((1, len(draws.t)))
-    others = constant(residual.graph, np.concatenate([ones, draws.others[:-1]]))
-    mode, precision = gauss_newton(constant(residual.graph, 0.0), residual, slope)
-    for _ in range(PRIOR_STEPS - 1):
-        mode, precision = residuals.step(concat([others, mode], axis=0), mode)
-    one = OneSystem(residuals.system)
-    return sample_round(residuals, family.axes, [others], (mode, precision), draws, one)
+    graph = along_solved.higher.graph
+    others = constant(graph, np.concatenate([ones, draws.others[:-1]]))
+
+    def misfit_at(_: Value, solved: Value) -> PointMisfit:
+        return PointMisfit.of_noise_alone(along_solved.residuals(solved))
+
+    tilts = [family.axes[i].tilt for i in order]
+    return sample_round(tilts, [others], along_solved.steps(PRIOR_STEPS), draws, misfit_at)
 
 
 def _adapted_round(
@@ -288,10 +304,12 @@ def _adapted_round(
     posterior: OneSystem | ScaleMixture,
     proposal: Value,
     draws: ProposalDraws,
+    variance: Value | None,
 ) -> tuple[Value, WeightedRound]:
     """Samples (1 + p, n) as 1 and their unbounded coordinates, and the round drawn from them.
 
-    `proposal` (1 + p, n) has 1, the unbounded coordinates, and the solved one by linear regression.
+    `proposal` (1 + p, n) has 1, the unbounded coordinates, and the solved one by linear regression;
+    `variance` (1,) is that of the noise over the one that was given, where it may be another.
     """
     _, unbounded, mode = proposal.split([1, len(residuals.order) - 1, 1], axis=0)
     bounded = tanh(unbounded)
@@ -299,7 +317,12 @@ def _adapted_round(
     ones = constant(bounded.graph, np.ones((1, len(draws.t))))
     for _ in range(ADAPTED_STEPS):
         points = concat([ones, bounded, within_box(mode)], axis=0)
-        mode, precision = residuals.step(points, mode)
+        mode, precision = residuals.step(points, mode, variance)
+
+    def misfit_at(points: Value, _: Value) -> PointMisfit:
+        return posterior.misfit(residuals.basis(points), variance)
+
+    tilts = [family.axes[i].tilt for i in residuals.order]
     others, solved = [ones, bounded], (mode, precision)
-    current = sample_round(residuals, family.axes, others, solved, draws, posterior, log_jacobian)
+    current = sample_round(tilts, others, solved, draws, misfit_at, log_jacobian)
     return concat([ones, unbounded, current.solved], axis=0), current

@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
+from soilml.onboard.set_contract import (
+    COMMON_ERROR_INPUTS,
+    MODEL_ERROR_COLUMNS,
+    SENSOR_ERROR_COLUMNS,
+)
 from training.onnx_graph.value import Value, concat
 from training.set_posterior.error_scales import ErrorScales
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
@@ -42,13 +46,17 @@ class Likelihood:
     response: Response
     context: ContextValues
     readings: SetReadings
+    #: columns of earlier readings: of monomials, errors of sensors and of the model
+    earlier: tuple[Value, ...]
 
     @staticmethod
     def of(
         family: WheelFamily, response: Response, context: ContextValues, readings: SetReadings
     ) -> Likelihood:
         """With all unknowns of a family of wheels, and all terms of its response."""
-        return Likelihood(family, response, context, readings)
+        parts = [len(response.terms), OF_SENSORS, OF_MODEL]
+        earlier = readings.state.split(parts, axis=1)
+        return Likelihood(family, response, context, readings, tuple(earlier))
 
     @property
     def noise_alone(self) -> Value:
@@ -56,9 +64,12 @@ class Likelihood:
 
         Errors of the model, of slip and load, and those that readings share change with the soil.
         """
-        _, of_sensors, _ = self._state()
-        sizes = [of_sensors.sum_of_squares(), self.readings.size * self.readings.size]
-        return self.readings.rows.sensor_errors.size.node("Sum", *sizes) <= 0.0
+        errors = self.readings.rows.sensor_errors
+        shared = concat([errors.readings[name] for name in COMMON_ERROR_INPUTS], axis=0)
+        others = (errors.operating.stds, self.earlier[1], shared)
+        squares = [value.sum_of_squares(keepdims=True) for value in others]
+        of_torque = errors.readings["torque_bias"].sum_of_squares(keepdims=True)
+        return of_torque.node("Sum", *squares) <= 0.0
 
     def rows_of_noise_alone(self) -> Value:
         """Rows (m, terms) of new readings that have noise alone."""
@@ -66,7 +77,7 @@ class Likelihood:
 
     def with_noise_alone(self, rows: Value) -> Value:
         """Residuals (m, terms) of readings that have noise alone, with these new rows."""
-        return concat([self._state()[0], rows], axis=0)
+        return concat([self.earlier[0], rows], axis=0)
 
     def grown(self, rows: Value) -> Value:
         """The state with these rows, which have no errors."""
@@ -95,7 +106,3 @@ class Likelihood:
         system = concat([whole, model, sensors], axis=1)
         system = integrate_out_sensor_errors(system, terms + OF_MODEL)
         return self.readings.mixture_of(system, terms), grown
-
-    def _state(self) -> list[Value]:
-        """Columns of earlier readings: of monomials, errors of sensors and of the model."""
-        return self.readings.state.split([len(self.response.terms), OF_SENSORS, OF_MODEL], axis=1)

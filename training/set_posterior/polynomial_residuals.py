@@ -7,6 +7,7 @@ from functools import reduce
 from operator import mul
 
 import numpy as np
+from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from training.onnx_graph.value import Value, concat, constant, exp, gemm, log
@@ -68,23 +69,17 @@ class PolynomialResiduals:
         """The residuals of another system (m, terms)."""
         return PolynomialResiduals.solved_last(system, self.terms, self.order)
 
-    def divided_by(self, std: Value) -> PolynomialResiduals:
-        """For noise whose standard deviation is larger by a factor (1,)."""
-        return self.with_system(self.system / std)
-
-    def at_fixed_points(self, points: Floats) -> tuple[Value, Value]:
-        """Residuals and their derivative (m, n) at fixed coordinates (p, n), in this order."""
-        basis = monomials(points[np.argsort(self.order)].T, self.terms).T
-        return self.system @ basis, self.slope @ basis[list(self.slope_terms)]
-
-    def step(self, points: Value, solved: Value) -> tuple[Value, Value]:
+    def step(
+        self, points: Value, solved: Value, variance: Value | None = None
+    ) -> tuple[Value, Value]:
         """The solved coordinate after a Gauss-Newton step, and its precision, (1, n) each.
 
-        `points` (1 + p, n) lie in the box; the last coordinate is the solved one.
+        `points` (1 + p, n) lie in the box; the last coordinate is the solved one. `variance`: see
+        `gauss_newton`.
         """
         basis = self.basis(points)
         slope = self.slope @ basis.take(self.slope_terms, axis=0)
-        return gauss_newton(solved, self.system @ basis, slope)
+        return gauss_newton(solved, self.system @ basis, slope, variance)
 
     def basis(self, points: Value) -> Value:
         """Monomials (terms, n) at points (1 + p, n), as products of pairs of coordinates."""
@@ -100,7 +95,83 @@ class PolynomialResiduals:
         return reduce(mul, per_term)
 
 
-def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, Value]:
+@dataclass(frozen=True)
+class ResidualsAtFixedPoints:
+    r"""Residuals along the solved coordinate s, at points whose other coordinates are constants.
+
+    .. math:: r(s) = r_0 + r_1 s + A_2 (m \circ s^k), \qquad
+        r'(s) = r_1 + A_2 (k m \circ s^{k-1}), \qquad k \ge 2
+
+    with the columns of the system by their power k of s, and the monomials m of the others: the
+    products of most columns are the same for all s.
+    """
+
+    constant_part: Value  # r_0, (m, n)
+    linear_part: Value  # r_1, (m, n)
+    higher: Value  # A_2, (m, terms of higher powers)
+    higher_slope: Value  # its columns times their powers
+    monomials: Floats  # (terms, n) of the other coordinates
+    powers: NDArray[np.intp]  # (terms,) of the solved coordinate
+
+    @staticmethod
+    def of(residuals: PolynomialResiduals, others: Floats) -> ResidualsAtFixedPoints:
+        """At other coordinates (p - 1, n), in their order."""
+        solved = residuals.order[-1] + 1
+        powers = np.asarray([term.count(solved) for term in residuals.terms])
+        points = np.concatenate([others, np.ones_like(others[:1])])[np.argsort(residuals.order)]
+        of_others = monomials(points.T, residuals.terms).T
+        places = [np.flatnonzero(powers == power) for power in (0, 1)]
+        places.append(np.flatnonzero(powers > 1))
+        by_power = residuals.system.take(np.concatenate(places).tolist(), axis=1)
+        none, one, higher = by_power.split([len(own) for own in places], axis=1)
+        return ResidualsAtFixedPoints(
+            none @ of_others[places[0]],
+            one @ of_others[places[1]],
+            higher,
+            higher * powers[places[2]],
+            of_others,
+            powers,
+        )
+
+    def steps(self, count: int) -> tuple[Value, Value]:
+        """The solved coordinate after so many Gauss-Newton steps from 0, and its precision."""
+        zero = constant(self.higher.graph, 0.0)
+        solved, precision = gauss_newton(zero, self.constant_part, self.linear_part)
+        for _ in range(count - 1):
+            slope = gemm(self.higher_slope, self._higher_monomials(solved), self.linear_part)
+            solved, precision = gauss_newton(solved, self.residuals(solved), slope)
+        return solved, precision
+
+    def residuals(self, solved: Value) -> Value:
+        """Residuals (m, n) at solved coordinates (1, n)."""
+        linear = self.constant_part + self.linear_part * solved
+        return gemm(self.higher, self._higher_monomials(solved) * solved, linear)
+
+    def basis(self, solved: Value) -> Value:
+        """Monomials (terms, n) at solved coordinates (1, n)."""
+        ones = constant(solved.graph, np.ones((1, self.monomials.shape[1])))
+        table = concat([ones, *self._powers(solved, int(self.powers.max()))], axis=0)
+        return table.take(self.powers.tolist(), axis=0) * self.monomials
+
+    def _higher_monomials(self, solved: Value) -> Value:
+        """Monomials of higher powers k of the solved coordinate with its power k - 1."""
+        chosen = self.powers > 1
+        table = concat(self._powers(solved, int(self.powers.max()) - 1), axis=0)
+        rows = (self.powers[chosen] - 2).tolist()
+        return table.take(rows, axis=0) * self.monomials[chosen]
+
+    @staticmethod
+    def _powers(solved: Value, last: int) -> list[Value]:
+        """The powers 1 to `last` of coordinates (1, n)."""
+        found = [solved]
+        while len(found) < last:
+            found.append(found[-1] * solved)
+        return found
+
+
+def gauss_newton(
+    solved: Value, residual: Value, slope: Value, variance: Value | None = None
+) -> tuple[Value, Value]:
     r"""A Gauss-Newton step in one unknown, for n points at once.
 
     .. math:: \kappa = |r'|^2 + \sigma_0^{-2}, \qquad s \leftarrow s - \frac{r^T r'}{\kappa}
@@ -108,10 +179,15 @@ def gauss_newton(solved: Value, residual: Value, slope: Value) -> tuple[Value, V
     with r the residuals and r' their derivative (m, n), and the damping :math:`\sigma_0`.
     Steps stay within the box.
 
+    variance: That of the noise (1,) over the one of the residuals, where it is not 1.
+
     Returns: The new s and the precision kappa of its conditional posterior, (1, n) each.
     """
-    precision = slope.sum_of_squares(axis=0, keepdims=True) + DAMPING_STD**-2
+    square = slope.sum_of_squares(axis=0, keepdims=True)
     gradient = (residual * slope).sum(axis=0, keepdims=True)
+    if variance is not None:
+        square, gradient = square / variance, gradient / variance
+    precision = square + DAMPING_STD**-2
     return within_box(solved - gradient / precision), precision
 
 

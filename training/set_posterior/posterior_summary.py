@@ -34,7 +34,7 @@ LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is 
 
 
 def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> Value:
-    r"""The quantiles (q, 2) at `INTERVAL` of q deviations from a mean.
+    r"""The quantiles (2, q) at `INTERVAL` of q deviations from a mean.
 
     The weighted distribution function F is evaluated at multiples :math:`g_i` of the spacing h, and
     inverted by linear interpolation. The weight of a sample at :math:`d_j` is shared by the grid
@@ -54,14 +54,14 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
     parameter's samples would take longer than the rest of the graph.
 
     deviations: Deviations from the mean, (q, n).
-    std: Their standard deviations, (q, 1).
+    std: Their standard deviations, (q,).
     weights: Weights (1, n) with sum 1.
     count: n.
     """
     segments = len(DISTANCES) - 1
     grid = np.concatenate([-DISTANCES[::-1], DISTANCES]) / SPACING
     spacing = std * SPACING
-    relative = (deviations / spacing).reshape(0, 1, -1)
+    relative = (deviations / spacing.reshape(-1, 1)).reshape(0, 1, -1)
     below = ((grid + 0.5)[:, None] - relative).clip(0.0, 1.0)
     flat = below.reshape(-1, count)  # (q * grid points, n)
     distribution = gemm(weights, flat, transpose_b=True).reshape(-1, len(grid))
@@ -77,8 +77,11 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
             of_end[segment, end] = 1.0
     remaining = gemm(distribution, minus_start, np.repeat(INTERVAL, segments))
     passed = remaining / maximum(distribution @ increment, LEAST_SHARE)
-    first_points = grid[[0, segments + 1]]
-    return gemm(passed.clip(0.0, 1.0), of_end, first_points) * spacing
+    first_points = grid[[0, segments + 1]][:, None]
+    whole = gemm(
+        constant(std.graph, of_end.T), passed.clip(0.0, 1.0), first_points, transpose_b=True
+    )
+    return whole * spacing
 
 
 ZERO_FACTOR = 1e-30  # Stands for a factor of zero, of which the logarithm is taken
@@ -104,39 +107,40 @@ def add_posterior_outputs(
     q = family.targets
     # onnxruntime takes half the time for one row times a matrix than for a matrix times one column
     value = _parameters(family, sample)
-    mean = gemm(sample.weights, value, transpose_b=True).reshape(q, 1)
-    deviation = value - mean
+    mean = gemm(sample.weights, value, transpose_b=True)  # (1, q)
+    deviation = value - mean.reshape(q, 1)
+    mean = mean.reshape(q)
     covariance = gemm(deviation * sample.weights, deviation, transpose_b=True)
-    variance = (covariance * np.eye(q)).sum(axis=1, keepdims=True)
+    variance = (covariance * np.eye(q)).sum(axis=0, keepdims=False)
     std = sqrt(variance)
     interval = mean + add_quantiles(deviation, std, sample.weights, sample.count)
     enough = consistency.enough
     consistent = enough & (sample.misfit <= consistency.limit)
     consistent = consistent.named(f"{prefix}{SET_PREFIX}in_range")
-    prior = prior_summary(family)
+    prior, scale = prior_summary(family), context.target_scale
     names = ("mean", "std", "low", "high")
-    estimated = concat([mean, std, interval], axis=1)  # (q, 4)
-    fallback = np.stack([prior[name] for name in names], axis=1)
-    chosen, scale = where(enough, estimated, fallback), context.target_scale
+    # one vector, whose parts are the outputs: onnxruntime takes two nodes for each row of a matrix
+    estimated = concat([mean, std, interval.reshape(-1)], axis=0)
+    chosen = where(enough, estimated, np.concatenate([prior[name] for name in names]))
     if scale is not None:
-        chosen = chosen * scale
-    for place, name in enumerate(names):
-        chosen.node("Gather", chosen.number(place), axis=1).named(f"{prefix}{SET_PREFIX}{name}")
+        chosen = chosen * concat([scale] * len(names), axis=0)
+    for name, part in zip(names, chosen.split(len(names), axis=0), strict=True):
+        part.named(f"{prefix}{SET_PREFIX}{name}")
     chosen = where(enough, covariance, np.diag(prior["std"] ** 2))
     if scale is not None:
-        chosen = chosen * gemm(scale, scale, transpose_b=True)
+        chosen = chosen * (scale * scale.reshape(-1, 1))
     chosen.named(f"{prefix}{SET_PREFIX}covariance")
     _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
-    vague = std > NOT_IDENTIFIED_ABOVE * prior["std"][:, None]
-    (vague | ~consistent).reshape(q).named(f"{prefix}{SET_PREFIX}abstains")
+    vague = std > NOT_IDENTIFIED_ABOVE * prior["std"]
+    (vague | ~consistent).named(f"{prefix}{SET_PREFIX}abstains")
     sample.misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
 
 
 def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:
     """Whether a mean is within `EDGE_STDS` standard deviations of an end of its prior, (q,)."""
     ends = np.asarray([axis.ends for axis in family.axes[: family.targets]])
-    middle, half = ends.mean(axis=1, keepdims=True), 0.5 * np.diff(ends, axis=1)
-    return (absolute(mean - middle) + std * EDGE_STDS > half).reshape(family.targets)
+    middle, half = ends.mean(axis=1), 0.5 * np.diff(ends, axis=1)[:, 0]
+    return absolute(mean - middle) + std * EDGE_STDS > half
 
 
 def prior_summary(family: WheelFamily) -> dict[str, Floats]:

@@ -108,8 +108,8 @@ def add_residual_rows(
     """
     context = family.add_context(readings)
     operating, outside = _operating(readings), _outside(response, context.features)
-    within = _all_below(response, outside)  # (1, rows) float32
-    in_range = within.astype(np.bool_).reshape(-1)
+    within = _all_below(response, outside)  # (rows,) float32
+    in_range = within.astype(np.bool_)
     one = constant(outside.graph, 1.0)
     sinkage = maximum(readings["sinkage"], SMALLEST)
     per_load = one / readings["load"]
@@ -121,19 +121,20 @@ def add_residual_rows(
     most_noise = np.asarray([[context.most_torque_noise], [MOST_RELATIVE_NOISE], [MOST_PULL_NOISE]])
     used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
     weight = used / sqrt(noise * noise + response.error[:, None] ** 2)
+    used = used.reshape(-1)
     values = response.add_to(context.features, y, context.feature_slopes, once=small)
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
     outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)
     exact = operating.stds.reduce("ReduceMax") <= 0.0
     counts = [
-        used.sum().reshape(1),
+        used.sum(),
         in_range.node("Shape").astype(np.float32),
-        _all_below(response, outside_noise).sum().reshape(1),
+        _all_below(response, outside_noise).sum(),
     ]
     return context, ResidualRows(
         weight=weight.reshape(1, -1),
-        used=used.reshape(-1).astype(np.bool_),
+        used=used.astype(np.bool_),
         values=values,
         sensor_errors=SensorErrors(context, readings, operating, y, slope, exact),
         model_errors=ModelErrors(family, response, context, readings, slope),
@@ -155,10 +156,10 @@ def _outside(response: Response, features: Value) -> Value:
 
 
 def _all_below(response: Response, distance: Value) -> Value:
-    """1 where all distances (f, rows) are within the box of the designs, else 0, (1, rows).
+    """1 where all distances (f, rows) are within the box of the designs, else 0, (rows,).
 
     Distances that are not numbers, of a wheel without size, are not.
     """
     half_width = (0.5 + BOX_TOLERANCE) * (response.upper - response.lower)
     inside = (distance <= half_width[:, None]).astype(np.float32)
-    return inside.reduce("ReduceMin", axis=0, keepdims=True)
+    return inside.reduce("ReduceMin", axis=0, keepdims=False)

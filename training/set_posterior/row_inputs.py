@@ -124,7 +124,8 @@ def _stacked(by_row: Sequence[Value], rows: Value) -> Value:
 
 def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
     """Slip and load as they are, channels and standard deviations without markers, (1, rows)."""
-    std = stacked.split([len(READING_INPUTS), len(ROW_STDS)], axis=0)[1]
+    k, others = len(RESPONSE_CHANNELS), len(ROW_STDS) - len(RESPONSE_CHANNELS)
+    operating, _, std = stacked.split([len(OPERATING_NOISE), k, len(ROW_STDS)], axis=0)
     read = [ROWS.index(_reading_of(name)) for name in ROW_STDS]
     reading = stacked.take(read, axis=0)  # (stds, rows)
     parts = np.asarray([_noise_of(name, noise) for name in ROW_STDS])
@@ -138,9 +139,8 @@ def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
     std = where(marked | (std >= ABSENT_STD), no_weight, std)
     channels = where(marked, constant(std.graph, ABSENT_READING), reading)
     channels = channels.clip(-LARGEST_READING, LARGEST_READING)
-    k, others = len(RESPONSE_CHANNELS), len(ROW_STDS) - len(RESPONSE_CHANNELS)
     groups = [
-        (OPERATING_NOISE, stacked.take([0, 1], axis=0)),
+        (OPERATING_NOISE, operating),
         (RESPONSE_CHANNELS, channels.split([k, others], axis=0)[0]),
     ]
     of_channels, bias, of_operating = std.split([k, 1, others - 1], axis=0)

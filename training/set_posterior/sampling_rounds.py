@@ -7,7 +7,7 @@ faster (Owen, Monte Carlo theory, methods and examples, chapter 15).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,10 +27,10 @@ from training.onnx_graph.value import (
     softmax,
     sqrt,
 )
-from training.set_posterior.families.coordinates import NORMAL_TRUNCATION, PriorAxis
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import WheelFamily
-from training.set_posterior.polynomial_residuals import PolynomialResiduals, within_box
-from training.set_posterior.scale_mixture import OneSystem, PointMisfit, ScaleMixture
+from training.set_posterior.polynomial_residuals import within_box
+from training.set_posterior.scale_mixture import PointMisfit
 
 #: Degrees of freedom of the t distributions: tails heavier than those of a normal distribution keep
 #: the importance weights bounded where the posterior has heavier tails than its normal
@@ -136,7 +136,6 @@ class WeightedRound:
 
     points: Value  # (1 + p, n) limited to the box
     solved: Value  # (1, n) their last coordinate
-    basis: Value  # (terms, n) monomials of the points
     boxed_log_weight: Value  # (1, n) of the points as limited to the box
     log_weight: Value  # (1, n) vanishing weight for samples outside of the box
     misfit: PointMisfit  # by scale of the model's errors
@@ -148,12 +147,11 @@ class WeightedRound:
 
 
 def sample_round(
-    residuals: PolynomialResiduals,
-    axes: tuple[PriorAxis, ...],
+    tilts: Sequence[float],
     others: Sequence[Value],
     solved: tuple[Value, Value],
     draws: ProposalDraws,
-    posterior: OneSystem | ScaleMixture,
+    misfit_at: Callable[[Value, Value], PointMisfit],
     log_jacobian: Value | None = None,
 ) -> WeightedRound:
     r"""Draw the solved coordinate around its conditional mode, and weigh the samples.
@@ -166,29 +164,27 @@ def sample_round(
     up to constants, with t a draw of the t distribution and c the scale of the proposal. The last
     sum is there if the other coordinates are hyperbolic tangents of the draws z.
 
-    residuals: The system of the set along the solved coordinate.
-    axes: The axes of the family, whose `tilt` is the lambda of their prior.
+    tilts: The lambda of the prior of each coordinate, in their order.
     others: 1, and the other coordinates, within the box: rows that make up (p, n).
     solved: Mode and precision of the solved coordinate given the others, (1, n) each.
     draws: The draws t of the round, and the log density of all draws.
-    posterior: The likelihood.
+    misfit_at: The likelihood of points (1 + p, n), whose last coordinate is (1, n).
     log_jacobian: log(1 - x_i^2) of the other coordinates (p - 1, n).
     """
     mode, precision = solved
     proposed = mode + PROPOSAL_SCALE * draws.t[None] / sqrt(precision)
     inside = within_box(proposed)
     points = concat([*others, inside], axis=0)
-    basis = residuals.basis(points)
-    misfit = posterior.misfit(basis)
+    misfit = misfit_at(points, inside)
     distance = absolute(proposed - inside)
     # one matrix product adds up the parts of the log weight, with these coefficients
     parts = [
-        (points, [0.0, *[axes[i].tilt for i in residuals.order]]),
+        (points, [0.0, *tilts]),
         (log(precision), [-0.5]),
         (misfit.log_likelihood, [1.0 / misfit.multiple]),
     ]
     if log_jacobian is not None:
-        parts.append((log_jacobian, [1.0] * (len(residuals.order) - 1)))
+        parts.append((log_jacobian, [1.0] * (len(tilts) - 1)))
     stacked = concat([*[part for part, _ in parts], distance], axis=0)
     coefficients = [coefficient for _, of_part in parts for coefficient in of_part]
     both = gemm(
@@ -197,7 +193,7 @@ def sample_round(
         -draws.log_density,
     )
     boxed_log_weight, log_weight = both.split(2, axis=0)
-    return WeightedRound(points, inside, basis, boxed_log_weight, log_weight, misfit)
+    return WeightedRound(points, inside, boxed_log_weight, log_weight, misfit)
 
 
 def tempering_power(log_weight: Value) -> Value:

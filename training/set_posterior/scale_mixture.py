@@ -22,6 +22,12 @@ class PointMisfit:
     log_likelihood: Value  # (1, n) up to a constant, and as this multiple of it:
     multiple: float
 
+    @staticmethod
+    def of_noise_alone(residuals: Value, variance: Value | None = None) -> PointMisfit:
+        """Of residuals (m, n) that have this variance (1,), or 1."""
+        squares = residuals.sum_of_squares(axis=0, keepdims=True)
+        return PointMisfit(squares, squares if variance is None else squares / variance, -2.0)
+
 
 @dataclass(frozen=True)
 class ScaledMisfit(PointMisfit):
@@ -37,18 +43,13 @@ class OneSystem:
 
     system: Value  # A, (m, terms)
 
-    def misfit(self, basis: Value) -> PointMisfit:
-        """At points with these monomials (terms, n)."""
-        squares = (self.system @ basis).sum_of_squares(axis=0, keepdims=True)
-        return PointMisfit(squares, squares, multiple=-2.0)
+    def misfit(self, basis: Value, variance: Value | None = None) -> PointMisfit:
+        """At points with these monomials (terms, n), with noise of this variance (1,), or 1."""
+        return PointMisfit.of_noise_alone(self.system @ basis, variance)
 
     def proposal(self, like: PolynomialResiduals, *_: object) -> PolynomialResiduals:
         """The system for proposals: the same in all rounds."""
         return like
-
-    def divided_by(self, std: Value) -> OneSystem:
-        """For noise whose standard deviation is larger by a factor (1,)."""
-        return OneSystem(self.system / std)
 
 
 @dataclass(frozen=True)
@@ -77,19 +78,15 @@ class ScaleMixture:
         whole = [self.systems * nearly_known.factors, constant(self.systems.graph, prior)]
         return replace(self, systems=concat(whole, axis=1))
 
-    def divided_by(self, std: Value) -> ScaleMixture:
-        """For noise whose standard deviation is larger by a factor (1,)."""
-        common = None if self.common is None else self.common / std
-        return replace(self, systems=self.systems / std, common=common)
-
-    def misfit(self, basis: Value) -> ScaledMisfit:
-        """At points with these monomials (terms, n)."""
+    def misfit(self, basis: Value, variance: Value | None = None) -> ScaledMisfit:
+        """At points with these monomials (terms, n), with noise of this variance (1,), or 1."""
         residuals = self.systems @ basis
         # onnxruntime takes three times as long for sums of squares over the middle of three axes
         squares = (residuals * residuals).sum(axis=1, keepdims=False)
         if self.common is not None:
             squares = squares + (self.common @ basis).sum_of_squares(axis=0, keepdims=True)
-        log_parts = squares * -0.5 + self.log_weight
+        of_squares = -0.5 if variance is None else -0.5 / variance
+        log_parts = squares * of_squares + self.log_weight
         largest = log_parts.reduce("ReduceMax", axis=0, keepdims=True)
         parts = exp(log_parts - largest)
         total = parts.sum(axis=0, keepdims=True)

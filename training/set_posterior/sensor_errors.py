@@ -11,7 +11,6 @@ from soilml.onboard.set_contract import (
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
     SENSOR_ERROR_COLUMNS,
-    SENSOR_ERROR_INPUTS,
 )
 from training.onnx_graph.value import Value, concat, constant, gemm, shortcut, sqrt
 from training.set_posterior.families.wheel_family import ContextValues
@@ -38,14 +37,6 @@ class SensorErrors:
     y: Value  # readings on the scales of the channels, (channels, rows)
     slope: Value  # derivatives of these scales by the readings, (channels, rows)
     exact: Value  # (1, 1) whether no row has errors of slip and load of its own
-
-    @property
-    def size(self) -> Value:
-        """A number (1, 1) that is zero without errors, also if there are no rows, else larger."""
-        shared = concat([self.readings[name] for name in SENSOR_ERROR_INPUTS], axis=0)
-        of_set = shared.sum_of_squares(keepdims=True)
-        of_rows = self.readings["torque_bias"].sum_of_squares(keepdims=True)
-        return of_rows.node("Sum", self.operating.stds.sum_of_squares(keepdims=True), of_set)
 
     def of_residuals(self, slopes: Value) -> Value:
         r"""Derivatives (2, channels, rows) of residuals by log slip and log load.

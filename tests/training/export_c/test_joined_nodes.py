@@ -72,20 +72,6 @@ def test_sums_of_a_gauss_newton_step_are_one_node_of_fewer_rows():
     assert list(made[2].input[:3]) == ["a_factor", "b", "a_factor"]
 
 
-def test_rows_of_zeros_of_constant_points_are_left_out():
-    known = known_of(
-        picked=[2, 0], factors=np.float32([1.0, 2.0]), rows=[0],
-        b=np.float32([[1, 1], [0, 0], [3, 3]]), d=np.float32([[0, 0], [4, 4]]),
-    )  # fmt: skip
-    nodes = [node("Neg", ["given"], ["a"]), *gauss_newton("b", "d")]
-    *_, columns, sums = joined(nodes, known, ["sums"])
-    assert known[columns.input[1]].value.tolist() == [0, 2]
-    assert known[sums.input[1]].value.tolist() == [[1, 1], [3, 3]]
-    assert known[sums.input[3]].value.tolist() == [[4, 4]]
-    assert known[sums.input[4]].value.tolist() == [0]
-    assert known[sums.input[5]].value.tolist() == [2.0]
-
-
 def test_what_is_computed_twice_is_computed_once():
     nodes = [
         node("Exp", ["x"], ["one"]),

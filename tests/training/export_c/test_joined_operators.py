@@ -42,6 +42,7 @@ CONSTANTS = {
     "picked": np.array([4, 1]),
     "factors": np.array([2.0, -0.5], np.float32),
     "rows": np.array([0]),
+    "one_empty": COLUMNS * np.array([0.0, 1.0], np.float32),
 }
 NODES = [
     helper.make_node(ROWS, [basis, "left", "right"], ["products"]),
@@ -59,9 +60,13 @@ NODES = [
     helper.make_node(FACTOR, ["apart"], ["rest", "top"], skipped=ERRORS),
     helper.make_node(SQUARES, ["top", "matrices", "rest", monomials], ["by_scale"]),
     helper.make_node(MEAN, ["top", "matrices", shares], ["mean"]),
+    helper.make_node(APART, [many, "one_empty", sizes], ["apart_0", "matrices_0", "n0", "n1"],
+                     errors=ERRORS),
+    helper.make_node(FACTOR, ["apart_0"], ["rest_0", "top_0"], skipped=ERRORS),
+    helper.make_node(SQUARES, ["top_0", "matrices_0", "rest_0", monomials], ["without_one"]),
 ]  # fmt: skip
 OUTPUTS = ["products", "squares", "gradients", "integrated", "d0", "d1", "of_rows", "matrices",
-           "e0", "e1", "top", "by_scale", "mean"]  # fmt: skip
+           "e0", "e1", "top", "by_scale", "mean", "without_one"]  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -125,14 +130,19 @@ def test_fewer_rows_have_the_same_sums_of_squares(found):
     agrees(found["of_rows"], ((MANY @ MONOMIALS) ** 2).sum(axis=0))
 
 
-def test_errors_apart_have_the_squares_of_each_scale(found):
+@pytest.mark.parametrize(
+    ("name", "columns"), [("by_scale", COLUMNS), ("without_one", CONSTANTS["one_empty"])]
+)
+def test_errors_apart_have_the_squares_of_each_scale(found, name, columns):
+    """Also where no reading has one of the errors."""
     for scale, size in enumerate(SIZES[:, 0]):
-        errors = COLUMNS * size
+        errors = columns * size
         whole = np.eye(len(MANY)) + errors @ errors.T
         residuals = MANY @ MONOMIALS
         expected = (residuals * np.linalg.solve(whole, residuals)).sum(axis=0)
-        agrees(found["by_scale"].reshape(3, -1)[scale], expected)
-        agrees(found["e0"][scale] * found["e1"][scale], np.linalg.det(whole))
+        agrees(found[name].reshape(3, -1)[scale], expected)
+        if name == "by_scale":
+            agrees(found["e0"][scale] * found["e1"][scale], np.linalg.det(whole))
 
 
 def test_the_mean_of_scales_is_that_of_the_first_rows(found):

@@ -23,7 +23,7 @@ OTHERS = np.concatenate([np.ones((1, POINTS)), RNG.uniform(-1, 1, (2, POINTS))])
 SOLVED = RNG.uniform(-1, 1, (1, POINTS)).astype(np.float32)
 SLOPES = np.flatnonzero(POWERS)
 CONSTANTS = {
-    "others": OTHERS,
+    "ones": OTHERS[:1],
     "left": LEFT,
     "right": RIGHT,
     "first": FIRST,
@@ -52,16 +52,10 @@ def made(request, tmp_path_factory):
     """The text of a C function, and its outputs by name; with 16 and with 8 points at a time."""
     if not COMPILERS:
         pytest.skip("no C compiler")
-    at_zero = np.zeros_like(SOLVED)
-    constants = CONSTANTS | {
-        "basis_0": monomials_at(at_zero).astype(np.float32),
-        "slopes_0": slopes_at(at_zero).astype(np.float32),
-        "slopes": slopes_at(SOLVED).astype(np.float32),
-    }
+    constants = CONSTANTS | {"slopes": slopes_at(SOLVED).astype(np.float32)}
     node = helper.make_node
     nodes = [
-        node(SUMS, ["system", "basis_0", "system", "slopes_0", "picked", "powers"], ["s0", "p0"]),
-        node("Concat", ["others", "solved"], ["points"], axis=0),
+        node("Concat", ["ones", "others", "solved"], ["points"], axis=0),
         node(ROWS, ["points", "left", "right"], ["pairs"]),
         node(ROWS, ["pairs", "first", "second"], ["basis"]),
         node(SUMS, ["system", "basis", "system", "slopes", "picked", "powers"], ["s1", "p1"]),
@@ -71,8 +65,14 @@ def made(request, tmp_path_factory):
         node(FACTOR, ["apart"], ["rest", "top"], skipped=2),
         node(SQUARES, ["top", "shares", "rest", "basis"], ["by_scale"]),
     ]
-    given = {"system": SYSTEM, "solved": SOLVED, "errors": ERRORS, "sizes": SIZES}
-    outputs = ["s0", "p0", "s1", "p1", "squares", "by_scale"]
+    given = {
+        "system": SYSTEM,
+        "others": OTHERS[1:],
+        "solved": SOLVED,
+        "errors": ERRORS,
+        "sizes": SIZES,
+    }
+    outputs = ["s1", "p1", "squares", "by_scale"]
     names = dict(zip((f"x{i}" for i in range(len(given))), given, strict=True))
     back = {name: x for x, name in names.items()}
     for one in nodes:
@@ -100,12 +100,11 @@ def test_one_product_with_the_system_serves_all(made):
 
 def test_sums_of_steps_and_squares(made):
     _, found = made
-    for name, solved in (("0", np.zeros_like(SOLVED)), ("1", SOLVED)):
-        residuals = SYSTEM @ monomials_at(solved)
-        slope = (SYSTEM[:, SLOPES] * POWERS[SLOPES]) @ slopes_at(solved)
-        np.testing.assert_allclose(found[f"s{name}"], (slope**2).sum(axis=0), rtol=1e-4)
-        expected = (residuals * slope).sum(axis=0)
-        np.testing.assert_allclose(found[f"p{name}"], expected, rtol=1e-4, atol=1e-3)
+    residuals = SYSTEM @ monomials_at(SOLVED)
+    slope = (SYSTEM[:, SLOPES] * POWERS[SLOPES]) @ slopes_at(SOLVED)
+    np.testing.assert_allclose(found["s1"], (slope**2).sum(axis=0), rtol=1e-4)
+    expected = (residuals * slope).sum(axis=0)
+    np.testing.assert_allclose(found["p1"], expected, rtol=1e-4, atol=1e-3)
     np.testing.assert_allclose(found["squares"], (residuals**2).sum(axis=0), rtol=1e-4)
 
 

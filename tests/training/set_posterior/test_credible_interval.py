@@ -14,13 +14,13 @@ SAMPLES = 400
 def ends_of(deviations, weights):
     """Ends (q, 2) by the graph, of deviations (q, n) and weights (n,) with sum 1."""
     q, graph = len(deviations), Graph()
-    std = np.sqrt((weights * deviations**2).sum(axis=1, keepdims=True))
+    std = np.sqrt((weights * deviations**2).sum(axis=1))
     feed = {"deviations": deviations, "std": std, "weights": weights[None]}
     given = [Value(graph, name) for name in feed]
     add_quantiles(*given, SAMPLES).named("ends")
     shapes = {name: list(value.shape) for name, value in feed.items()}
-    session = session_of(graph.model(shapes, {"ends": (1, [q, 2])}))
-    return session.run(None, {k: v.astype(np.float32) for k, v in feed.items()})[0] / std
+    session = session_of(graph.model(shapes, {"ends": (1, [2, q])}))
+    return session.run(None, {k: v.astype(np.float32) for k, v in feed.items()})[0].T / std[:, None]
 
 
 def test_the_ends_are_the_quantiles_of_a_weighted_sample():

@@ -13,7 +13,11 @@ from training.set_posterior.monomials import (
     monomials,
     pair_factors,
 )
-from training.set_posterior.polynomial_residuals import PolynomialResiduals
+from training.set_posterior.polynomial_residuals import (
+    DAMPING_STD,
+    PolynomialResiduals,
+    ResidualsAtFixedPoints,
+)
 from training.set_posterior.scale_mixture import OneSystem
 
 
@@ -63,3 +67,32 @@ def test_the_misfit_in_the_graph_is_that_of_all_factors_of_the_monomials(degree)
     OneSystem(value).misfit(residuals.basis(points)).least.named("misfit")
     found = session_of(graph.model({}, {"misfit": (1, [1, 5])})).run(None, {})[0][0]
     assert found == pytest.approx(((monomials(x, terms) @ system.T) ** 2).sum(axis=1), rel=1e-4)
+
+
+@pytest.mark.parametrize("degree", [2, 4])
+def test_residuals_at_fixed_points_are_those_of_all_monomials(degree):
+    """One Gauss-Newton step from 0 and a second one, and the residuals where it ends."""
+    terms, order = monomial_terms(3, degree), (2, 0, 1)
+    rng, graph = np.random.default_rng(degree), Graph()
+    system, others = rng.normal(size=(9, len(terms))), rng.uniform(-1.0, 1.0, (2, 6))
+    residuals = PolynomialResiduals.solved_last(constant(graph, system), terms, order)
+    along = ResidualsAtFixedPoints.of(residuals, others)
+    solved, precision = along.steps(2)
+    for name, value in (("s", solved), ("k", precision), ("r", along.residuals(solved))):
+        value.node("Identity").named(name)
+    along.basis(solved).node("Identity").named("b")
+    outputs = {name: (1, [None, 6]) for name in "skrb"}
+    found = dict(zip(outputs, session_of(graph.model({}, outputs)).run(None, {}), strict=True))
+
+    def basis_at(s):
+        return monomials(np.stack([others[1], s, others[0]], axis=1), terms).T
+
+    s = np.zeros(6)
+    for _ in range(2):
+        slope = system @ derivative(terms, 2) @ basis_at(s)
+        kappa = (slope**2).sum(axis=0) + DAMPING_STD**-2
+        s = np.clip(s - (slope * (system @ basis_at(s))).sum(axis=0) / kappa, -1.0, 1.0)
+    assert found["s"][0] == pytest.approx(s, abs=1e-5)
+    assert found["k"][0] == pytest.approx(kappa, rel=1e-5)
+    assert found["b"] == pytest.approx(basis_at(s), abs=1e-5)
+    assert found["r"] == pytest.approx(system @ basis_at(s), abs=1e-4)

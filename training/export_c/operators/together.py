@@ -156,8 +156,9 @@ def translate_errors_apart(program: Program, node: Node) -> list[Tensor]:
     matrices = program.new(own.kind, (scales, Size(e), Size(e)))
     determinants = program.new(own.kind, (Size(e), scales))
     small, change = (program.new(own.kind, s) for s in ((Size(e), Size(2 * e)), (Size(step),)))
-    reflect, integrate = (
-        program.shared.kernel(name, own.kind) for name in ("reflect", "integrate_out")
+    reflect, integrate, largest, not_zero = (
+        program.shared.kernel(name, own.kind)
+        for name in ("reflect", "integrate_out", "largest_column", "not_zero")
     )
     zero, one = number(0.0, own.kind), number(1.0, own.kind)
     place = f"{system.name}[i0 * {step}"
@@ -173,8 +174,15 @@ def translate_errors_apart(program: Program, node: Node) -> list[Tensor]:
             {place} + {n.c} + i1] = {columns.name}[i0 * {e} + i1];
     }}"""
     program.emit(code, system, own, columns)
-    code = f"""    for (int error = 0; error < {e}; ++error)
-        {reflect}({count}, {width}, {step}, error, {n.c} + error, {system.name}, {change.name});
+    # a row that has no error takes a monomial, so that the other rows are fewer
+    code = f"""    for (int error = 0; error < {e}; ++error) {{
+        int pivot = {n.c} + error, given = 0;
+        for (int i0 = error; i0 < {count}; ++i0)
+            given += {not_zero}({system.name}[i0 * {step} + pivot]) ? 1 : 0;
+        if (given == 0)
+            pivot = {largest}({count}, {n.c}, {step}, error, {system.name}, {change.name});
+        {reflect}({count}, {width}, {step}, error, pivot, {system.name}, {change.name});
+    }}
     for (int i0 = 0; i0 < {count}; ++i0)
         for (int i1 = 0; i1 < {n.c}; ++i1)
             {out.name}[i0 * {n.c} + i1] = {place} + i1];
@@ -218,7 +226,6 @@ def translate_factor(program: Program, node: Node) -> list[Tensor]:
     system = program.new(x.kind, x.shape)
     rest, change = program.new(x.kind, (n,)), program.new(x.kind, (n,))
     program.emit(element_loops(system.name, x.shape, Expression("{0}", (x,))), system, x)
-    program.shared.kernel("reflect", x.kind)
     kernel = program.shared.kernel("factor_rows", x.kind)
     code = (
         f"    int {count} = 0;\n    {count} = "

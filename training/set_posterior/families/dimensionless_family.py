@@ -252,7 +252,7 @@ class DimensionlessFamily:
             reference_log_load=log(radius * readings["wheel_width"]) + self._middle_pressure,
             most_torque_noise=MOST_RELATIVE_NOISE,
             length=radius,
-            target_scale=target_scale.reshape(-1, 1),
+            target_scale=target_scale,
             axis_std=concat([one, one, one, normal_std, normal_std], axis=0).reshape(-1, 1),
         )
 

@@ -47,7 +47,7 @@ class ContextValues:
     reference_log_load: Value | float  # from which changes with the logarithm of load are counted
     most_torque_noise: float  # readings with more noise on that scale are left out
     length: Value | float  # unit of sinkage, and of torque over load, m
-    target_scale: Value | None  # (q, 1) factors of the values of the estimated axes; None: 1
+    target_scale: Value | None  # (q,) factors of the values of the estimated axes; None: 1
     axis_std: Value | None  # (p, 1) std of nearly known coordinates, 1 for others; None: no such
 
 

@@ -7,6 +7,10 @@ static void add_product_REAL(int m, int k, int n, REAL alpha, const REAL *a, int
 {
     const int pairs = m - m % 2, wide = n - n % 16, fours = n - n % 4;
     four_REAL s[8];
+    if (n == 1 && step == 1) { /* a column, whose sums are formed along the rows of a */
+        add_product_transposed_REAL(m, k, 1, alpha, a, row, b, y);
+        return;
+    }
     for (int j = 0; j < wide; j += 16)
         for (int i = 0; i < m; i += 2) {
             const int rows = i < pairs ? 2 : 1;

@@ -8,28 +8,25 @@
  */
 static int factor_rows_REAL(int m, int n, REAL *a, REAL *rest, REAL *change)
 {
-    const int most = m < n ? m : n, wide = n - n % 4;
+    const int most = m < n ? m : n;
     if (m <= FEW_ROWS)
         return m;
+    REAL computed = 0; /* sum of all squares when these were last computed, not reduced */
     for (int k = 0; k < most; ++k) {
         int pivot = 0;
         REAL total = 0;
-        for (int j = 0; j < wide; j += 4) {
-            four_REAL sum = {0};
-            for (int i = k; i < m; ++i) {
-                const four_REAL x = load_REAL(a + i * n + j);
-                sum = plus_product_REAL(sum, x, x);
-            }
-            store_REAL(sum, rest + j);
-        }
-        for (int j = wide; j < n; ++j) {
-            rest[j] = 0;
-            for (int i = k; i < m; ++i)
-                rest[j] += a[i * n + j] * a[i * n + j];
-        }
         for (int j = 0; j < n; ++j) {
+            const REAL before = k > 0 ? a[(k - 1) * n + j] : 0;
+            rest[j] = k > 0 ? rest[j] - before * before : 0;
             total += rest[j];
             pivot = rest[j] > rest[pivot] ? j : pivot;
+        }
+        if (!(total > REDUCED * computed)) { /* what is left of larger numbers is not exact */
+            pivot = largest_column_REAL(m, n, n, k, a, rest);
+            total = 0;
+            for (int j = 0; j < n; ++j)
+                total += rest[j];
+            computed = total;
         }
         if (total < LEAST_REST)
             return k;

@@ -14,17 +14,7 @@ static REAL integrate_out_REAL(int m, int last, int step, REAL *system, REAL *ch
     for (int i = 0; i < m; ++i)
         d += system[i * step + last] * system[i * step + last];
     const REAL kappa = d + SQRT(d);
-    for (int j = 0; j < wide; j += 4) {
-        four_REAL sum = {0};
-        for (int i = 0; i < m; ++i)
-            sum = plus_REAL(sum, system[i * step + last], load_REAL(system + i * step + j));
-        store_REAL(sum, change + j);
-    }
-    for (int j = wide; j < last; ++j) {
-        change[j] = 0;
-        for (int i = 0; i < m; ++i)
-            change[j] += system[i * step + last] * system[i * step + j];
-    }
+    sum_of_rows_REAL(m, last, step, system + last, system, change);
     for (int i = 0; i < m; ++i) {
         REAL *row = system + i * step;
         const REAL share = row[last] / kappa;

@@ -15,17 +15,7 @@ static void reflect_REAL(int m, int n, int step, int k, int pivot, REAL *a, REAL
     const REAL length = SQRT(square), first = top[pivot] < 0 ? -length : length;
     const REAL h = square + first * top[pivot];
     top[pivot] += first;
-    for (int j = 0; j < wide; j += 4) {
-        four_REAL sum = {0};
-        for (int i = k; i < m; ++i)
-            sum = plus_REAL(sum, a[i * step + pivot], load_REAL(a + i * step + j));
-        store_REAL(sum, change + j);
-    }
-    for (int j = wide; j < n; ++j) {
-        change[j] = 0;
-        for (int i = k; i < m; ++i)
-            change[j] += a[i * step + pivot] * a[i * step + j];
-    }
+    sum_of_rows_REAL(m - k, n, step, top + pivot, top, change);
     for (int i = k; i < m; ++i) {
         REAL *row = a + i * step;
         const REAL share = -row[pivot] / h;
