@@ -32,9 +32,16 @@ CHECKED = ErrorScale(EXACT + ERRORS[0.1], bearing=0.15, channels=0.15, laws=0.6)
 
 #: Share of the prior that no campaign rules out: errors on other soils than its own.
 OPEN = 0.05
-#: Share of a sensor's usual error by which later drives may differ from the campaign: a tyre that
-#: wears, a motor that warms up. Rows of one campaign cannot tell it.
-DRIFT = 1.0 / 3.0
+#: Shares of the usual errors of sensors by which later drives may differ from the campaign, which
+#: its rows cannot tell. Radius and gear ratios hardly change; the load moves with what is carried;
+#: the torque of a motor for its current falls by some per cent as it warms up.
+DRIFT = {
+    "slip_bias": 0.2,
+    "load_gain": 0.5,
+    "torque_gain": 0.7,
+    "sinkage_bias": 0.3,
+    "drawbar_pull_bias": 0.3,
+}
 
 
 @dataclass(frozen=True)
@@ -178,7 +185,7 @@ def _sensor_errors(
         if name not in usual or name in declared_errors(case):
             continue
         squares = [1.0 if fit is None else _mean_square(fit, name, usual[name]) for fit in fits]
-        size = np.sqrt(min(1.0, float(probabilities @ squares) + DRIFT**2))
+        size = np.sqrt(min(1.0, float(probabilities @ squares) + DRIFT[name] ** 2))
         if size < 1.0:
             found[name] = float(f"{size * usual[name]:.3g}")
     return found

@@ -87,7 +87,7 @@ def test_sensors_that_the_rows_find_right_have_small_errors(case):
     rows = whole_of(rows_of(case), case)
     sensors = supported_errors(case, rows, rows).sensors
     usual = USUAL_SENSOR_ERRORS["slip_bias"]
-    assert DRIFT * usual < sensors["slip_bias"] < 0.7 * usual
+    assert DRIFT["slip_bias"] * usual < sensors["slip_bias"] < 0.7 * usual
 
 
 def test_an_error_that_the_rows_show_stays_in_the_file(case):
