@@ -165,17 +165,27 @@ def channel_remarks(estimator: Estimator, readings: dict[str, Any]) -> list[Rema
 
 def _common_error_remarks(sets: SetPosterior) -> list[Remark]:
     """A note on the errors that all rows are assumed to share."""
-    texts = {
-        "slip_bias": "slip {:g}",
-        "load_gain": "load {:.3g} %",
-        "torque_gain": "torque {:.3g} %",
-        "sinkage_bias": "sinkage {:g} mm",
-        "drawbar_pull_bias": "drawbar pull {:g} N",
-    }
-    factors = {"slip_bias": 1.0, "sinkage_bias": 1e3, "drawbar_pull_bias": 1.0}  # gains in %
-    stds = {name: std for name, std in sets.common_errors.items() if std > 0.0 and name in texts}
+    stds = {n: std for n, std in sets.common_errors.items() if std > 0.0 and n in ERRORS_SHOWN}
     if not stds:
         return []
-    said = ", ".join(texts[n].format(factors.get(n, 100.0) * std) for n, std in stds.items())
+    said = sensor_errors_shown(stds)
     text = f"assumes that all rows share errors with standard deviations of {said}"
     return [Remark("shared-errors", text, tuple(stds), "note")]
+
+
+#: Errors of sensors that all rows share: factor from the SI unit, and text; gains in %.
+ERRORS_SHOWN = {
+    "slip_bias": (1.0, "slip {:.3g}"),
+    "load_gain": (100.0, "load {:.3g} %"),
+    "torque_gain": (100.0, "torque {:.3g} %"),
+    "sinkage_bias": (1e3, "sinkage {:.3g} mm"),
+    "drawbar_pull_bias": (1.0, "drawbar pull {:.3g} N"),
+}
+
+
+def sensor_errors_shown(stds: Mapping[str, float]) -> str:
+    """Standard deviations of errors of sensors, by input of a file, in words."""
+    shown = (
+        (text, factor * stds[name]) for name, (factor, text) in ERRORS_SHOWN.items() if name in stds
+    )
+    return ", ".join(text.format(value) for text, value in shown)

@@ -24,6 +24,7 @@ from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.table_estimates import sensor_errors_shown
 from soilml.remarks import Remark
 from soilml.report.page import Provenance, json_text, page
 from training.adaptation.board_file import FileNames, make_file
@@ -313,8 +314,8 @@ def _errors_remark(errors: SupportedErrors) -> Remark:
         f"probability of {checked.probability:.2f}, as the campaign supports, else larger ones"
     )
     if errors.sensors:
-        sizes = ", ".join(f"{name} {std:g}" for name, std in errors.sensors.items())
-        text += f"; standard deviations of errors of its sensors are {sizes}"
+        text += "; errors of its sensors have standard deviations of "
+        text += sensor_errors_shown(errors.sensors)
     return Remark("model-errors", text, severity="note")
 
 
