@@ -158,7 +158,7 @@ def kept_promise(records: Sequence[Mapping[str, Any]]) -> str:
         lines.append(f"{words} is no worse in {np.mean(ratio <= 1.0):.0%}, {', '.join(within)}.")
     either = [min(at["effect"], at["process"]) / max(at["effect"], at["process"]) for at in own]
     return (
-        "Which of effect and process is better at heavier loads is known only afterwards: the "
+        "Which of effect and process is better at heavier loads is known only afterwards. The "
         f"better one is {np.median(either):.2f} times as far from the truth as the other in the "
         f"median of {len(own)} sets. {' '.join(lines)}"
     )
