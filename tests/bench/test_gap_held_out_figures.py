@@ -169,7 +169,7 @@ def test_how_often_a_model_is_no_worse_than_the_better_of_two_is_said():
     said = gap_hybrid.kept_promise(sets)
     words = "The hybrid is no worse in 33%, at most 5% worse in 33%, at most 25% worse in 67%."
     assert words in said and "The predictive model is no worse in 67%" in said
-    assert "the better one is 0.25 times" in said
+    assert "The better one is 0.25 times" in said
     assert gap_hybrid.text(sets).endswith(said)
 
 
