@@ -179,7 +179,9 @@ def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosteri
     """The set posterior of wheels of any size, and its metrics on fresh simulated sets."""
     response = fit_response(spec.family, spec.response, progress)
     posterior = calibrate_misfit_limits(spec.family, response, progress, spec.response.small)
-    posterior = replace(posterior, scales=spec.response.scales)
+    posterior = replace(
+        posterior, scales=spec.response.scales, sensor_errors=spec.response.sensor_errors
+    )
     return posterior, validate_posterior(posterior, progress)
 
 
