@@ -31,10 +31,10 @@ TITLES = {
     "gap-hybrid": "Gap workflow: rows kept back",
     "gap-speed": "Gap workflow: seconds",
     "gap-measured": "Gap workflow: published tests",
+    "adapt": "Files for the board before and after an adaptation",
 }
 #: Pages whose figures a command of their own prints, by what they compare.
 ELSEWHERE = {
-    "Files for the board before and after an adaptation": ("how-to/adapt", "bench/adapt.py"),
     "The gap workflow beside regressions, sealed": ("how-to/challenge", "bench/challenge.py"),
     "Tests on Earth for a pull on the Moon": ("how-to/gravity", "examples/gravity/moon.py"),
 }
@@ -89,7 +89,8 @@ def write_first_page(names: Sequence[str], summary: str, root: Path = ROOT) -> N
         "the workflow that finds missing effects. Goals are targets; a goal that is not reached is "
         "marked as missed.\n\n"
         "**Command.** `make bench` writes this page and all others but those of the gap workflow, "
-        "which `make bench-gap` and `make gap-real` write. `python bench/run.py NAME ...` replaces "
+        "which `make bench-gap` and `make gap-real` write, and that of adaptations, by "
+        "`python bench/adapt.py`. `python bench/run.py NAME ...` replaces "
         "single sections: "
         f"{', '.join(names)}. No figure is typed by hand.\n\n"
         f"**Machine.** {environment}\n\n"
