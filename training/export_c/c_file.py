@@ -41,6 +41,7 @@ _MATH = {
     "SQRT": {"float": "sqrtf", "double": "sqrt"},
     "FEW_ROWS": {"float": str(FEW_ROWS), "double": str(FEW_ROWS)},
     "LEAST_REST": {"float": "1e-7f", "double": "1e-7"},
+    "LEAST_POWER": {"float": "-87.0f", "double": "-708.0"},
     "REDUCED": {"float": "1e-3f", "double": "1e-3"},
 }
 #: Kernels that others call, where these have no light version; of others, one that calls another
@@ -50,6 +51,7 @@ CALLED = {
     "factor_rows": ("largest_column", "reflect"),
     "integrate_out": ("sum_of_rows",),
     "reflect": ("sum_of_rows",),
+    "tanh_of": ("at_least", "at_most"),
 }
 #: Entries of the metadata that tell one file from another, and what they were trained from.
 IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")

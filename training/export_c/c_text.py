@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from training.export_c.tensor import Expression, Shape, Size, Tensor, strides
 
 WIDTH = 100  # Width of the lines that hold the numbers of an array
+LEAST_BLOCK = 4  # Elements of a row that is copied as a block of memory
 LONG = 16  # Elements of a loop that stays one of a fixed length
 LARGEST_INT = 2**31 - 1  # The largest whole number that every C compiler's int holds (32 bits)
 
@@ -73,6 +74,29 @@ def nest(sizes: Sequence[Size], indices: Sequence[str], body: str) -> str:
             depth += 1
     lines += [INDENT * depth + line for line in body.splitlines()]
     return "\n".join(lines)
+
+
+def copied_rows(
+    out: Tensor, to: tuple[str, Size], x: Tensor, source: tuple[str, Size], sizes: Sequence[Size]
+) -> str:
+    """Copies of rows, so many of so many elements; of each tensor where they begin, and the step.
+
+    Rows of a fixed length are copied as a block of memory, which compilers do side by side.
+    """
+    i, j = indices_of(sizes)
+    block = sizes[1].fixed and sizes[1].constant >= LEAST_BLOCK
+    one, other = (
+        offset([Size(1), step, Size(1)], [start, i, "0" if block else j])
+        for start, step in (to, source)
+    )
+    if not block:
+        return nest(sizes, [i, j], f"{out.name}[{one}] = {x.name}[{other}];")
+    into, of = (
+        tensor.name + (f" + {place}" if place != "0" else "")
+        for tensor, place in ((out, one), (x, other))
+    )
+    copy = f"memcpy({into}, {of}, {sizes[1].constant} * sizeof({out.kind}));"
+    return nest(sizes[:1], [i], copy)
 
 
 def indices_of(sizes: Sequence[Size], first: int = 0) -> list[str]:

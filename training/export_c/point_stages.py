@@ -23,7 +23,7 @@ from training.export_c.solved_polynomials import (
 from training.export_c.tensor import Size, Tensor
 
 #: Points that a stage takes at a time; the latter where memory is scarce.
-TILE, SMALL_TILE = 16, 8
+TILE, SMALL_TILE = 32, 8
 LEAST_POINTS = 128  # Fewer are not worth a stage
 #: Operators that move elements along an axis.
 MOVING = ("Concat", "Gather", "Slice", "Split")

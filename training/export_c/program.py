@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import ModelFileError
-from training.export_c.c_text import element_loops, indices_of, leaves_of, nest, offset
+from training.export_c.c_text import copied_rows, element_loops, leaves_of, offset
 from training.export_c.tensor import Expression, Shape, Size, Tensor, kind_of_array, total
 
 LONGEST_EXPRESSION = 6  # Tensors that one expression reads at most; longer ones are hard to read
@@ -117,7 +117,15 @@ class Program:
         self._stage = 0
 
     def tile_of(self, whole: Tensor, points: int) -> Tensor:
-        """The elements of some points, of those of all points along the last axis."""
+        """The elements of some points, of those of all points along the last axis.
+
+        Constants lie in memory tile by tile, so that those of a tile need no copy.
+        """
+        if whole.value is not None:
+            tiles = whole.value.reshape(total(whole.shape[:-1]).constant, -1, points)
+            name = self.shared.constant(np.ascontiguousarray(tiles.swapaxes(0, 1)))
+            place = offset([Size(tiles.shape[0])], ["first"])
+            return Tensor(f"({name} + {place})", whole.kind, (*whole.shape[:-1], Size(points)))
         whole = self.stored(whole)
         part = self.new(whole.kind, (*whole.shape[:-1], Size(points)))
         self.emit(_copied_points(part, whole, into_whole=False), part, whole)
@@ -182,11 +190,10 @@ class Program:
 def _copied_points(part: Tensor, whole: Tensor, into_whole: bool) -> str:
     """C text that copies the points of a tile out of a tensor, or into it."""
     sizes = (total(part.shape[:-1]), part.shape[-1])
-    i, j = indices_of(sizes)
-    of_part = f"{part.name}[{offset([sizes[1], Size(1)], [i, j])}]"
-    of_whole = f"{whole.name}[{offset([whole.shape[-1], Size(1), Size(1)], [i, 'first', j])}]"
-    target, source = (of_whole, of_part) if into_whole else (of_part, of_whole)
-    return nest(sizes, [i, j], f"{target} = {source};")
+    of_part, of_whole = ("0", sizes[1]), ("first", whole.shape[-1])
+    if into_whole:
+        return copied_rows(whole, of_whole, part, of_part, sizes)
+    return copied_rows(part, of_part, whole, of_whole, sizes)
 
 
 @dataclass(frozen=True)

@@ -40,25 +40,32 @@ class _Monomials:
 
     name: Of the monomials (terms, n).
     solved: Name of the solved coordinate (1, n).
-    order: Name of the columns of the system in this order.
     powers: Of the solved coordinate, by column of the system.
     nodes: That compute them; none where they are constant.
     """
 
     name: str
     solved: str
-    order: str
     powers: NDArray[np.intp]
     nodes: tuple[Any, ...]
 
-    def coefficients(self, system: str) -> Any:
-        """The node of the coefficients (m * powers, n) of a system (m, terms)."""
+    def coefficients(self, system: str, known: dict[str, Tensor]) -> tuple[Any, Any]:
+        """Nodes of a system (m, terms) by power, and of its coefficients (m * powers, n)."""
         from onnx import helper
 
-        made = f"{system}_{self.name}"
-        ends = np.searchsorted(np.sort(self.powers), np.arange(self.powers.max() + 1), "right")
-        inputs = [system, self.name, self.order]
-        return helper.make_node(COEFFICIENTS, inputs, [made], ends=ends.tolist())
+        order = _by_power(self.powers)
+        columns = f"by_power_{zlib.crc32(order.tobytes()):08x}"
+        known[columns] = Tensor.constant(order, columns)
+        ordered, made = f"{system}_{columns}", f"{system}_{self.name}"
+        ends = np.searchsorted(self.powers[order], np.arange(self.powers.max() + 1), "right")
+        return (
+            helper.make_node("Gather", [system, columns], [ordered], axis=1),
+            helper.make_node(COEFFICIENTS, [ordered, self.name], [made], ends=ends.tolist()),
+        )
+
+
+def _by_power(powers: NDArray[np.intp]) -> NDArray[np.int32]:
+    return np.argsort(powers, kind="stable").astype(np.int32)
 
 
 def with_solved_polynomials(nodes: Sequence[Any], known: dict[str, Tensor]) -> list[Any]:
@@ -80,25 +87,27 @@ def with_solved_polynomials(nodes: Sequence[Any], known: dict[str, Tensor]) -> l
         if node.op_type == SUMS:
             if not _is_derivative(node, found.powers, known):
                 continue
-            parts = [found.coefficients(name) for name in (node.input[0], *node.input[6:])]
-            inputs = [found.solved, *(part.output[0] for part in parts)]
+            systems = [node.input[0], *node.input[6:]]
+            parts = [found.coefficients(system, known) for system in systems]
+            inputs = [found.solved, *(part.output[0] for _, part in parts)]
             last = helper.make_node(STEP_SUMS, inputs, list(node.output), groups=groups)
         elif node.op_type == SQUARES:
             top, matrices, rest, _ = node.input
-            parts = [found.coefficients(name) for name in (top, rest)]
-            inputs = [found.solved, parts[0].output[0], matrices, parts[1].output[0]]
+            parts = [found.coefficients(system, known) for system in (top, rest)]
+            first, others = (part.output[0] for _, part in parts)
+            inputs = [found.solved, first, matrices, others]
             last = helper.make_node(SOLVED_SCALES, inputs, list(node.output), groups=groups)
         else:
-            (*others, user) = users.get(node.output[0], [None])
-            if others or user is None or user.op_type != "ReduceSumSquare":
+            (*more, user) = users.get(node.output[0], [None])
+            if more or user is None or user.op_type != "ReduceSumSquare":
                 continue
             if not over_rows(user, known):
                 continue
-            parts = [found.coefficients(node.input[0])]
-            inputs = [found.solved, parts[0].output[0]]
+            parts = [found.coefficients(node.input[0], known)]
+            inputs = [found.solved, parts[0][1].output[0]]
             last = helper.make_node(SOLVED_SQUARES, inputs, list(user.output), groups=groups)
             new[id(user)] = []
-        new[id(node)] = [*found.nodes, *parts, last]
+        new[id(node)] = [*found.nodes, *(own for both in parts for own in both), last]
     made: set[str] = set()
     result = []
     for node in nodes:
@@ -129,31 +138,29 @@ def _monomials(name: str, makers: Mapping[str, Any], known: dict[str, Tensor]) -
     if pairs is None or terms is None:
         return None
     powers = (pairs == pairs.max()).sum(axis=0)[terms].sum(axis=0)
-    order = np.argsort(powers, kind="stable").astype(np.int32)
+    order = _by_power(powers)
     stem = "_".join(points.input[:-1])
     ones, by_power = f"{stem}_ones", f"{second.input[1]}_{second.input[2]}_by_power"
     known[ones] = Tensor.constant(np.ones((1, head.value.shape[1]), head.value.dtype), ones)
-    for k, name in enumerate((by_power, f"{by_power}_left", f"{by_power}_right")):
-        known[name] = Tensor.constant(order if k == 0 else terms[k - 1][order], name)
+    for k, side in enumerate(("left", "right")):
+        known[f"{by_power}_{side}"] = Tensor.constant(terms[k][order], f"{by_power}_{side}")
     made = [f"{stem}_{part}" for part in ("others", "pairs", by_power)]
     nodes = (
         helper.make_node("Concat", [*points.input[:-1], ones], [made[0]], axis=0),
         helper.make_node(ROWS, [made[0], *first.input[1:]], [made[1]]),
         helper.make_node(ROWS, [made[1], f"{by_power}_left", f"{by_power}_right"], [made[2]]),
     )
-    return _Monomials(made[2], points.input[-1], by_power, powers, nodes)
+    return _Monomials(made[2], points.input[-1], powers, nodes)
 
 
 def _of_fixed_points(found: FixedMonomials | None, known: dict[str, Tensor]) -> _Monomials | None:
     """Of points whose other coordinates are constant."""
     if found is None or not found.solved or len(found.values) < 2:
         return None
-    order = np.argsort(found.powers, kind="stable").astype(np.int32)
-    values = np.ascontiguousarray(found.values[order])
+    values = np.ascontiguousarray(found.values[_by_power(found.powers)])
     name = f"monomials_{zlib.crc32(values.tobytes()):08x}"
     known[name] = Tensor.constant(values, name)
-    known[f"{name}_order"] = Tensor.constant(order, f"{name}_order")
-    return _Monomials(name, found.solved, f"{name}_order", found.powers, ())
+    return _Monomials(name, found.solved, found.powers, ())
 
 
 def _numbers(node: Any, known: Mapping[str, Tensor]) -> NDArray[np.intp] | None:

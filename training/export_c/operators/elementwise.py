@@ -34,9 +34,13 @@ def translate_function(program: Program, node: Node) -> list[Tensor]:
             return _computed(program, x.kind, "{0} < 0 ? -{0} : {0}", [program.stored(x)])
         raise ModelFileError(f"operator {node.kind} of {x.kind} numbers is not known to export-c")
     if node.kind == "Tanh" and x.kind == "float":
-        name = program.shared.kernel("tanh_of", "float")
-    else:
-        name = FUNCTIONS[node.kind] + ("f" if x.kind == "float" else "")
+        x = program.stored(x)
+        out = program.new(x.kind, x.shape)
+        kernel = program.shared.kernel("tanh_of", x.kind)
+        code = f"    {kernel}({x.count.c}, {x.name}, {out.name});"
+        program.emit(code, out, x, replaceable=[x])
+        return [out]
+    name = FUNCTIONS[node.kind] + ("f" if x.kind == "float" else "")
     return _computed(program, x.kind, f"{name}({{0}})", [x])
 
 

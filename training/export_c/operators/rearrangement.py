@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from soilml.errors import ModelFileError
-from training.export_c.c_text import indices_of, nest, offset
+from training.export_c.c_text import copied_rows, indices_of, nest, offset
 from training.export_c.program import Node, Program, Translation
 from training.export_c.tensor import Size, Tensor, broadcast, strides, total
 
@@ -198,14 +198,9 @@ def _copy_part(
     part, whole = (x, out) if into_whole else (out, x)
     inner = total(part.shape[axis + 1 :])
     sizes = (total(part.shape[:axis]), part.shape[axis] * inner)
-    i, j = indices_of(sizes)
-    in_part = offset([sizes[1], Size(1)], [i, j])
-    in_whole = offset([whole.shape[axis] * inner, Size(1)], [i, j])
-    begin = start * inner
-    if begin != Size(0):
-        in_whole = begin.c if in_whole == "0" else f"{begin.c} + {in_whole}"
-    target, source = (in_whole, in_part) if into_whole else (in_part, in_whole)
-    program.emit(nest(sizes, [i, j], f"{out.name}[{target}] = {x.name}[{source}];"), out, x)
+    in_part, in_whole = ("0", sizes[1]), ((start * inner).c, whole.shape[axis] * inner)
+    to, source = (in_whole, in_part) if into_whole else (in_part, in_whole)
+    program.emit(copied_rows(out, to, x, source, sizes), out, x)
 
 
 def _is_known(tensor: Tensor) -> bool:

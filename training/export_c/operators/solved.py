@@ -16,18 +16,18 @@ from training.export_c.tensor import Size, Tensor
 
 
 def translate_coefficients(program: Program, node: Node) -> list[Tensor]:
-    """Coefficients (m * powers, n) of a system (m, k), by monomials (k, n) and their columns."""
-    system, basis, order = (program.stored(node.input(k)) for k in range(3))
+    """Coefficients (m * powers, n) of a system (m, k), by monomials (k, n)."""
+    system, basis = (program.stored(node.input(k)) for k in range(2))
     ends = np.asarray(node.attributes["ends"], np.int32)
     places = program.stored(Tensor.constant(ends, ""))
     (m, k), n = system.shape, basis.shape[1]
     out = program.new(basis.kind, (m * len(ends), n))
     kernel = program.shared.kernel("solved_coefficients", basis.kind)
     code = (
-        f"    {kernel}({m.c}, {k.c}, {n.c}, {system.name}, {order.name}, {basis.name}, "
+        f"    {kernel}({m.c}, {k.c}, {n.c}, {system.name}, {basis.name}, "
         f"{len(ends)}, {places.name}, {out.name});"
     )
-    program.emit(code, out, system, order, basis, places)
+    program.emit(code, out, system, basis, places)
     return [out]
 
 
