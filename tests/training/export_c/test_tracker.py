@@ -107,6 +107,48 @@ def test_a_bad_standard_deviation_changes_nothing(value, compiled):
     assert code == model.codes["BAD_STD"] and bytes(own.tracker) == before
 
 
+def damaged(whole, rng, first):
+    """The bytes of a struct with one to four of them changed, half of the time from `first` on."""
+    found = bytearray(whole)
+    begin = first if rng.random() < 0.5 else 0
+    for place in rng.integers(begin, len(found), rng.integers(1, 5)):
+        found[place] ^= int(rng.integers(1, 256))
+    return bytes(found)
+
+
+def test_a_damaged_tracker_is_refused_as_it_is_or_read(compiled):
+    """A tracker that was stored, some bytes of which have changed since."""
+    model, rng = compiled("wheel"), np.random.default_rng(4)
+    own, rows = CompiledTracker(model, {}), day(0)
+    for row in rows[:60]:
+        own.read(**row)
+    stored = bytes(own.tracker)
+    first = type(own.tracker).blocks.offset  # counts and what else is no array of a system
+    codes = []
+    for k in range(4000):
+        before = damaged(stored, rng, first)
+        ctypes.memmove(ctypes.byref(own.tracker), before, len(before))
+        code, _, answer = own.read(**rows[60 + k % 20])
+        codes.append(code)
+        if code < 0:
+            assert bytes(own.tracker) == before
+        else:
+            assert all(np.isfinite(answer[part]).all() for part in ("mean", "std", "low", "high"))
+    refused, read = codes.count(model.codes["NOT_STARTED"]), sum(code >= 0 for code in codes)
+    assert refused > 200 and read > 200 and refused + read == len(codes)
+
+
+def test_a_tracker_whose_memory_is_no_number_is_refused_as_it_is(compiled):
+    model = compiled("wheel")
+    own = CompiledTracker(model, {})
+    for row in day(0)[:20]:
+        own.read(**row)
+    own.tracker.memory.factor[0] = np.nan
+    own.tracker.stale = True
+    before = bytes(own.tracker)
+    assert own.read(**day(0)[20])[0] == model.codes["NOT_STARTED"] and bytes(own.tracker) == before
+
+
 def test_a_tracker_that_was_not_started_is_refused(compiled):
     model = compiled("wheel")
     own = CompiledTracker(model, {})
