@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from soilml.errors import InputError
+from soilml.io.cell_text import one_line
 
 try:
     import fcntl
@@ -199,7 +200,9 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
         raise InputError(f"{path} is read-only; make it writable, or give another name")
     if folder is None or not stat.S_ISDIR(folder):
         missing = target.parent if Path(path).is_symlink() else Path(path).parent
-        raise InputError(f"{path}: the folder {missing} does not exist; create it first")
+        raise InputError(
+            f"{one_line(path)}: the folder {one_line(missing)} does not exist; create it first"
+        )
     if not os.access(target.parent, os.W_OK | os.X_OK):
         raise InputError(f"{path} cannot be written: no permission to write to its folder")
     return target
@@ -226,7 +229,8 @@ def output_files(path: str | None, *suffixes: str) -> list[Path]:
     file = Path(path)
     if file.suffix.lower() != suffixes[0]:
         raise InputError(
-            f"{path}: the output is a {suffixes[0]} file; its name must end in {suffixes[0]}"
+            f"{one_line(path)}: the output is a {suffixes[0]} file; its name must end "
+            f"in {suffixes[0]}"
         )
     return [file, *(file.with_suffix(suffix) for suffix in suffixes[1:])]
 

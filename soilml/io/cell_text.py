@@ -67,6 +67,11 @@ def escaped(text: str) -> str:
     return "".join(c if c == "\n" or is_plain(c) else ascii(c)[1:-1] for c in text)
 
 
+def one_line(text: object) -> str:
+    """The text with escapes for newlines too, as a name stands in a message."""
+    return escaped(str(text)).replace("\n", "\\n")
+
+
 def text_as_cell(text: str) -> str:
     """A text as the cell of a CSV file; one that a spreadsheet would calculate gets a quote."""
     return f"'{text}" if text.startswith(_FORMULA) else text

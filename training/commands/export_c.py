@@ -7,6 +7,7 @@ from pathlib import Path
 
 from soilml.cli.options import InputFile, whole_number_from
 from soilml.io.atomic_files import atomic_outputs, output_files
+from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
 
 HELP = "write a model file as C99 code"
@@ -70,7 +71,8 @@ def run(args: argparse.Namespace) -> int:
         header.write_text(written.header, encoding="utf-8")
     of_set = f"memory of a set {written.memory_bytes}, " if written.memory_bytes else ""
     tell(
-        f"written: {out} ({len(written.source) / 1e3:.0f} kB), {out.with_suffix('.h')}; bytes of "
-        f"constants {written.constant_bytes}, {of_set}working memory {written.work_bytes}"
+        f"written: {one_line(out)} ({len(written.source) / 1e3:.0f} kB), "
+        f"{one_line(out.with_suffix('.h'))}; bytes of constants "
+        f"{written.constant_bytes}, {of_set}working memory {written.work_bytes}"
     )
     return 0

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from soilml.cli.options import InputFile
 from soilml.io.atomic_files import atomic_outputs, output_files
+from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
 
 HELP = "write the fusion of several model files as C99 code"
@@ -59,5 +60,5 @@ def run(args: argparse.Namespace) -> int:
     with atomic_outputs(outputs(args)) as written:
         for file, text in zip(written, texts, strict=True):
             file.write_text(text, encoding="utf-8")
-    tell(f"written: {out}, {out.with_suffix('.h')}")
+    tell(f"written: {one_line(out)}, {one_line(out.with_suffix('.h'))}")
     return 0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from soilml.errors import InputError
-from soilml.io.cell_text import escaped
+from soilml.io.cell_text import one_line
 from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
 from soilml.log_import.guesses.clocks_and_runs import (
@@ -225,7 +225,7 @@ class _MapDrafting:
         if not self.steady:
             lines += _window_lines(self.runs)
         # values are plain already; names and lines of the log also stand in comments
-        text = "\n".join(escaped(line).replace("\n", "\\n") for line in lines) + "\n"
+        text = "\n".join(one_line(line) for line in lines) + "\n"
         return DraftedMap(text, sum(isinstance(line, Marked) for line in lines))
 
     def _head(self) -> list[str]:

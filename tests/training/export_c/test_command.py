@@ -31,6 +31,17 @@ def test_both_files_are_written_and_their_memory_is_said(tmp_path, capsys):
     assert not [p for p in tmp_path.iterdir() if p.name not in ("linear.c", "linear.h")]
 
 
+def test_a_name_with_a_newline_stays_on_one_line(tmp_path, capsys):
+    folder = tmp_path / "a\nb\x1b"
+    folder.mkdir()
+    assert main(["export-c", str(LINEAR), str(folder / "linear.c")]) == 0
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and r"a\nb\x1b/linear.h" in said and "\x1b" not in said
+    refused([LINEAR, tmp_path / "no\nsuch" / "linear.c"], capsys, r"no\nsuch does not exist")
+    refused([LINEAR, tmp_path / "lin\near.c"], capsys, r"lin\near.c: ")
+    refused([LINEAR, tmp_path / "linear\n.h"], capsys, r"linear\n.h: ")
+
+
 def test_a_file_without_sets_has_no_functions_of_sets(tmp_path):
     out = tmp_path / "linear.c"
     assert main(["export-c", str(LINEAR), str(out)]) == 0
