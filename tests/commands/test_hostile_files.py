@@ -83,6 +83,25 @@ def test_a_file_of_effects_does_not_run_for_a_table_that_is_refused(command, fol
     assert not (folder / "it_ran").exists()
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["simulate", "model.toml", "--slip", "fast", "--load", "60"],
+        ["simulate", "model.toml", "--slip", "0.2", "--load", "60", "--run", "\x1b"],
+        ["advise", "model.toml", "--slips", "fast"],
+        ["gap", "model.toml", "runs.csv", "--cost", "reverse"],
+        ["audit", "model.toml", "runs.csv", "--cost", "reverse"],
+        ["pull", "model.toml", "runs.csv", "--load", "heavy"],
+        ["slip", "model.toml", "none.csv"],
+    ],
+    ids=lambda words: " ".join(words[:1] + words[-2:]),
+)
+def test_a_file_of_effects_does_not_run_for_a_value_that_is_refused(words, folder, capsys):
+    (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.2,60,2.5\na,0.3,60,2.9\n")
+    refusal([*words, "--effects", "own.py"], capsys)
+    assert not (folder / "it_ran").exists()
+
+
 def test_a_file_of_effects_runs_for_a_command_that_goes_on(folder, capsys):
     words = ["model.toml", "--slip", "0.2", "--load", "60", "--effects", "own.py"]
     assert "no effect in it" in refusal(["simulate", *words], capsys)

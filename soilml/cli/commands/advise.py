@@ -157,12 +157,12 @@ def run(args: argparse.Namespace) -> int:
     elif args.count is not None or args.picture is not None:
         raise InputError("--count and --picture are of rows; with --gravity omit them")
     table = None if args.runs is None else read_rows(args, RUNS)
-    case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
-    free = select_free(case, parse_names(args.free))
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()
         for option, text in (("--slips", args.slips), ("--loads", args.loads))
     )
+    case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
+    free = select_free(case, parse_names(args.free))
     change = gravity_change(args, case)
     at, driven, notes = None, np.empty(0), list[Remark]()
     if table is not None:

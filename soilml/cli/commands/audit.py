@@ -63,12 +63,11 @@ def run(args: argparse.Namespace) -> int:
     from soilml.report.page import json_text
 
     design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
+    costs = parse_costs(args)
     effects = available_effects(args)
     case = read_case(args.model, effects)
     with working(f"auditing {len(design)} rows"):
-        found = audit(
-            case, design, free=parse_names(args.free), effects=effects, costs=parse_costs(args)
-        )
+        found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
     show(audit_text(found))

@@ -103,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.gap import gap
     from soilml.gap.presentation import gap_files, gap_text
 
-    table = read_rows(args, RUNS)
+    table, costs = read_rows(args, RUNS), parse_costs(args)
     effects = available_effects(args)
     if args.gear is not None:
         case = read_case_of_rows(args, args.model, table, effects)
@@ -118,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
             holdout=args.holdout,
             effects=effects,
             calibration=_calibration(args.checked, effects),
-            costs=parse_costs(args),
+            costs=costs,
             seed=args.seed,
             progress=lambda share: done(round(100 * share)),
         )

@@ -125,6 +125,9 @@ def run(args: argparse.Namespace) -> int:
         "free": parse_names(args.free),
         "exact_model": args.exact_model,
     }
+    loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
+    if len(loads or ()) > MAX_LOADS:
+        raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
     if args.load is None and args.gear is None:
         whole = read_case(args.model, available_effects(args), with_bias=True)
         if whole.rover is not None:
@@ -134,9 +137,6 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--slope needs a model file with [rover], and neither --load nor --gear")
     case = read_case_of_rows(args, args.model, table, available_effects(args))
     print_table_hints(table, case)
-    loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
-    if len(loads or ()) > MAX_LOADS:
-        raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
     options |= {
         "loads": loads,
         "estimator": _estimator(args),

@@ -113,12 +113,12 @@ def run(args: argparse.Namespace) -> int:
 
     if not args.balance and (args.hitch is not None or args.behind is not None):
         raise InputError("--hitch and --behind balance the moments of a track: add --balance")
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
+    slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
+    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
-    slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
     most = MOST_BALANCED if args.balance else MAX_ROWS
     if slips.size * loads.size > most:
         raise InputError(

@@ -71,8 +71,9 @@ def run(args: argparse.Namespace) -> int:
         plot_drive,
     )
 
+    driven = read_long_table(args.drive, ignore_extra=args.ignore_extra)
     case = read_case(args.rover, available_effects(args))
-    rows = read_drive(read_long_table(args.drive, ignore_extra=args.ignore_extra), case)
+    rows = read_drive(driven, case)
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)
 
