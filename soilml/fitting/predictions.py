@@ -273,7 +273,7 @@ def _answered(
     requests: Sequence[PredictionRequest], answer: Callable[[Sequence[PredictionRequest]], list[T]]
 ) -> list[T | InputError]:
     """Answers to all requests, those that can be joined together; else one by one."""
-    keys = join_keys([request.case_sets(request.x) for request in requests])
+    keys = join_keys([CaseSets(r.case, len(r.x), {}, r.readings.at) for r in requests])
     groups: dict[object, list[int]] = {}
     for i, (request, own) in enumerate(zip(requests, keys, strict=True)):
         key = own, None if request.estimate is None else request.estimate.nearest
