@@ -129,8 +129,11 @@ def thinned(plans: Sequence[Plan], every: int) -> list[Plan]:
 
 def _added(args: argparse.Namespace, sample: Sequence[Plan]) -> list[tuple[Plan, str]]:
     """Plans beside the sample, with the groups that they enlarge."""
+    if not args.enlarge:
+        return []
     every = [plan for plans in _drawn(args) for plan in plans]
-    return list(gap_enlarged.added(every, sample, args.enlarge)) if args.enlarge else []
+    every += gap_enlarged.further_plans(args.seed)
+    return list(gap_enlarged.added(every, sample, args.enlarge))
 
 
 def _judge(

@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 from gap_case import read_model
-from gap_records import LATER_DESIGNS, NAMEABLE_SIGMA, SUSPECT_DESIGNS, Judged
+from gap_records import FEW_ROWS, LATER_DESIGNS, NAMEABLE_SIGMA, SUSPECT_DESIGNS, Judged
 from gap_separation import separation
 
 from datagen.blind_sets.blind_set import draw_blind_set
-from datagen.blind_sets.plans import Plan
+from datagen.blind_sets.plans import Plan, benchmark_plans
 from soilml.io.table import Table
 
 #: Tiers whose causes are effects of the catalogue.
@@ -25,7 +25,17 @@ GROUPS: Mapping[str, Callable[[Plan], bool]] = {
     ONE_LOAD: lambda p: (
         p.tier in CATALOGUED_TIERS and p.design in SUSPECT_DESIGNS and p.design not in LATER_DESIGNS
     ),
+    FEW_ROWS: lambda p: p.tier in CATALOGUED_TIERS and p.design == FEW_ROWS,
 }
+#: Draws of the plans of few rows beside the first one, by numbers from that of the seed times 100:
+#: one draw has six or seven with a cause that can be named.
+FURTHER_DRAWS = (1, 2)
+
+
+def further_plans(seeds: Sequence[int]) -> list[Plan]:
+    """The plans of few rows of the further draws of these seeds."""
+    drawn = [p for s in seeds for i in FURTHER_DRAWS for p in benchmark_plans(100 * s + i)]
+    return [p for p in drawn if p.design == FEW_ROWS]
 
 
 def added(
@@ -53,8 +63,11 @@ def added(
 
 
 def separating_snr(plan: Plan) -> float:
-    """The separating SNR of a plan's cause, before any analysis."""
-    drawn = draw_blind_set(plan)
+    """The separating SNR of a plan's cause, before any analysis; 0 where no soil carries it."""
+    try:
+        drawn = draw_blind_set(plan)
+    except RuntimeError:
+        return 0.0
     return separation(read_model(drawn.model), Table(dict(drawn.columns)), drawn.truth).snr
 
 

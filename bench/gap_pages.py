@@ -57,9 +57,10 @@ SAME_CAUSE = (
 )
 #: What the sets are that were added to the sample.
 ENLARGED = (
-    " The sample has few sets with a cause that can be named at one load, or beside a discrepancy "
-    "of 4 %. {more} more plans of the same seeds, with an SNR of 3 or more before any analysis, "
-    "were drawn at random. They count in the gates of these two groups at SNR >= 3 alone."
+    " The sample has few sets with a cause that can be named at one load, from few rows, or beside "
+    "a discrepancy of 4 %. {more} more plans, of the same seeds and for few rows of further ones, "
+    "were drawn at random, with an SNR of 3 or more before any analysis. They count in the gates "
+    "of these three groups at SNR >= 3 alone."
 )
 PICTURE = "docs/gap_reliability.png"
 

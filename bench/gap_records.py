@@ -15,9 +15,10 @@ UNIQUE_STATUSES = ("named", "partly-named", "form-open")
 #: Statuses that state an explanation.
 CLAIMING_STATUSES = (*UNIQUE_STATUSES, "class")
 #: Designs that leave suspects, not names: they are judged by those.
-SUSPECT_DESIGNS = ("one-load", "one-run", "jittered-one-load", "few-rows")
+FEW_ROWS = "few-rows"
+SUSPECT_DESIGNS = ("one-load", "one-run", "jittered-one-load", FEW_ROWS)
 #: Tiers and designs with figures of their own, which the others do not count.
-LATER_TIERS, LATER_DESIGNS = ("L", "T"), ("few-rows", "torque-alone")
+LATER_TIERS, LATER_DESIGNS = ("L", "T"), (FEW_ROWS, "torque-alone")
 #: Separation, in sigma, from which an effect can be named.
 NAMEABLE_SIGMA = 3.0
 

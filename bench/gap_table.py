@@ -48,7 +48,7 @@ def figures(sets: Sequence[Judged]) -> list[Figure]:
         *_false_names(usual),
         *_silence(usual),
         *_suspects(usual, gap_enlarged.sampled(every, gap_enlarged.ONE_LOAD)),
-        *gap_families.figures(sets),
+        *gap_families.figures(every),
         *_probabilities(sets),
         *gap_held_out.figures(sets),
         *_region(usual),

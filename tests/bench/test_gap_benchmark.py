@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import Plan, draw_blind_set
+from datagen.blind_sets.plans import benchmark_plans
 from soilml.config.case import read_case
 from soilml.io.table import Table
 
@@ -188,6 +189,13 @@ def test_a_group_is_enlarged_until_it_has_enough_sets():
     assert {group for _, group in found} == {gap_enlarged.LARGE} and len(found) == 8
     assert all(snr(p) > 3.0 and p not in sample and p.discrepancy == 0.04 for p, _ in found)
     assert len(list(gap_enlarged.added(plans, sample, 99, snr))) == 18  # as far as there are any
+
+
+def test_further_draws_have_plans_of_few_rows_that_no_other_seed_has():
+    further = gap_enlarged.further_plans((10, 11))
+    assert len(further) == 4 * 56 and {p.design for p in further} == {"few-rows"}
+    assert len({p.seed for p in further}) == len(further)
+    assert not {p.seed for p in further} & {p.seed for s in (10, 11) for p in benchmark_plans(s)}
 
 
 def test_statements_are_those_of_every_effect_that_was_tested():
