@@ -8,11 +8,13 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import LOG_LOAD_LENGTH, SLIP_LENGTH
+from soilml.errors import InputError
 from soilml.fitting.covariance import USUAL
+from soilml.fitting.least_squares import Solution
 from soilml.fitting.operating_points import gear_numbers
 from soilml.gap.evidence.covariance import Covariance, assemble_covariance
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_many
 from soilml.numerics.smooth_process import slip_load_points, squared_exponential
 from soilml.quantities import column
 
@@ -54,10 +56,10 @@ def with_fitted_lengths(
     with the residuals r of a channel and the covariance V of their noise and scatter, minimised
     over lengths l and amplitudes a on a grid. V is that of the problem, or independent noise of
     a size that is fitted too: what changes fast with slip or load is no noise, and the variance
-    components of a search take it for noise or for scatter between runs. Soil and effects stay as
-    they are, and so does the process of a channel whose discrepancy the case declares. A process
-    that predicts readings of its channel no better than none does, each from the others, is left
-    out: see `_predicts`.
+    components of a search take it for noise or for scatter between runs. The process of a channel
+    whose discrepancy the case declares stays as it is. A process that predicts readings of its
+    channel no better than none does, each from the others, is left out: see `_predicts`. Soil and
+    effects, which were fitted beside it, are then fitted again, and else stay as they are.
 
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.8.
     """
@@ -79,7 +81,18 @@ def with_fitted_lengths(
     case = replace(problem.case, discrepancy=discrepancy)
     evidence = replace(marginal.evidence, amplitude=amplitude)
     problem = replace(problem, case=case, covariance=covariance)
-    return problem, replace(marginal, evidence=evidence)
+    fit = marginal.fit
+    if np.any((amplitude == 0.0) & (marginal.evidence.amplitude > 0.0)):
+        fit = _fitted_again(problem, fit, amplitude)
+    return problem, replace(marginal, fit=fit, evidence=evidence)
+
+
+def _fitted_again(problem: FitProblem, fit: Solution, amplitude: Floats) -> Solution:
+    """A fit beside a remainder of these amplitudes; as it was where the model refuses that."""
+    whiten = problem.discrepancy.whiten(amplitude)
+    started = StartedFit(fit.case, fit.coordinates, fit.start_values(), whiten, fit.linearisation)
+    (found,) = fit_many(problem, [started])
+    return fit if isinstance(found, InputError) else found
 
 
 def _declared(problem: FitProblem, noise: Floats) -> Covariance:

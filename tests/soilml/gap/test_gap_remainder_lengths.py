@@ -7,7 +7,7 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.config.measurement_noise import LOG_LOAD_LENGTH, SLIP_LENGTH, Discrepancy
 from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
-from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.evidence.problem import MarginalFit, StartedFit, fit_many
 from soilml.gap.verdict import remainder_lengths
 from soilml.gap.verdict.learned_remainder import learned_remainder
 from soilml.gap.verdict.remainder_lengths import with_fitted_lengths
@@ -94,6 +94,16 @@ def test_what_changes_with_the_pass_is_no_remainder_of_slip(monkeypatch):
     evidence = replace(problem.discrepancy.evidence(soil), amplitude=np.zeros(3))
     given = problem, MarginalFit(soil, evidence)
     assert with_fitted_lengths(*given)[1].evidence.amplitude[0] == 0.0
+    assert with_fitted_lengths(*given)[1].fit is soil
+    beside = replace(evidence, amplitude=np.asarray([3.0, 0.0, 0.0]))
+    whiten = problem.discrepancy.whiten(beside.amplitude)
+    (away,) = fit_many(problem, [StartedFit(case, problem.soil, soil.start_values(), whiten)])
+    own, again = with_fitted_lengths(problem, MarginalFit(away, beside))
+    assert again.evidence.amplitude[0] == 0.0  # it predicts nothing, and the soil does without it
+    known = own.discrepancy.whiten(again.evidence.amplitude)
+    fits = [fit.whitened_by(known) for fit in (again.fit, away)]
+    best, earlier = (fit.problem.objective(fit.residual, fit.x) for fit in fits)
+    assert best < earlier - 1.0
     monkeypatch.setattr(remainder_lengths, "_predicts", lambda *_: True)
     assert with_fitted_lengths(*given)[1].evidence.amplitude[0] > 0.0
 
