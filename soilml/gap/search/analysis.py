@@ -51,6 +51,8 @@ SOIL_STARTS = (0.5, 0.25)
 #: run-to-run standard deviations by less than this many units: weights of the readings then differ
 #: by less than their estimation error.
 SCALE_TOLERANCE, RUN_EFFECT_TOLERANCE = 0.2, 0.3
+#: Code of the remark that no effect is needed where the priors of the soil are opened.
+OUTSIDE_PRIORS = "soil-outside-priors"
 #: Decrease of the objective from which an analysis with opened priors replaces the one with those
 #: of the case: tempered odds of 1 to 9. It then names suspects only.
 OPENED_MARGIN = 9.0
@@ -69,7 +71,7 @@ class Analysis:
     `predictions` are those of rows kept back, by the soil alone and the likeliest explanations.
     `of_all` is the analysis of all readings, where some were excluded.
     `excluded` (m,) are the readings of `outliers` among all.
-    `opened` says which priors of the soil were opened, where they were.
+    `opened` says which priors of the soil were opened where that matters, which forbids a name.
     `error` is the reason why the data could not be analysed, if they could not.
     """
 
@@ -96,7 +98,8 @@ def analyse(
     """Search for the effects that explain what the soil alone does not.
 
     Where the soil presses against its priors, the search is repeated with these opened; it counts
-    where it explains the readings far better.
+    where it explains the readings far better. Where the soil alone then leaves no gap, that speaks
+    against a cause.
 
     `place` gives the file and line of a row, for messages; `progress` is called with the share that
     is done.
@@ -121,6 +124,10 @@ def analyse(
                 likeliest = _predictive(other)
                 if likeliest is not None and explains_better(found, other, likeliest):
                     found = replace(other, opened=opened.remark)
+            elif not (other.error or other.outliers or other.result.has_gap):
+                text = f"{opened.remark}, and the soil alone then agrees with the rows"
+                remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
+                found = replace(found, opened=remark)
     return found
 
 

@@ -41,14 +41,17 @@ class Posterior:
     most of the data without the others. A set with another law counts with `OTHER_LAW`.
 
     Of these, the sets in `unlisted` are no suspects: they predict rows that were kept back worse
-    than the soil alone does, beyond sampling error, or need an implausible size. Those in
-    `unproven` predict them no better, within sampling error: they can be suspected, not named.
+    than the soil alone does, beyond sampling error, or need an implausible fault of a sensor. Those
+    in `oversized` need an implausible size: none of them comes first where another set is listed.
+    Those in `unproven` predict them no better, within sampling error: they can be suspected, not
+    named.
     """
 
     log_weights: dict[Names, float]
     refused: Mapping[Names, frozenset[str]] = field(default_factory=dict)
     unlisted: frozenset[Names] = frozenset()
     unproven: frozenset[Names] = frozenset()
+    oversized: frozenset[Names] = frozenset()
 
     def probability(self, *effects: str) -> float:
         """Probability that these effects are present, causes outside the catalogue included."""
@@ -90,6 +93,20 @@ class Posterior:
             elif parts:
                 del odds[names]
         return sorted(odds.items(), key=lambda item: (-item[1], -self.weight(item[0]), item[0]))
+
+    def from_first(
+        self, ranked: Sequence[tuple[Names, float]], fitted: Collection[Names]
+    ) -> list[tuple[Names, float]]:
+        """Ranked sets from the first suspect: the likeliest of usual size that was fitted in full.
+
+        Likelier ones of an implausible size follow it; without one of usual size, one of them
+        comes first.
+        """
+        known = [i for i, (names, _) in enumerate(ranked) if names in fitted]
+        usual = [i for i in known if ranked[i][0] not in self.oversized]
+        first = (usual or known or [0])[0]
+        before = [own for own in ranked[:first] if own[0] in self.oversized]
+        return [*ranked[first : first + 1], *before, *ranked[first + 1 :]]
 
     def effects(self) -> list[str]:
         """All effects with a probability, the likeliest first."""

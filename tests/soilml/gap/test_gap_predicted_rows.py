@@ -33,6 +33,22 @@ def test_a_set_that_is_not_listed_is_no_suspect():
     assert dict(part.ranked())[("b",)] > dict(Posterior(logs).ranked())[("b",)]
 
 
+def test_a_set_of_an_implausible_size_follows_the_first_of_a_usual_size():
+    logs = {(): -4.0, ("a",): -0.1, ("b",): -2.5, ("c",): -3.0}
+    found = Posterior(logs, refused={("a",): frozenset()}, oversized=frozenset({("a",)}))
+    assert found.probability("a") == pytest.approx(0.3 * Posterior(logs).probability("a"))
+    every = {("a",), ("b",), ("c",)}
+
+    def order(fitted):
+        return [names[0] for names, _ in found.from_first(found.ranked(), fitted)]
+
+    assert [names[0] for names, _ in found.ranked()] == ["a", "b", "c"]
+    assert order(every) == ["b", "a", "c"]
+    assert order({("a",), ("c",)}) == ["c", "a"]  # what was not fitted does not come first
+    assert order({("a",)}) == ["a", "b", "c"]  # nothing of a usual size was fitted
+    assert found.from_first([], every) == []
+
+
 def scored(*by_fold):
     return HeldOutPrediction(np.zeros(4), np.ones(4), by_fold)
 
@@ -93,6 +109,18 @@ def test_no_figure_of_a_report_grows_and_suspects_say_how_they_predict():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("factor", [0.4, 2.5])
+def test_a_prior_that_excludes_the_soil_makes_a_suspect_and_no_name(factor):
+    """Nothing is hidden; within the priors, an effect has to explain what the soil cannot."""
+    case = case_of()
+    wrong = Prior(0.9 * factor * case.soil.shear_modulus, 1.1 * factor * case.soil.shear_modulus)
+    narrow = replace(case, prior=case.prior | {"shear_modulus": wrong})
+    report = gap(narrow, driven(case, seed=3))
+    assert report.status == "suspected" and report.effects == ()
+    assert "soil-outside-priors" in {reason.code for reason in report.reasons}
+    assert gap(case, driven(case, seed=3)).status == "no-gap"
+
+
 def test_a_prior_that_excludes_the_truth_is_opened_and_the_report_says_so():
     case = case_of()
     soil = replace(case.soil, shear_modulus=0.003)
