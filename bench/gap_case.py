@@ -136,7 +136,7 @@ def _compared(
             if name in report.soil_before
         }
     }
-    models = {"soil": soil_only, "named": report.model, "predictive": report.predictive_model}
+    models = {"soil": soil_only, "named": report.model}
     plain_design = len(measured) == len(CHANNELS) and "gear" not in table
     if number % EVERY == 0 and plain_design:
         compared["naming"] = gap_baselines.names(soil_only, table, case)

@@ -40,12 +40,12 @@ MOST_EFFECTS, RESAMPLES = 3, 50
 def gap_entry(data: SetData, seed: int) -> Answer:
     """The gap workflow: its posterior probabilities, and the model that it returns.
 
-    The model that it suspects, where it does not name a cause. The probability that it leaves is
-    divided between `none` and `unknown`; see `gap_probabilities`. Rows kept back are predicted by
-    the model to first order, with its smooth error and scatter given all readings.
+    The probability that it leaves is divided between `none` and `unknown`; see
+    `gap_probabilities`. Rows kept back are predicted by the model to first order, with its smooth
+    error and scatter given all readings.
     """
     report = gap(data.case, data.runs, seed=seed)
-    case = replace(report.suspected_model or report.model, remainder=None)
+    case = replace(report.model, remainder=None)
     readings, runs = data.joined(case)
     jacobian, expected = _linear_soil(case, readings)
     parts = [jacobian, discrepancy_process(readings, case.discrepancy, Discrepancy()).columns]

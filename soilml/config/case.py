@@ -75,6 +75,9 @@ class Case:
         of `discrepancy`.
     drive
         What the rover's drives report beside the torque on the soil.
+    suspected
+        Names of effects that a gap analysis suspects and does not name: `grousers@lugged`. They are
+        a part of every prediction.
     """
 
     model: Model
@@ -89,6 +92,7 @@ class Case:
     remainder: Remainder | None = None
     simulator: Simulator | None = None
     drive: DriveErrors = field(default_factory=DriveErrors)
+    suspected: tuple[str, ...] = ()
 
     @property
     def states_model_error(self) -> bool:
@@ -150,10 +154,35 @@ class Case:
         shared = [effect for effect in self.model.effects if effect.name not in replaced]
         remainder = None if self.remainder is None else self.remainder.of_gear(name)
         model = Model(own.gear, (*shared, *own.effects))
-        case = replace(self, model=model, prior={}, gears={}, remainder=remainder)
+        suspected = tuple(n for n in (_name_on_gear(s, name) for s in self.suspected) if n)
+        case = replace(
+            self, model=model, prior={}, gears={}, remainder=remainder, suspected=suspected
+        )
         paths = self.paths_of_gear(name)
         prior = {paths[path]: prior for path, prior in self.prior.items() if path in paths}
         return replace(case, prior=prior)
+
+    def without_suspected(self) -> Case:
+        """The case without its suspected effects, and without the remainder beside them."""
+        if not self.suspected:
+            return self
+
+        def known(model: Model, of_gear: str = "") -> Model:
+            kept = [e for e in model.effects if f"{e.name}{of_gear}" not in self.suspected]
+            return replace(model, effects=tuple(kept))
+
+        return replace(
+            self,
+            model=known(self.model),
+            gears={name: known(own, f"@{name}") for name, own in self.gears.items()},
+            prior={
+                path: prior
+                for path, prior in self.prior.items()
+                if path.partition(".")[0] not in self.suspected
+            },
+            remainder=None,
+            suspected=(),
+        )
 
     def paths_of_gear(self, name: str) -> dict[str, str]:
         """Paths of the parameters that act on one of several gears: here, and in `of_gear`."""
@@ -167,6 +196,12 @@ class Case:
         for path in located(own):
             paths[_path_of_gear(name, path)] = path.removeprefix("effects.")
         return paths
+
+
+def _name_on_gear(effect: str, gear: str) -> str:
+    """Name of an effect of the case in that of one of its gears, empty where it is of another."""
+    name, _, of_gear = effect.partition("@")
+    return name if of_gear in ("", gear) else ""
 
 
 def _path_of_gear(name: str, path: str) -> str:
@@ -284,8 +319,9 @@ def take_case(
     """The case in the tables that `read_case` reads; others are left unread."""
     gears: dict[str, Model] = {}
     gear_priors: dict[str, Prior] = {}
+    of_gears: tuple[str, ...] = ()
     if "gears" in settings:
-        gears, gear_priors = take_gears(settings, effects)
+        gears, gear_priors, of_gears = take_gears(settings, effects)
         if not gears:
             settings.fail("[gears] is empty; write each gear as [gears.NAME]")
         model = Model(next(iter(gears.values())).gear)
@@ -301,7 +337,7 @@ def take_case(
         if with_simulator:
             gear, simulator = emulated(simulator, own_soil, prior)
             model = Model(gear)
-    model, effect_priors = take_effects(settings.tables("effect"), effects, model)
+    model, effect_priors, suspected = take_effects(settings.tables("effect"), effects, model)
     for name, other in gears.items():
         for effect in model.effects:
             if not effect.applies_to(other.gear):
@@ -339,4 +375,5 @@ def take_case(
         remainder=remainder,
         simulator=simulator,
         drive=take_drive(settings.table("drive")) if "drive" in settings else DriveErrors(),
+        suspected=(*suspected, *of_gears),
     )

@@ -82,6 +82,7 @@ def _number(unit: str) -> str:
 
 
 UNNAMED_GEAR = "gear"  # Name of the gear in [gear], beside those in [gears.NAME]
+SUSPECTED = "suspected"  # Key of an effect that predicts, and that nothing names
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 #: Kinds of tests; the key of the measured quantity identifies the kind.
@@ -103,10 +104,13 @@ def take_gear(settings: Settings) -> Gear:
     return gear
 
 
-def take_gears(settings: Settings, effects: Effects) -> tuple[dict[str, Model], dict[str, Prior]]:
+def take_gears(
+    settings: Settings, effects: Effects
+) -> tuple[dict[str, Model], dict[str, Prior], tuple[str, ...]]:
     """The gears in [gear], where it is present, and in [gears.NAME], with their own effects.
 
-    The priors are those of the effects, by path: `grousers@lugged.height`.
+    The priors are those of the effects, by path: `grousers@lugged.height`. Then come the names of
+    the effects that are suspected: `grousers@lugged`.
     """
     tables = {}
     if "gear" in settings:
@@ -122,22 +126,24 @@ def take_gears(settings: Settings, effects: Effects) -> tuple[dict[str, Model], 
             f"{settings.where} [gears.{name}]",
             settings.folder,
         )
-    gears, priors = {}, {}
+    gears, priors, suspected = {}, {}, []
     for name, own in tables.items():
         entries = own.tables("effect")
-        model, own_priors = take_effects(entries, effects, Model(take_gear(own)))
+        model, own_priors, marked = take_effects(entries, effects, Model(take_gear(own)))
         gears[name] = model
+        suspected += [f"{effect}@{name}" for effect in marked]
         for path, prior in own_priors.items():
             effect, _, parameter = path.partition(".")
             priors[f"{effect}@{name}.{parameter}"] = prior
-    return gears, priors
+    return gears, priors, tuple(suspected)
 
 
 def take_effects(
     entries: list[Settings], effects: Effects, model: Model
-) -> tuple[Model, dict[str, Prior]]:
-    """The model with the effects of tables [[effect]], and their priors by path."""
+) -> tuple[Model, dict[str, Prior], tuple[str, ...]]:
+    """The model with the effects of tables [[effect]], their priors by path, and suspected ones."""
     prior: dict[str, Prior] = {}
+    suspected = []
     for entry in entries:
         name = entry.text("name")
         if name not in effects:
@@ -145,13 +151,15 @@ def take_effects(
                 f"name is {name!r}; {did_you_mean(name, effects)}there are: {', '.join(effects)}"
             )
         priors = entry.table("prior")
+        if entry.take(SUSPECTED, bool, "true or false", False):
+            suspected.append(name)
         try:
             model = model + take_instance(effects[name], entry)
         except InputError as error:
             entry.fail(str(error).removeprefix(f"{entry.where}: "))
         entry.finish()
         prior |= {f"{name}.{k}": v for k, v in take_priors(priors, effects[name]).items()}
-    return model, prior
+    return model, prior, tuple(suspected)
 
 
 def take_instance(cls: type, settings: Settings) -> Any:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
 from soilml.config.measurement_noise import discrepancy_as_settings
-from soilml.config.model_settings import UNNAMED_GEAR
+from soilml.config.model_settings import SUSPECTED, UNNAMED_GEAR
 from soilml.config.remainder import remainder_lines
 from soilml.config.wheeled_rover import DRIVE_KEYS, DriveErrors, WheeledRover
 from soilml.numerics.prior import Prior
@@ -118,6 +118,8 @@ def _key(name: str) -> str:
 def _effect_lines(case: Case, effect: Effect, table: str, path: str) -> list[str]:
     """An effect with its priors, which are those below `path`."""
     lines, default = [f"[[{table}]]", f'name = "{effect.name}"'], type(effect)()
+    if path in case.suspected:
+        lines.append(f"{SUSPECTED} = true  # it predicts, and is not named")
     for key in declared(type(effect)):
         if float(getattr(effect, key)) != float(getattr(default, key)):
             lines.append(f"{key} = {_number(getattr(effect, key))}")

@@ -15,9 +15,6 @@ if TYPE_CHECKING:
     from soilml.gap.design.identifiability import Audit
     from soilml.gap.report.results import GapReport
 
-#: The file that there is where causes are suspected but not named.
-SUSPECTED_FILE = "model_suspected.toml"
-
 
 def gap_files(
     report: GapReport, model_name: str, runs_name: str, origin: Provenance | None = None
@@ -32,19 +29,17 @@ def gap_files(
     if origin is None:
         origin = Provenance.of(["gap", model_name, runs_name], [])
     entry = {"report": summary(report, model_name, runs_name).as_json(origin)}
-    content = {
+    comments = [report.sentence]
+    if names := report.model.suspected:
+        comments += [
+            f"{' + '.join(names)} is suspected, not named: it predicts rows kept back better."
+        ]
+    return {
         "report.html": page(report, model_name, runs_name, origin),
         "gap.json": json_text(report.as_json() | entry),
-        "model.toml": case_as_toml(report.model, [report.sentence]),
+        "model.toml": case_as_toml(report.model, comments),
         "next_runs.csv": csv_text(_next_runs(report)),
     }
-    if report.suspected_model is not None:
-        first = " + ".join(report.best_unclaimed)
-        heading = f"With {first}, which is suspected, not named. {report.sentence}"
-        if report.predictive_model is report.suspected_model:
-            heading += " Rows kept back are predicted better with it than by model.toml."
-        content[SUSPECTED_FILE] = case_as_toml(report.suspected_model, [heading])
-    return content
 
 
 def _next_runs(report: GapReport) -> dict[str, list[Any]]:

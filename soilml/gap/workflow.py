@@ -44,6 +44,7 @@ from soilml.gap.verdict.decision import (
     cause_set,
     decide,
     is_left_open,
+    predictive_suspect,
     reasons,
     unclaimed_effects,
     with_refused_outside,
@@ -59,6 +60,7 @@ from soilml.gap.verdict.entries import (
     signature_similarity,
     soil_beside_discrepancy,
     soil_marginal,
+    suspect_notes,
     suspects,
     variance_component_entries,
 )
@@ -180,7 +182,7 @@ def gap(
     'no-gap'
     """
     effects = candidate_effects(case, effects)
-    case = without_learned_discrepancy(case)
+    case = without_learned_discrepancy(case).without_suspected()
     known_costs = check_costs(costs or {})
     table = with_rover_columns(case, with_order_columns(case, as_table(table), FROM_ORDER))
     check_wheel_size(case, table)
@@ -273,7 +275,9 @@ def _build_report(
     excluded = _changed_by_outliers(analysis, decision, obstacles)
     before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
     shown = decision.shown.best if decision.shown else before
-    written = shown if decision.claimed else beside  # what model.toml contains
+    suspected = predictive_suspect(decision, predictive_gains(analysis.predictions))
+    explained = shown if decision.claimed else beside
+    written = shown if suspected else explained  # what model.toml contains
     plain = plain_fit(problem, result.soil, decision.shown) if decision.shown else result.soil
     figures, beside_remainder = gap_reductions(analysis, decision.shown, plain, seed)
     if held_out is not None and len(held_out):
@@ -284,18 +288,24 @@ def _build_report(
     figures, not_reduced = without_grown(figures, addition)
     beside_remainder, _ = without_grown(beside_remainder, addition)
     replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
-    intervals = with_uncertain_discrepancy(problem, written)
     if smooth_gap:
+        own, written = with_fitted_lengths(problem, written)
+        learned = learned_remainder(own, written)
         left = discrepancy_amplitudes(problem, written)
-        learned = learned_remainder(*with_fitted_lengths(problem, written))
+        intervals = with_uncertain_discrepancy(problem, written)
         spread = among_candidates(intervals, result.candidates, result.posterior)
     else:
         left, learned = None, None
+        intervals = with_uncertain_discrepancy(problem, written)
         spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
+    marked = tuple(n for n in suspected if n not in effect_names(case))  # what the case had stays
+    listed = suspects(analysis, decision.claimed) if smooth_gap else []
+    sizes = result.posterior.oversized & {s.effects for s in listed}
+    doubted = [c.fit for c in result.candidates if c.names in sizes]
     report = GapReport(
         status=decision.status,
         sentence="",
-        model=updated_case(intervals, left, learned),
+        model=replace(updated_case(intervals, left, learned), suspected=marked),
         cause_set=cause_set(decision, result),
         probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
         best_unclaimed=unclaimed_effects(decision, result),
@@ -309,7 +319,8 @@ def _build_report(
         notes=(
             *excluded,
             *checks.notes,
-            *analysis_notes(analysis, written.fit, shown.fit, replicates),
+            *suspect_notes(suspected),
+            *analysis_notes(analysis, written.fit, [shown.fit, *doubted], replicates),
             *not_reduced,
             *(drift if smooth_gap else ()),
             *(hidden_effect(problem, result) if decision.status == "no-gap" else ()),
@@ -322,11 +333,6 @@ def _build_report(
         seed=seed,
         curves=readings_and_predictions(analysis, plain),
     )
-    if decision.status == "suspected":
-        fit = with_uncertain_discrepancy(problem, shown)
-        beside_shown = learned_remainder(*with_fitted_lengths(problem, shown))
-        suspected = updated_case(fit, discrepancy_amplitudes(problem, shown), beside_shown)
-        report = replace(report, suspected_model=suspected)
     if decision.claimed:
         claimed = decision.claimed
         similarity = signature_similarity(problem, claimed[0].fit, claimed[0].amplitude)
@@ -343,12 +349,12 @@ def _build_report(
         conditions = (*conditions, noise_range(analysis, decision.shown))
     return replace(
         report,
-        suspects=tuple(suspects(analysis, decision.claimed)),
+        suspects=tuple(listed),
         conditions=conditions,
         where=tuple(discrepancy_map(problem, result.soil, seed)),
         residual_trend=residual_trend(problem, left_by.fit),
         discrepancy=remaining_discrepancy(problem, beside, left_by),
-        remainder_cause=described_cause(problem, written, seed),
+        remainder_cause=described_cause(problem, explained, seed),
         next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
     )
 

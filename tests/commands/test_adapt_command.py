@@ -10,7 +10,6 @@ from conftest import THREE_CHANNEL_MODEL
 import soilml
 from soilml import SlipSinkage, read_case, simulate
 from soilml.cli import main
-from soilml.gap.presentation import SUSPECTED_FILE
 from soilml.io.text_tables import csv_text
 from training.adaptation import board_file
 from training.adaptation.supported_errors import CHECKED
@@ -144,15 +143,17 @@ def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys
 
 def test_a_gap_that_needs_other_priors_trains_nothing(tmp_path):
     model = tmp_path / "model.toml"
-    model.write_text(THREE_CHANNEL_MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n')
+    model.write_text(THREE_CHANNEL_MODEL)
+    case = read_case(model)
+    effect = '[[effect]]\nname = "slip-sinkage"\nsuspected = true\nn1 = 0.4\n'
+    model.write_text(THREE_CHANNEL_MODEL + effect)
     reason = {"code": "prior-opened", "about": ["kphi"], "severity": "warning", "text": ""}
     content = {
         "status": "suspected", "sentence": "", "reasons": [reason], "soil_before": {},
     }  # fmt: skip
     (tmp_path / "gap.json").write_text(json.dumps(content))
-    model.rename(tmp_path / SUSPECTED_FILE)
-    (tmp_path / "model.toml").write_text(THREE_CHANNEL_MODEL)
-    case = read_case(tmp_path / "model.toml")
+    alone = _read_gap(tmp_path, case, suspected=False)
+    assert alone.refusal is not None and alone.refusal.code == "gap-suspected"
     found = _read_gap(tmp_path, case, suspected=True)
     assert found.effects == ("slip-sinkage",)
     assert found.refusal is not None and found.refusal.code == "prior-opened"

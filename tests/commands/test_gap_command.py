@@ -175,7 +175,7 @@ def analysed(inputs, tmp_path, capsys, *arguments):
     """Status of an analysis that ran, and its gap.json."""
     assert main(["gap", *arguments, "--out", str(tmp_path / "out")]) == 0
     written = {p.name for p in (tmp_path / "out").iterdir()}
-    assert written - {"model_suspected.toml"} == set(FILES)
+    assert written == set(FILES)
     found = content(tmp_path / "out")
     assert capsys.readouterr().out.startswith(f"{found['status']}: ")
     return found
@@ -204,7 +204,7 @@ def test_two_rows_are_bad_data(inputs, tmp_path, capsys):
 
 
 def test_one_load_has_suspects_and_names_nothing(one_load):
-    assert sorted(p.name for p in one_load.iterdir()) == sorted([*FILES, "model_suspected.toml"])
+    assert sorted(p.name for p in one_load.iterdir()) == sorted(FILES)
     found = content(one_load)
     assert found["status"] == "suspected"
     assert found["effects"] == []
@@ -219,16 +219,25 @@ def test_one_load_has_suspects_and_names_nothing(one_load):
     assert "inside-priors" in {condition["code"] for condition in found["conditions"]}
     first = found["suspects"][0]["effects"]
     assert found["best_unclaimed"] == first
-    assert "[[effect]]" not in (one_load / "model.toml").read_text()
-    suspected = (one_load / "model_suspected.toml").read_text()
-    assert all(f'name = "{name}"' in suspected for name in first)
+    assert found["suspects"][0]["predictive_gain"] > 0.0
 
 
-def test_a_model_of_an_earlier_suspicion_does_not_stay(inputs, tmp_path, capsys):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "model_suspected.toml").write_text("of an earlier analysis")
-    analysed(inputs, tmp_path, capsys, str(inputs / "model.toml"), str(inputs / "two.csv"))
-    assert not (tmp_path / "out" / "model_suspected.toml").exists()
+def test_a_suspect_that_predicts_is_marked_in_the_model_and_no_part_of_the_next_analysis(
+    one_load, inputs, tmp_path, capsys
+):
+    found = content(one_load)
+    names = tuple(found["suspects"][0]["effects"])
+    text = (one_load / "model.toml").read_text()
+    assert f"# {' + '.join(names)} is suspected, not named" in text
+    assert all(f'name = "{name}"\nsuspected = true' in text for name in names)
+    (note,) = [note for note in found["notes"] if note["code"] == "suspect-predicts"]
+    assert tuple(note["about"]) == names
+    model = read_case(one_load / "model.toml")
+    assert model.suspected == names
+    again = analysed(
+        inputs, tmp_path, capsys, str(one_load / "model.toml"), str(inputs / "one.csv")
+    )
+    assert again["status"] == "suspected" and tuple(again["suspects"][0]["effects"]) == names
 
 
 def test_noise_that_nobody_declared_is_bad_data_with_a_hint(inputs, tmp_path, capsys):

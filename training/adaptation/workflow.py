@@ -16,7 +16,8 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import gap
 from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
-from soilml.gap.presentation import SUSPECTED_FILE, gap_files
+from soilml.gap.presentation import gap_files
+from soilml.gap.search.analysis import OUTSIDE_PRIORS
 from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
 from soilml.io.atomic_files import create_folder, write_files
@@ -52,8 +53,7 @@ ADAPTED, BEFORE = FileNames("adapted"), FileNames("before")
 ADAPTED_MODEL = "adapted.toml"
 SPLIT_FILES = ("campaign.csv", "kept_back.csv")
 GAP_FILES = tuple(
-    f"gap/{name}"
-    for name in ("report.html", "gap.json", "model.toml", "next_runs.csv", SUSPECTED_FILE)
+    f"gap/{name}" for name in ("report.html", "gap.json", "model.toml", "next_runs.csv")
 )
 ROWS = 40_000  # Synthetic rows of each file, by default
 
@@ -100,7 +100,8 @@ def adapt(
     folder : path
         Where all files are written; it is created.
     suspected : bool
-        Whether the first suspect is added where the evidence names no effect.
+        Whether the first suspect counts where the evidence names no effect, and `gap` predicts rows
+        kept back better with it.
     against : path, optional
         A model file for this wheel, or a released one by name, in the place of one trained on the
         model as it was.
@@ -272,15 +273,14 @@ def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
     """The gap of a campaign from its files, and whether it supports a change."""
     content = json.loads((folder / "gap.json").read_text(encoding="utf-8"))
     status = content["status"]
-    name = SUSPECTED_FILE if suspected and (folder / SUSPECTED_FILE).exists() else "model.toml"
-    found = read_case(folder / name, with_bias=True)
+    found = read_case(folder / "model.toml", with_bias=True)
     known = {effect.name for effect in case.model.effects}
     effects = tuple(e.name for e in found.model.effects if e.name not in known)
     refusal = None
     if not (status in CLAIMED or (status == "suspected" and suspected)) or not effects:
         text = f"the gap analysis ends with {status}, which supports no change of the model"
         refusal = Remark(f"gap-{status}", text, severity="note")
-    elif any(one["code"] == "prior-opened" for one in content["reasons"]):
+    elif any(one["code"] in ("prior-opened", OUTSIDE_PRIORS) for one in content["reasons"]):
         text = (
             "only soils outside of [soil.prior] explain the gap; give priors in which the "
             "soils to come lie, and in which gap/report.html finds that of the campaign"

@@ -39,8 +39,9 @@ interruption: steps whose inputs are the same are kept.
 
 The exit status is 0 also where the analysis supports no change, which is a
 result, and 2 for bad input. --suspected adds the first suspect where the
-evidence names no effect. --soil TRUE.toml, with [soil], compares the estimates
-with a soil that is known; columns such as cohesion_Pa do the same for each run.
+evidence names no effect and `gap` predicts rows kept back better with it.
+--soil TRUE.toml, with [soil], compares the estimates with a soil that is known;
+columns such as cohesion_Pa do the same for each run.
 """
 #: Files of the folder, beside those of the folder `gap` in it.
 FILES = (
@@ -58,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--suspected",
         action="store_true",
-        help="add the first suspect where the evidence names no effect",
+        help="add the first suspect where the evidence names none, and it predicts better",
     )
     parser.add_argument(
         "--against",

@@ -21,9 +21,8 @@ from soilml.io.cell_text import read_number
 if TYPE_CHECKING:
     from soilml.physics.effects.base import Effect
 
-#: Files of the folder, and a further one where causes are suspected but not named.
+#: Files of the folder.
 FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
-SUSPECTED_FILE = "model_suspected.toml"
 HELP = "find where a model and measured runs disagree, and name the missing effect"
 DESCRIPTION = """\
 Compare MODEL.toml with measured runs. Where they disagree by more than noise
@@ -43,10 +42,10 @@ error in them appears as an effect.
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
 slip_angle_rad, time_s and <column>_std. DIR receives report.html (start here),
-gap.json, model.toml (the model with the effects that the evidence supports) and
-next_runs.csv (runs to measure next); and model_suspected.toml where causes are
-suspected but not named. The exit status is 0 whatever the result and 2 for bad
-input.
+gap.json, model.toml (the model with the effects that the evidence supports, or
+with a suspected one, marked so, where rows kept back are predicted better with
+it) and next_runs.csv (runs to measure next). The exit status is 0 whatever the
+result and 2 for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.
@@ -85,7 +84,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder exists already."""
-    return folder_outputs("--out", args.out, (*FILES, SUSPECTED_FILE))
+    return folder_outputs("--out", args.out, FILES)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -124,10 +123,8 @@ def run(args: argparse.Namespace) -> int:
         )
     texts = gap_files(report, str(args.model), str(args.runs), origin_of(args))
     folder = Path(args.out)
-    # a suspected model of an earlier analysis would contradict this one
-    earlier = [folder / SUSPECTED_FILE] if SUSPECTED_FILE not in texts else []
     files = {folder / name: text for name, text in texts.items()}
-    write_files(files, folders=[folder], remove=earlier)
+    write_files(files, folders=[folder])
     show(gap_text(report))
     tell(f"\n{', '.join(str(name) for name in files)}")
     return 0

@@ -116,9 +116,8 @@ _ADVICE = {
     "no-gap": "Use the model as it is, within the measured range of slip and load.",
     "undecided": "Do not use the model as it is yet: find out why the measurements disagree, then "
     "correct the noise in the model file or the runs, and analyse again.",
-    "suspected": "Make the first run under Next runs. model.toml contains the soil alone, with its "
-    "discrepancy; model_suspected.toml contains the first suspect. Predict with that one where its "
-    "gain on rows kept back is above zero.",
+    "suspected": "Make the first run under Next runs. model.toml contains the first suspect, "
+    "marked as such, where it predicts rows kept back better; else the soil alone.",
     "partly-named": "model.toml contains the effect and, under [discrepancy], the size of what is "
     "left, which widens every interval computed from it. Make the first run under Next runs.",
     "named": "model.toml contains the effect. Make the first run under Next runs to confirm it.",

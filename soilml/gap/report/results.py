@@ -256,7 +256,8 @@ class GapReport:
     lines : tuple of Remark
         At most five sentences below it: what was tried, what is left and where, what to drive next.
     model : Case
-        The fitted model; it contains an effect only where one is claimed.
+        The fitted model. It contains the effects that are claimed, or those of the first suspect
+        where its `predictive_gain` is above zero; `model.suspected` names the latter.
     effects : tuple of NamedEffect
         The effects that were added.
     cause_set : tuple of tuple of str
@@ -272,9 +273,7 @@ class GapReport:
     remainder_cause : RemainderCause, optional
         Stage of the cause of the remainder, and what it depends on, where the readings tell.
     best_unclaimed : tuple of str
-        The explanation that is likeliest where no cause is claimed; it is not in `model`.
-    suspected_model : Case, optional
-        The model with the likeliest suspect, where the status is `suspected`.
+        The explanation that is likeliest where no cause is claimed.
     reasons : tuple of Remark
         Why no cause can be named, or why the data cannot be analysed.
     where : tuple of RegionScore
@@ -322,7 +321,6 @@ class GapReport:
     discrepancy: dict[str, RemainingDiscrepancy] = field(default_factory=dict)
     remainder_cause: RemainderCause | None = None
     best_unclaimed: tuple[str, ...] = ()
-    suspected_model: Case | None = field(default=None, metadata=ELSEWHERE)
     lines: tuple[Remark, ...] = ()
     reasons: tuple[Remark, ...] = ()
     where: tuple[RegionScore, ...] = ()
@@ -355,18 +353,6 @@ class GapReport:
         from soilml.gap.report.gap_figure import plot_gap
 
         return plot_gap(self.gap, ax, part)
-
-    @property
-    def predictive_model(self) -> Case:
-        """The model to predict with: that of the first suspect where it predicts better.
-
-        It does where its `predictive_gain` is above zero: rows that were kept back are likelier by
-        it than by the soil alone. Else it is `model`, as for all other statuses. A suspect is no
-        name: what is wrong with the model and what predicts best are two questions.
-        """
-        gains = {s.effects: s.predictive_gain for s in self.suspects}
-        better = (gains.get(self.best_unclaimed) or 0.0) > 0.0
-        return (self.suspected_model if better else None) or self.model
 
     @property
     def soil_tests(self) -> list[SoilTestAgreement]:

@@ -37,9 +37,11 @@ _IN_SHORT = {
     "nothing-is-better": "no effect or smooth discrepancy is better",
     "not-decisive": "the evidence is not decisive",
     "implausible-fault": "a sensor's fault would be implausibly large",
+    "implausible-size": "an effect would have to be implausibly large",
     "not-predictive": "the best fit does not predict rows kept back",
     "other-law": "the law differs from the catalogue's",
     "not-catalogued": "a large discrepancy is left beside it",
+    "soil-outside-priors": "a soil outside its priors explains the rows",
     "prior-opened": "a fit pressed against its prior",
     "few-readings": "there are few readings",
     "one-run": "there is one run only",
@@ -268,8 +270,7 @@ _NOT_SUPPORTED_BY = {
     "suspected": [
         (
             "cause",
-            "any cause: model.toml contains the refitted soil and no new effect; "
-            "model_suspected.toml contains the first suspect",
+            "any cause: an effect that model.toml marks as suspected predicts, and is not named",
         )
     ],
 }

@@ -93,9 +93,9 @@ class SearchResult:
 
     @property
     def likeliest_suspect(self) -> Explanation | None:
-        """The likeliest candidate that can be suspected; see `Posterior.unlisted`."""
-        unlisted = self.posterior.unlisted
-        return next((c for c in self.candidates if c.names and c.names not in unlisted), None)
+        """The likeliest candidate that can be the first suspect; see `Posterior`."""
+        refused = self.posterior.unlisted | self.posterior.oversized
+        return next((c for c in self.candidates if c.names and c.names not in refused), None)
 
 
 def without_search(

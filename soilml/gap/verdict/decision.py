@@ -41,6 +41,9 @@ IMPLAUSIBLE_FAULT = (
     "{} would explain the gap, but would have to be implausibly large for a fault of a sensor or "
     "of the rig: check that first"
 )
+IMPLAUSIBLE_SIZE = (
+    "{} would have to be far larger than it usually is, so that its law or the cause is another one"
+)
 NOT_PREDICTIVE = (
     "{} fits the rows, but predicts rows that were kept back no better than the soil alone does"
 )
@@ -101,10 +104,15 @@ def decide(
     if not suspects:  # many weak rivals share the probability that the soil alone lacks
         return Decision("unknown", (), None)
     not_proven = result.posterior.unlisted | result.posterior.unproven
+    if best.names in result.posterior.oversized:
+        text = IMPLAUSIBLE_SIZE.format(" + ".join(best.names))
+        remark = Remark("implausible-size", text, best.names)
+        return Decision("suspected", (), _first_suspect(result), remark)
     if best.names in not_proven:
         text = NOT_PREDICTIVE.format(" + ".join(best.names))
         remark = Remark("not-predictive", text, best.names)
         return Decision("suspected", (), _first_suspect(result), remark)
+    not_proven |= result.posterior.oversized
     listed = tuple(c for c in accepted if c.names not in not_proven)
     if _far_from_catalogue(problem, result, best):
         text = OTHER_LAW.format(" + ".join(best.names))
@@ -148,13 +156,10 @@ def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool
 
 
 def _first_suspect(result: SearchResult) -> Explanation | None:
-    """The candidate that is listed first: the likeliest; see `Posterior.ranked`.
-
-    An effect that was not fitted in full is passed over.
-    """
+    """The candidate that is listed first; see `Posterior.ranked` and `Posterior.from_first`."""
     fitted = {c.names: c for c in result.candidates}
-    listed = (fitted[names] for names, _ in result.posterior.ranked() if names in fitted)
-    return next(listed, result.likeliest_suspect)
+    listed = result.posterior.from_first(result.posterior.ranked(), fitted)
+    return fitted.get(listed[0][0] if listed else (), result.likeliest_suspect)
 
 
 def by_probability(
@@ -185,25 +190,29 @@ def with_refused_outside(
 ) -> SearchResult:
     """The result with refused explanations counted as causes outside the catalogue.
 
-    They need an implausible size, or another law than the catalogue's, or they predict rows that
-    were kept back worse than the soil alone does, beyond sampling error. Where a part of such a set
-    is accepted, what is refused is its supplement, not that part.
+    They need an implausible size or fault, or another law than the catalogue's, or they predict
+    rows that were kept back worse than the soil alone does, beyond sampling error. Where a part of
+    such a set is accepted, what is refused is its supplement, not that part.
 
     gains: Log density of the rows kept back, above that of the soil alone, as far as it is known.
     """
     candidates = [c for c in result.candidates if c.names]
-    unlisted = {
-        c.names for c in candidates if _implausible_faults(c.fit) or _implausibly_large(c.fit)
-    }
+    unlisted = {c.names for c in candidates if _implausible_faults(c.fit)}
     unlisted |= {names for names, gain in gains.items() if gain.is_worse}
     unproven = frozenset(names for names, gain in gains.items() if not gain.is_better)
-    far = unlisted | {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
+    oversized = {c.names for c in candidates if _implausibly_large(c.fit)} - unlisted
+    far = unlisted | oversized
+    far |= {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
     parts = [set(c.names) for c in result.accepted if c.names not in far]
     refused = {
         names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
     }
     found = replace(
-        result.posterior, refused=refused, unlisted=frozenset(unlisted), unproven=unproven
+        result.posterior,
+        refused=refused,
+        unlisted=frozenset(unlisted),
+        unproven=unproven,
+        oversized=frozenset(oversized),
     )
     return replace(result, posterior=found)
 
@@ -274,6 +283,17 @@ def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...]
         first = (decision.shown.names,) if decision.shown else ()
         return tuple(dict.fromkeys((*first, *(c.names for c in left))))
     return tuple(c.names for c in decision.claimed)
+
+
+def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]) -> Names:
+    """The effects of the first suspect where it predicts rows kept back better than the soil alone.
+
+    What is wrong with a model and what predicts best are two questions: this one is no name.
+    """
+    if decision.status != "suspected" or decision.shown is None:
+        return ()
+    gain = gains.get(decision.shown.names)
+    return decision.shown.names if gain is not None and gain.is_better else ()
 
 
 def unclaimed_effects(decision: Decision, result: SearchResult) -> tuple[str, ...]:

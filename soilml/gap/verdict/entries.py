@@ -113,8 +113,8 @@ def candidate_summaries(analysis: Analysis, *, claimed: bool) -> list[CandidateS
 def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect]:
     """Explanations with their odds against all others, the likeliest first.
 
-    None stands before the likeliest one that was fitted in full, whose figures are shown; after it
-    come those only whose odds the data raise. A set that adds effects to a claimed one is listed
+    The first one is that whose figures are shown; see `Posterior.from_first`. After it come those
+    only whose odds the data raise. A set that adds effects to a claimed one is listed
     as that one, since the evidence for what it adds is not decisive.
     """
     problem, posterior = analysis.problem, analysis.result.posterior
@@ -125,21 +125,29 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
 
     listed = dict.fromkeys([*stated, *(as_claimed(names) for names, _ in posterior.ranked())])
     ranked = sorted(((n, posterior.log_odds(*n)) for n in listed), key=lambda item: -item[1])
-    fitted = {c.names for c in analysis.result.candidates}
-    first = next((i for i, (names, _) in enumerate(ranked) if names in fitted), 0)
-    rest = [
-        own for own in ranked[first + 1 :] if posterior.favours(own[0], problem.penalty(own[0]))
-    ]
+    ranked = posterior.from_first(ranked, {c.names for c in analysis.result.candidates})
+    rest = [own for own in ranked[1:] if posterior.favours(own[0], problem.penalty(own[0]))]
     gains = predictive_gains(analysis.predictions)
     return [
         Suspect(names, odds, posterior.probability(*names), *_gain(gains.get(names)))
-        for names, odds in [*ranked[first : first + 1], *rest[: LISTED_SUSPECTS - 1]]
+        for names, odds in [*ranked[:1], *rest[: LISTED_SUSPECTS - 1]]
     ]
 
 
 def _gain(gain: PredictiveGain | None) -> tuple[float | None, float | None]:
     """A predictive gain and its standard error as entries of a report."""
     return (None, None) if gain is None else (gain.value, gain.std_error)
+
+
+def suspect_notes(names: Sequence[str]) -> list[Remark]:
+    """A note on effects that the model contains because they predict, if there are any."""
+    if not names:
+        return []
+    text = (
+        f"model.toml contains {' + '.join(names)}, which is suspected and not named: rows kept "
+        "back are predicted better with it than by the soil alone"
+    )
+    return [Remark("suspect-predicts", text, tuple(names), "note")]
 
 
 def conditions_of_suspects(
@@ -167,24 +175,27 @@ def competing_explanations(analysis: Analysis) -> list[Explanation]:
 
 
 def analysis_notes(
-    analysis: Analysis, written: Solution, shown: Solution, replicates: Sequence[Remark]
+    analysis: Analysis,
+    written: Solution,
+    listed: Sequence[Solution],
+    replicates: Sequence[Remark],
 ) -> list[Remark]:
     """Notes on outliers, estimates at a bound, sizes, repeats, noise and run-to-run variation.
 
-    `written` is the fit that model.toml contains, `shown` that of the explanation whose figures are
-    shown; `replicates` says which repeats disagree.
+    `written` is the fit that model.toml contains, `listed` those of the explanations that are shown
+    or suspected; `replicates` says which repeats disagree.
     """
     readings = analysis.problem.readings
     components = analysis.problem.covariance.components
     notes = []
     if count := len(analysis.outliers):
-        listed = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
+        names = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
         many = (
             f"{count} readings are outliers and were"
             if count > 1
             else "1 reading is an outlier and was"
         )
-        notes.append(Remark("outliers", f"{many} excluded: {listed}", analysis.outliers))
+        notes.append(Remark("outliers", f"{many} excluded: {names}", analysis.outliers))
     soil = analysis.result.soil
     far = disagreeing_soil_tests(soil.case, soil.values()) if analysis.result.has_gap else []
     notes += [
@@ -196,7 +207,7 @@ def analysis_notes(
         for text in far
     ]
     notes += _bound_notes(written.coordinates, written.x.tolist())
-    notes += size_notes(shown.coordinates, shown.x.tolist())
+    notes += dict.fromkeys(n for fit in listed for n in size_notes(fit.coordinates, fit.x.tolist()))
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
             text = f"the noise of {column(name)} is {scale:.2g} times as large as declared"

@@ -56,6 +56,25 @@ def test_each_gear_has_its_dimensions_and_effects_and_shares_the_rest(tmp_path):
     assert case.prior["grousers@lugged.height"] == Prior(0.0, 0.02)
 
 
+def test_suspected_effects_are_marked_and_left_out_with_their_priors(tmp_path):
+    marked = (GEARS + REST).replace("height = 0.01", "suspected = true\nheight = 0.01")
+    case = case_of(tmp_path, marked)
+    assert case.suspected == ("grousers@lugged",)
+    assert case.of_gear("lugged").suspected == ("grousers",)
+    assert case.of_gear("smooth").suspected == ()
+    again = case_of(tmp_path, case_as_toml(case))
+    assert again == case
+    known = case.without_suspected()
+    assert known.gears["lugged"].effects == () and known.suspected == ()
+    assert [e.name for e in known.model.effects] == ["slip-sinkage"]
+    assert known.prior.keys() == {"friction_angle", "slip-sinkage.n1"}
+    shared = case_of(tmp_path, (GEARS + REST).replace("n1 = 0.3", "suspected = true\nn1 = 0.3"))
+    assert shared.suspected == shared.of_gear("smooth").suspected == ("slip-sinkage",)
+    assert shared.without_suspected().model.effects == ()
+    with pytest.raises(InputError, match="suspected is 1; needed is true or false"):
+        case_of(tmp_path, (GEARS + REST).replace("n1 = 0.3", "suspected = 1\nn1 = 0.3"))
+
+
 def test_parameters_of_gears_are_set_by_path(tmp_path):
     case = case_of(tmp_path, GEARS + REST)
     new = {"gears.smooth.radius": 0.2, "grousers@lugged.height": 0.015, "slip-sinkage.n1": 0.1}

@@ -14,7 +14,13 @@ from soilml.gap.report.page import page
 from soilml.gap.report.results import GapReduction, GapReport, Suspect
 from soilml.gap.report.sentences import headline
 from soilml.gap.search.posterior import Posterior
-from soilml.gap.verdict.decision import decide, unclaimed_effects
+from soilml.gap.search.prediction import PredictiveGain
+from soilml.gap.verdict.decision import (
+    Decision,
+    decide,
+    predictive_suspect,
+    unclaimed_effects,
+)
 from soilml.gap.verdict.entries import size_notes
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
@@ -125,7 +131,9 @@ def test_a_cause_by_a_law_far_from_the_catalogue_is_suspected():
     assert report.status == "suspected"
     assert report.suspects[0].effects == ("slip-sinkage",)
     assert "other-law" in {reason.code for reason in report.reasons}
-    assert report.model.model.effects == () and report.suspected_model is not None
+    assert report.model.suspected == ("slip-sinkage",)
+    assert [e.name for e in report.model.model.effects] == ["slip-sinkage"]
+    assert "suspect-predicts" in {note.code for note in report.notes}
     assert report.gap["train"].after < 0.1 * report.gap["train"].before
 
 
@@ -211,16 +219,14 @@ def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
     assert status(30.0, 4.0) == ("partly-named", None)
 
 
-def test_the_model_to_predict_with_is_that_of_a_suspect_that_predicts_better():
-    case = case_of()
-    other = replace(case, noise={})
+def test_a_suspect_predicts_where_rows_kept_back_are_likelier_with_it():
+    def chosen(gain, status="suspected", scored=("a",)):
+        gains = {} if gain is None else {scored: PredictiveGain(gain, 1.0)}
+        shown = SimpleNamespace(names=("a",))
+        return predictive_suspect(Decision(status, (), shown), gains)
 
-    def chosen(gain, effects=("a",), suspected=other):
-        suspects = (Suspect(("b",), 1.0, 0.5, 9.0), Suspect(effects, 0.0, 0.45, gain, 1.0))
-        report = GapReport("suspected", "", case, suspects=suspects, best_unclaimed=("a",))
-        return replace(report, suspected_model=suspected).predictive_model
-
-    assert chosen(2.0) is other
-    assert chosen(-2.0) is case and chosen(0.0) is case and chosen(None) is case
-    assert chosen(2.0, effects=("c",)) is case  # another suspect than the one of the model
-    assert chosen(2.0, suspected=None) is case
+    assert chosen(2.0) == ("a",)
+    assert chosen(-2.0) == chosen(0.0) == chosen(None) == ()
+    assert chosen(2.0, scored=("c",)) == ()  # another suspect than the one that is shown
+    assert chosen(2.0, status="named") == ()
+    assert predictive_suspect(Decision("suspected", (), None), {}) == ()

@@ -125,7 +125,7 @@ def test_a_pair_that_contains_a_named_effect_is_listed_as_that_effect():
 
 def notes(given):
     fit = SimpleNamespace(coordinates=[], x=np.zeros(0))
-    return texts(analysis_notes(given, fit, fit, [remark("run a and run b")]))
+    return texts(analysis_notes(given, fit, [fit], [remark("run a and run b")]))
 
 
 def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):

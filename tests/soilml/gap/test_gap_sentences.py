@@ -185,7 +185,7 @@ def test_an_all_clear_is_no_proof():
         ("partly-named", ["no cause outside the catalogue", "cause of the remaining discrepancy"]),
         ("class", ["which of the effects is present"]),
         ("unknown", ["any cause: model.toml contains the refitted soil and no new effect"]),
-        ("suspected", ["model_suspected.toml contains the first suspect"]),
+        ("suspected", ["any cause: an effect that model.toml marks as suspected"]),
         ("not-testable", []),
     ],
 )

@@ -7,7 +7,7 @@ import pytest
 from gap_sets import remark
 
 from soilml.fitting.coordinates import Coordinate
-from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.gap.search.explanation import Explanation
@@ -147,6 +147,21 @@ def test_a_fault_of_an_implausible_size_is_not_claimed():
         assert made.status == found
         assert (made.reason is not None) == (found == "unknown")
     assert (made.reason.code, made.reason.about) == ("implausible-fault", ("dig",))
+
+
+def test_an_implausible_size_is_suspected_after_an_explanation_of_a_usual_size():
+    def found(x, *rivals):
+        far = candidate("dig", 20.0, coordinates=[size("dig")], x=[x])
+        far.fit.precision[:] = 0.01  # no fault of a sensor, whose size has a narrow prior
+        result = with_refused_outside(PROBLEM, searched(NONE, far, *rivals), {})
+        return decide(PROBLEM, result, (), ()), result.posterior
+
+    assert found(0.99 * LARGEST_SIZE)[0].status == "named"
+    made, chances = found(1.01 * LARGEST_SIZE, candidate("plough", 48.0))
+    assert (made.status, made.shown.names) == ("suspected", ("plough",))
+    assert (made.reason.code, made.reason.about) == ("implausible-size", ("dig",))
+    assert chances.probability("dig") > chances.probability("plough")
+    assert found(1.01 * LARGEST_SIZE)[0].status == "unknown"  # nothing else can come first
 
 
 def test_an_implausible_fault_is_the_reason_also_where_no_other_effect_is_suspected():

@@ -28,14 +28,11 @@ export function startGap() {
 }
 
 function show({ id, result }) {
-  const files = result.files;
-  const suspected = files.find((name) => name.startsWith("model_suspected"));
   byId("gap-result").replaceChildren(...[
     verdict(result),
     element("div", { class: "buttons" },
       element("a", { class: "button", href: jobFile(id, "report.html", true), target: "_blank", rel: "noopener" }, "Open the full report"),
       element("a", { class: "button", href: jobFile(id, "model.toml") }, "Save MODEL.toml"),
-      suspected ? element("a", { class: "button", href: jobFile(id, suspected) }, "Save the suspected model") : null,
       element("a", { class: "button", href: jobFile(id, "next_runs.csv") }, "Save the next runs"),
       element("a", { class: "button", href: jobFile(id, "report.html") }, "Save the report"),
       element("a", { class: "button", href: jobFile(id, "gap.json") }, "Save gap.json")),
