@@ -95,15 +95,20 @@ class Posterior:
         return sorted(odds.items(), key=lambda item: (-item[1], -self.weight(item[0]), item[0]))
 
     def from_first(
-        self, ranked: Sequence[tuple[Names, float]], fitted: Collection[Names]
+        self, ranked: Sequence[tuple[Names, float]], fitted: Mapping[Names, float]
     ) -> list[tuple[Names, float]]:
         """Ranked sets from the first suspect: the likeliest of usual size that was fitted in full.
 
-        Likelier ones of an implausible size follow it; without one of usual size, one of them
-        comes first.
+        Likelier ones of an implausible size follow it, if the data raise its odds; without such a
+        one, the likeliest comes first.
+
+        fitted: -2 ln of the prior odds of each set that was fitted.
         """
         known = [i for i, (names, _) in enumerate(ranked) if names in fitted]
-        usual = [i for i in known if ranked[i][0] not in self.oversized]
+        raised = [i for i in known if self.favours(ranked[i][0], fitted[ranked[i][0]])]
+        usual = [i for i in raised if ranked[i][0] not in self.oversized]
+        if known and ranked[known[0]][0] not in self.oversized:
+            usual = known
         first = (usual or known or [0])[0]
         before = [own for own in ranked[:first] if own[0] in self.oversized]
         return [*ranked[first : first + 1], *before, *ranked[first + 1 :]]

@@ -158,7 +158,8 @@ def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool
 def _first_suspect(result: SearchResult) -> Explanation | None:
     """The candidate that is listed first; see `Posterior.ranked` and `Posterior.from_first`."""
     fitted = {c.names: c for c in result.candidates}
-    listed = result.posterior.from_first(result.posterior.ranked(), fitted)
+    penalties = {names: c.penalty for names, c in fitted.items()}
+    listed = result.posterior.from_first(result.posterior.ranked(), penalties)
     return fitted.get(listed[0][0] if listed else (), result.likeliest_suspect)
 
 

@@ -125,7 +125,7 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
 
     listed = dict.fromkeys([*stated, *(as_claimed(names) for names, _ in posterior.ranked())])
     ranked = sorted(((n, posterior.log_odds(*n)) for n in listed), key=lambda item: -item[1])
-    ranked = posterior.from_first(ranked, {c.names for c in analysis.result.candidates})
+    ranked = posterior.from_first(ranked, {c.names: c.penalty for c in analysis.result.candidates})
     rest = [own for own in ranked[1:] if posterior.favours(own[0], problem.penalty(own[0]))]
     gains = predictive_gains(analysis.predictions)
     return [

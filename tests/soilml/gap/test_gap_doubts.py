@@ -141,7 +141,7 @@ def test_figures_are_those_of_the_suspect_that_is_listed_first():
     """Here the largest evidence is that of two effects, and a rival with its additions leads."""
     weights = {(): -5.0, ("b", "c"): -1.0, ("a",): -1.1, ("a", "d"): -1.3}
     sets = [
-        SimpleNamespace(names=names, objective=-4.0 * weight, amplitude=np.ones(1))
+        SimpleNamespace(names=names, objective=-4.0 * weight, amplitude=np.ones(1), penalty=0.0)
         for names, weight in weights.items()
     ]
     ordered = sorted(sets, key=lambda one: one.objective)
@@ -194,6 +194,7 @@ def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
             fit=fit,
             shape_deviation=0.0,
             shape_supported=False,
+            penalty=0.0,
         )
 
     problem = SimpleNamespace(readings=SimpleNamespace(channels=("torque", "drawbar_pull")))

@@ -39,14 +39,16 @@ def test_a_set_of_an_implausible_size_follows_the_first_of_a_usual_size():
     assert found.probability("a") == pytest.approx(0.3 * Posterior(logs).probability("a"))
     every = {("a",), ("b",), ("c",)}
 
-    def order(fitted):
+    def order(sets, penalty=0.0):
+        fitted = dict.fromkeys(sets, penalty)
         return [names[0] for names, _ in found.from_first(found.ranked(), fitted)]
 
     assert [names[0] for names, _ in found.ranked()] == ["a", "b", "c"]
     assert order(every) == ["b", "a", "c"]
     assert order({("a",), ("c",)}) == ["c", "a"]  # what was not fitted does not come first
     assert order({("a",)}) == ["a", "b", "c"]  # nothing of a usual size was fitted
-    assert found.from_first([], every) == []
+    assert order(every, penalty=-4.0) == ["a", "b", "c"]  # the rows do not raise the odds of b, c
+    assert found.from_first([], {}) == []
 
 
 def scored(*by_fold):
