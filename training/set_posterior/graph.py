@@ -142,4 +142,6 @@ class SetPosteriorGraph:
         consistency = add_consistency(counts, self.limits)
         sizes = SIZES_SMALL if self.small else sample_sizes(len(self.family.axes))
         sample = add_importance_sampler(likelihood, consistency, sizes, outputs[0])
-        add_posterior_outputs(likelihood.family, context, sample, consistency, prefix)
+        add_posterior_outputs(
+            likelihood.family, context, sample, consistency, prefix, few_points=self.small
+        )

@@ -16,6 +16,7 @@ from training.onnx_graph.value import (
     exp,
     gemm,
     maximum,
+    minimum,
     sqrt,
     where,
 )
@@ -30,6 +31,8 @@ INTERVAL = (0.05, 0.95)  # Probabilities of the ends of the interval
 #: them. All are multiples of their spacing.
 SPACING = 0.25
 DISTANCES = np.arange(0.5, 3.3, SPACING)
+#: Largest sum of squared weights that is taken into account: one point alone has 1.
+LARGEST_SHARE = 0.95
 LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is divided by
 
 
@@ -95,6 +98,7 @@ def add_posterior_outputs(
     sample: WeightedSample,
     consistency: Consistency,
     prefix: str,
+    few_points: bool = False,
 ) -> None:
     r"""Add the outputs, each named `<prefix>set_<name>`, from the moments of the weighted sample.
 
@@ -103,6 +107,9 @@ def add_posterior_outputs(
 
     A set without enough rows in range gets the prior. Of a set that no soil explains, the sample
     is that with the noise that explains it, and the flag is false.
+
+    few_points: Whether the covariance also has the error of a mean of few points, see
+        `variance_of_few_points`.
     """
     q = family.targets
     # onnxruntime takes half the time for one row times a matrix than for a matrix times one column
@@ -113,7 +120,12 @@ def add_posterior_outputs(
     covariance = gemm(deviation * sample.weights, deviation, transpose_b=True)
     variance = (covariance * np.eye(q)).sum(axis=0, keepdims=False)
     std = sqrt(variance)
-    interval = mean + add_quantiles(deviation, std, sample.weights, sample.count)
+    interval = add_quantiles(deviation, std, sample.weights, sample.count)
+    if few_points:
+        factor = variance_of_few_points(sample.weights)
+        root = sqrt(factor)
+        covariance, std, interval = covariance * factor, std * root, interval * root
+    interval = mean + interval
     enough = consistency.enough
     consistent = enough & (sample.misfit <= consistency.limit)
     consistent = consistent.named(f"{prefix}{SET_PREFIX}in_range")
@@ -134,6 +146,22 @@ def add_posterior_outputs(
     vague = std > NOT_IDENTIFIED_ABOVE * prior["std"]
     (vague | ~consistent).named(f"{prefix}{SET_PREFIX}abstains")
     sample.misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
+
+
+def variance_of_few_points(weights: Value) -> Value:
+    r"""Variance of a parameter over that of its few weighted points, (1,).
+
+    .. math:: \frac{1 + r}{1 - r}, \qquad r = \sum_i w_i^2
+
+    The variance of points around their own mean is too small by 1 - r, and the variance of that
+    mean is r times the variance of the parameter. For n equal weights r is 1 / n.
+
+    weights: Weights (1, n) with sum 1.
+
+    References: Kish, Survey Sampling, 1965 (effective sample size 1 / r).
+    """
+    share = minimum(weights.sum_of_squares(axis=1, keepdims=False), LARGEST_SHARE)
+    return (share + 1.0) / (1.0 - share)
 
 
 def _add_edge_flag(family: WheelFamily, mean: Value, std: Value) -> Value:

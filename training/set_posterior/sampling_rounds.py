@@ -54,7 +54,7 @@ class SampleSizes:
 FEW_UNKNOWNS = 3
 SIZES_FEW, SIZES_MANY = SampleSizes(256, 128, 2), SampleSizes(512, 256, 3)
 #: Those of a file for a microcontroller, whatever the number of unknowns.
-SIZES_SMALL = SampleSizes(32, 64, 2)
+SIZES_SMALL = SampleSizes(64, 48, 2)
 
 
 @dataclass(frozen=True)
