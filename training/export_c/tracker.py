@@ -31,7 +31,9 @@ def tracker_values(interface: Interface, memory_bytes: int, rows: int) -> dict[s
     blocks = length + per_block + 2
     system_rows = len(RESPONSE_CHANNELS) * blocks
     stds = [names.index(f"{n}_std") if f"{n}_std" in names else -1 for n in watched]
-    size = 2 * memory_bytes + system_rows * interface.columns * 4 + blocks * BYTES_OF_A_ROW
+    recent = min(filter_state.RECENT_ROWS, length // 2)
+    size = 2 * memory_bytes + system_rows * interface.columns * 4
+    size += (blocks + recent + filter_state.MOST_ROWS) * BYTES_OF_A_ROW
     return {
         "length": length,
         "bytes": size + OTHER_BYTES,
@@ -39,7 +41,8 @@ def tracker_values(interface: Interface, memory_bytes: int, rows: int) -> dict[s
         "system_rows": system_rows,
         "blocks": blocks,
         "rows_per_block": per_block,
-        "recent": min(filter_state.RECENT_ROWS, length // 2),
+        "recent": recent,
+        "enough_known": filter_state.ENOUGH_KNOWN,
         "most_rows": filter_state.MOST_ROWS,
         "least_rows": filter_state.LEAST_ROWS,
         "give_up_after": filter_state.GIVE_UP_AFTER,

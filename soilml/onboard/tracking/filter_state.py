@@ -26,11 +26,25 @@ GIVE_UP_AFTER = 25
 WATCHED = ("torque", *OPTIONAL_READINGS, *OPERATING_NOISE)
 #: Last rows that are kept one by one, so that a change among them is found where it began.
 RECENT_ROWS = 24
+#: Share of the rows known now that a recent row was read again with, so that it is not once more.
+ENOUGH_KNOWN = 0.75
 #: Exact repetitions in succession after which a sensor is stuck.
 REPETITIONS = 2
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 2  # Version of the arrays
+FORMAT = 3  # Version of the arrays
+
+
+@dataclass(frozen=True)
+class RecentRows:
+    """Rows of a recent block as they were read.
+
+    rows: Row inputs of the graph (m,) by name.
+    known: Rows on which the soil rested at which their errors of sensors and model are linear.
+    """
+
+    rows: Rows
+    known: int
 
 
 @dataclass(frozen=True)
@@ -44,12 +58,14 @@ class RowWindow:
     memory: All rows of the blocks, packed.
     length: Rows that are remembered at least, once there were so many.
     added: What each of the last rows added to the misfit, (recent,).
+    recent: The same rows as they were read, (recent,).
     """
 
     blocks: tuple[Memory, ...]
     memory: Memory
     length: int
     added: tuple[float, ...] = ()
+    recent: tuple[RecentRows, ...] = ()
 
     @staticmethod
     def empty(start: Memory, length: int) -> RowWindow:
@@ -66,7 +82,7 @@ class RowWindow:
         """Whether the oldest block is to be forgotten."""
         return self.memory.rows > self.length + self.rows_per_block
 
-    def with_rows(self, after: Memory, added: float = 0.0) -> RowWindow:
+    def with_rows(self, rows: Rows, after: Memory, added: float = 0.0) -> RowWindow:
         """The window with one more row, or its first ones, from its memory after them, not packed.
 
         added: What the row added to the misfit.
@@ -74,18 +90,52 @@ class RowWindow:
         system = after.system[len(self.memory.system) :]
         last = replace(after, system=system, counts=after.counts - self.memory.counts)
         blocks, rises = (*self.blocks, last), (*self.added, added)
+        recent = (*self.recent, RecentRows(rows, after.rows))
         if len(rises) > min(RECENT_ROWS, self.length // 2):
-            first, rises = len(blocks) - len(rises), rises[1:]
+            first, rises, recent = len(blocks) - len(rises), rises[1:], recent[1:]
             older, one = blocks[:first], blocks[first]
             if older and older[-1].rows < self.rows_per_block:
                 older, one = older[:-1], join((older[-1], one))
             blocks = (*older, one, *blocks[first + 1 :])
-        return replace(self, blocks=blocks, memory=after.packed(), added=rises)
+        return replace(self, blocks=blocks, memory=after.packed(), added=rises, recent=recent)
+
+    @property
+    def least_known(self) -> int | None:
+        """The recent block whose errors are to be linear at another soil, if there is one.
+
+        It is that whose errors are linear at a soil of the fewest rows, if these are fewer than
+        `ENOUGH_KNOWN` of those now.
+        """
+        known = [one.known for one in self.recent]
+        if not known or min(known) >= ENOUGH_KNOWN * self.memory.rows:
+            return None
+        return len(self.blocks) - len(known) + known.index(min(known))
+
+    def rows_of(self, block: int) -> Rows:
+        """The rows of a recent block as they were read."""
+        return self.recent[block - len(self.blocks)].rows
+
+    def without(self, block: int) -> Memory:
+        """The memory of all rows but those of one block, which is not the only one."""
+        return join((*self.blocks[:block], *self.blocks[block + 1 :]))
+
+    def read_again(self, block: int, after: Memory) -> RowWindow:
+        """The window with a recent block as it is in the memory `after`, behind all others.
+
+        `after` is not packed.
+        """
+        blocks, recent = list(self.blocks), list(self.recent)
+        place = block - len(blocks)
+        system = after.system[len(after.system) - len(blocks[block].system) :]
+        blocks[block] = replace(blocks[block], system=system)
+        recent[place] = replace(recent[place], known=after.rows)
+        return replace(self, blocks=tuple(blocks), memory=after.packed(), recent=tuple(recent))
 
     def since(self, block: int) -> RowWindow:
         """The window without the blocks before this one."""
         blocks = self.blocks[block:]
-        return replace(self, blocks=blocks, memory=join(blocks), added=self.added[-len(blocks) :])
+        added, recent = self.added[-len(blocks) :], self.recent[-len(blocks) :]
+        return replace(self, blocks=blocks, memory=join(blocks), added=added, recent=recent)
 
     def before(self, block: int) -> Memory:
         """The memory of the rows before this block."""
@@ -249,7 +299,9 @@ class FilterState:
         empty = self.window.memory.system[:0]
         previous = [] if self.repeated.previous is None else [self.repeated.previous]
         rows = [*previous, *self.question.rows]
-        names = list(rows[0]) if rows else []
+        recent = self.window.recent
+        read = [row for one in recent for row in _one_by_one(one.rows)]
+        names = list((rows or read or [{}])[0])
         return {
             "format": np.asarray(FORMAT),
             "model": np.asarray(identity),
@@ -258,6 +310,8 @@ class FilterState:
             "lengths": np.asarray([len(block.system) for block in blocks], dtype=np.int64),
             "names": np.asarray(names, dtype=np.str_),
             "rows": np.reshape([row[n][0] for row in rows for n in names], (len(rows), len(names))),
+            "recent": np.reshape([row[n] for row in read for n in names], (len(read), len(names))),
+            "known": np.asarray([one.known for one in recent], dtype=np.int64),
             "disagree": np.asarray(self.question.disagree, dtype=np.bool_),
             "added": np.asarray(self.window.added, dtype=np.float64),
             "increases": np.asarray(self.increases, dtype=np.float64),
@@ -293,6 +347,11 @@ class FilterState:
             ) from None
 
 
+def _one_by_one(rows: Rows) -> list[dict[str, float]]:
+    """Several rows as one mapping each."""
+    return [{n: float(v[i]) for n, v in rows.items()} for i in range(len(rows["slip"]))]
+
+
 def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
     if int(arrays["format"]) != FORMAT:
         raise InputError(
@@ -319,7 +378,8 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
     added = tuple(float(value) for value in arrays["added"])
     if not len(added) <= len(blocks) or not np.isfinite(added).all():
         raise ValueError(f"it has {len(added)} last rows in {len(blocks)} blocks")
-    window = RowWindow(blocks, join(blocks) if blocks else start, length, added)
+    recent = _read_recent(arrays, blocks[len(blocks) - len(added) :])
+    window = RowWindow(blocks, join(blocks) if blocks else start, length, added, recent)
     rows: list[Rows] = [
         {str(n): np.asarray([float(v)]) for n, v in zip(arrays["names"], row, strict=True)}
         for row in arrays["rows"]
@@ -335,3 +395,17 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
     if not 1.0 <= variance < np.inf:
         raise ValueError(f"its noise is {variance:g} times that stated")
     return FilterState(window, question, repeated, increases, since_change, since_drift, variance)
+
+
+def _read_recent(arrays: Mapping[str, Any], blocks: Sequence[Memory]) -> tuple[RecentRows, ...]:
+    """The rows of the recent blocks, as they were read."""
+    counts, known = [block.rows for block in blocks], arrays["known"]
+    readings = np.asarray(arrays["recent"], dtype=np.float64)
+    if len(readings) != sum(counts) or len(known) != len(counts) or np.isinf(readings).any():
+        raise ValueError(f"it has {len(readings)} rows as read in {len(counts)} last blocks")
+    names = [str(name) for name in arrays["names"]]
+    parts = np.split(readings, np.cumsum(counts)[:-1]) if counts else []
+    return tuple(
+        RecentRows(dict(zip(names, part.T, strict=True)), int(number))
+        for part, number in zip(parts, known, strict=True)
+    )

@@ -33,11 +33,15 @@ def test_a_memory_must_have_finite_numbers_of_its_file():
 @pytest.mark.parametrize("part", ["system", "counts"])
 def test_a_state_of_a_tracker_must_have_finite_numbers(part):
     start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
-    window = RowWindow.empty(start, 48).with_rows(replace(start, system=np.ones((2, 3))))
+    row = {"slip": np.asarray([0.2])}
+    counts = np.ones(3, np.float32)
+    after = replace(start, system=np.ones((2, 3)), counts=counts)
+    window = RowWindow.empty(start, 48).with_rows(row, after)
     arrays = FilterState(window).as_arrays("file")
     again = FilterState.from_arrays(arrays, "file", start)
     assert again.window.memory.system.tolist() == window.memory.system.tolist()
     assert (again.rows_since_change, again.rows_since_drift, again.increases) == (0, -1, ())
+    assert [(one.rows, one.known) for one in again.window.recent] == [(row, 1)]
     arrays[part] = arrays[part].astype(float)
     arrays[part][0, 1] = np.inf
     with pytest.raises(InputError, match="numbers that are not finite"):

@@ -90,7 +90,7 @@ def test_a_window_forgets_whole_blocks_and_keeps_the_likelihood_of_the_others():
         added = rng.standard_normal((1, 3)).astype(np.float32)
         kept.append(added[0])
         system = np.concatenate([window.memory.system, added])
-        window = window.with_rows(Memory(system, window.memory.counts + 1.0))
+        window = window.with_rows({}, Memory(system, window.memory.counts + 1.0))
         if window.is_full:
             window = window.since(1)
         count = window.memory.rows
@@ -110,7 +110,7 @@ def test_another_soil_is_suspected_where_rows_began_to_add_more():
     window = RowWindow.empty(start, 100)
     for i in range(60):
         system = np.concatenate([window.memory.system, np.ones((1, 3))])
-        window = window.with_rows(Memory(system, window.memory.counts + 1.0), 5.0 * (i >= 53))
+        window = window.with_rows({}, Memory(system, window.memory.counts + 1.0), 5.0 * (i >= 53))
     assert len(window.added) == RECENT_ROWS and window.memory.rows == 60
     assert window.since(window.suspect(1.0)).memory.rows == 7
     assert window.with_another_soil().suspect(1.0) == len(window.blocks) - LEAST_ROWS
