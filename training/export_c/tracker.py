@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from soilml.onboard.set_contract import ABSENT_STD, MODEL_ERROR_INPUT, RESPONSE_CHANNELS
-from soilml.onboard.tracking import filter_state, misfit, soil_tracker
+from soilml.onboard.tracking import filter_state, misfit, row_window, soil_tracker
 from training.export_c.interface import Interface
 
 BYTES_OF_A_ROW, OTHER_BYTES = 64, 2048  # Beside the residual systems, at most
@@ -27,11 +27,11 @@ def tracker_values(interface: Interface, memory_bytes: int, rows: int) -> dict[s
     if not interface.context or not complete or rows < filter_state.MOST_ROWS:
         return None
     length = soil_tracker.DEFAULT_LENGTH
-    per_block = -(-length // filter_state.BLOCKS)
+    per_block = -(-length // row_window.BLOCKS)
     blocks = length + per_block + 2
     system_rows = len(RESPONSE_CHANNELS) * blocks
     stds = [names.index(f"{n}_std") if f"{n}_std" in names else -1 for n in watched]
-    recent = min(filter_state.RECENT_ROWS, length // 2)
+    recent = min(row_window.RECENT_ROWS, length // 2)
     size = 2 * memory_bytes + system_rows * interface.columns * 4
     size += (blocks + recent + filter_state.MOST_ROWS) * BYTES_OF_A_ROW
     return {
@@ -42,9 +42,9 @@ def tracker_values(interface: Interface, memory_bytes: int, rows: int) -> dict[s
         "blocks": blocks,
         "rows_per_block": per_block,
         "recent": recent,
-        "enough_known": filter_state.ENOUGH_KNOWN,
+        "enough_known": row_window.ENOUGH_KNOWN,
         "most_rows": filter_state.MOST_ROWS,
-        "least_rows": filter_state.LEAST_ROWS,
+        "least_rows": row_window.LEAST_ROWS,
         "give_up_after": filter_state.GIVE_UP_AFTER,
         "repetitions": filter_state.REPETITIONS,
         "watched": watched,

@@ -15,7 +15,7 @@ from soilml.onboard.estimator import Estimator
 from soilml.onboard.features import READABLE, as_number
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
-from soilml.onboard.tracking.filter_state import GIVE_UP_AFTER, Arrays, FilterState, RowWindow
+from soilml.onboard.tracking.filter_state import GIVE_UP_AFTER, Arrays, FilterState
 from soilml.onboard.tracking.misfit import (
     CHANGE_QUANTILE,
     ERROR_DEGREES,
@@ -31,6 +31,7 @@ from soilml.onboard.tracking.misfit import (
     usual_excess,
     with_noise,
 )
+from soilml.onboard.tracking.row_window import RowWindow
 
 #: After so many rows the last half of the rows is compared with the first, for a slow drift.
 HALVES_EVERY = 4

@@ -9,7 +9,8 @@ from conftest import simulated_run
 from soilml import Estimator
 from soilml.errors import InputError
 from soilml.onboard.memory import LEAST_SINGULAR_VALUE, PACKED_EVERY, Memory, check_memory
-from soilml.onboard.tracking.filter_state import FilterState, RowWindow
+from soilml.onboard.tracking.filter_state import FilterState
+from soilml.onboard.tracking.row_window import RowWindow
 from soilml.onboard.tracking.soil_tracker import Event
 
 

@@ -16,8 +16,9 @@ from driven_days import SLIP_STD, Kind, simulate_day
 from soilml import Estimator, SoilTracker
 from soilml.errors import InputError
 from soilml.onboard.tracking import Event, soil_tracker
-from soilml.onboard.tracking.filter_state import FilterState, RowWindow
+from soilml.onboard.tracking.filter_state import FilterState
 from soilml.onboard.tracking.misfit import CHANGE_QUANTILE, MOST_VARIANCE, chi_squared_limit
+from soilml.onboard.tracking.row_window import RowWindow
 
 
 @pytest.fixture(scope="module")

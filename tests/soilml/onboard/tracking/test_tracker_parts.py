@@ -8,15 +8,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from soilml.onboard.memory import Memory
-from soilml.onboard.tracking.filter_state import (
-    BLOCKS,
-    LEAST_ROWS,
-    MOST_ROWS,
-    RECENT_ROWS,
-    RepeatedReadings,
-    RowsInQuestion,
-    RowWindow,
-)
+from soilml.onboard.tracking.filter_state import MOST_ROWS, RepeatedReadings, RowsInQuestion
 from soilml.onboard.tracking.misfit import (
     QUANTILE,
     chi_squared_limit,
@@ -24,6 +16,7 @@ from soilml.onboard.tracking.misfit import (
     over_median,
     usual_excess,
 )
+from soilml.onboard.tracking.row_window import BLOCKS, LEAST_ROWS, RECENT_ROWS, RowWindow
 
 
 def row(torque, slip=0.3, load=60.0):

@@ -1,0 +1,146 @@
+"""The rows that a tracker remembers: blocks of them, the last ones as they were read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from soilml.onboard.memory import Memory
+from soilml.onboard.tracking.misfit import Rows
+
+BLOCKS = 16  # Blocks of a window that is full; one more grows until the oldest is forgotten
+#: Rows that must disagree with those before, and agree with each other, for another soil.
+LEAST_ROWS = 3
+#: Last rows that are kept one by one, so that a change among them is found where it began.
+RECENT_ROWS = 24
+#: Share of the rows known now that a recent row was read again with, so that it is not once more.
+ENOUGH_KNOWN = 0.75
+
+
+@dataclass(frozen=True)
+class RecentRows:
+    """Rows of a recent block as they were read.
+
+    rows: Row inputs of the graph (m,) by name.
+    known: Rows on which the soil rested at which their errors of sensors and model are linear.
+    """
+
+    rows: Rows
+    known: int
+
+
+@dataclass(frozen=True)
+class RowWindow:
+    """Memories of consecutive rows, and the memory of all of them.
+
+    All rows of a window have the same weight, as in the likelihood. With weights that fade
+    exponentially, the posterior would claim twice the variance that the estimate has.
+
+    blocks: Consecutive rows, the oldest first; the last ones are of one row each.
+    memory: All rows of the blocks, packed.
+    length: Rows that are remembered at least, once there were so many.
+    added: What each of the last rows added to the misfit, (recent,).
+    recent: The same rows as they were read, (recent,).
+    """
+
+    blocks: tuple[Memory, ...]
+    memory: Memory
+    length: int
+    added: tuple[float, ...] = ()
+    recent: tuple[RecentRows, ...] = ()
+
+    @staticmethod
+    def empty(start: Memory, length: int) -> RowWindow:
+        """A window that remembers between `length` rows and a block more."""
+        return RowWindow((), start, length)
+
+    @property
+    def rows_per_block(self) -> int:
+        """Rows after which another block begins, but for the last rows."""
+        return -(-self.length // BLOCKS)
+
+    @property
+    def is_full(self) -> bool:
+        """Whether the oldest block is to be forgotten."""
+        return self.memory.rows > self.length + self.rows_per_block
+
+    def with_rows(self, rows: Rows, after: Memory, added: float = 0.0) -> RowWindow:
+        """The window with one more row, or its first ones, from its memory after them, not packed.
+
+        added: What the row added to the misfit.
+        """
+        system = after.system[len(self.memory.system) :]
+        last = replace(after, system=system, counts=after.counts - self.memory.counts)
+        blocks, rises = (*self.blocks, last), (*self.added, added)
+        recent = (*self.recent, RecentRows(rows, after.rows))
+        if len(rises) > min(RECENT_ROWS, self.length // 2):
+            first, rises, recent = len(blocks) - len(rises), rises[1:], recent[1:]
+            older, one = blocks[:first], blocks[first]
+            if older and older[-1].rows < self.rows_per_block:
+                older, one = older[:-1], join((older[-1], one))
+            blocks = (*older, one, *blocks[first + 1 :])
+        return replace(self, blocks=blocks, memory=after.packed(), added=rises, recent=recent)
+
+    @property
+    def least_known(self) -> int | None:
+        """The recent block whose errors are to be linear at another soil, if there is one.
+
+        It is that whose errors are linear at a soil of the fewest rows, if these are fewer than
+        `ENOUGH_KNOWN` of those now.
+        """
+        known = [one.known for one in self.recent]
+        if not known or min(known) >= ENOUGH_KNOWN * self.memory.rows:
+            return None
+        return len(self.blocks) - len(known) + known.index(min(known))
+
+    def rows_of(self, block: int) -> Rows:
+        """The rows of a recent block as they were read."""
+        return self.recent[block - len(self.blocks)].rows
+
+    def without(self, block: int) -> Memory:
+        """The memory of all rows but those of one block, which is not the only one."""
+        return join((*self.blocks[:block], *self.blocks[block + 1 :]))
+
+    def read_again(self, block: int, after: Memory) -> RowWindow:
+        """The window with a recent block as it is in the memory `after`, behind all others.
+
+        `after` is not packed.
+        """
+        blocks, recent = list(self.blocks), list(self.recent)
+        place = block - len(blocks)
+        system = after.system[len(after.system) - len(blocks[block].system) :]
+        blocks[block] = replace(blocks[block], system=system)
+        recent[place] = replace(recent[place], known=after.rows)
+        return replace(self, blocks=tuple(blocks), memory=after.packed(), recent=tuple(recent))
+
+    def since(self, block: int) -> RowWindow:
+        """The window without the blocks before this one."""
+        blocks = self.blocks[block:]
+        added, recent = self.added[-len(blocks) :], self.recent[-len(blocks) :]
+        return replace(self, blocks=blocks, memory=join(blocks), added=added, recent=recent)
+
+    def before(self, block: int) -> Memory:
+        """The memory of the rows before this block."""
+        return join(self.blocks[:block])
+
+    def with_another_soil(self) -> RowWindow:
+        """The window whose rows are all of one soil: what they added to the misfit is forgotten."""
+        return replace(self, added=(0.0,) * len(self.added))
+
+    def suspect(self, excess: float) -> int:
+        """The block with which another soil begins most likely: the last ones added most.
+
+        excess: What a sound row adds to the misfit on the mean.
+        """
+        over = np.cumsum(np.asarray(self.added[::-1]) - excess)[LEAST_ROWS - 1 :]
+        most = LEAST_ROWS + int(np.argmax(over)) if over.size else LEAST_ROWS
+        return len(self.blocks) - most
+
+
+def join(memories: Sequence[Memory]) -> Memory:
+    """The memory of the rows of one or more others."""
+    system = np.concatenate([memory.system for memory in memories])
+    counts = np.stack([memory.counts for memory in memories]).sum(axis=0).astype(np.float32)
+    return replace(memories[0], system=system, counts=counts).packed()
