@@ -78,7 +78,7 @@ the same effect give 16 torque readings each, at the loads of the campaign.
 The columns *before*, *before, model right* and *adapted* have root mean square errors of c, phi \
 and K, and coverage of their 90 % intervals. *Kept back* is the ratio of errors that `adapt` \
 states itself, against the better of the two answers of the old file. Errors are then taken over \
-the prior's standard deviations. The last two columns have that of the file that `adapt` recommends, \
+the prior's standard deviations. The last two columns have that of the recommended file, \
 over that of the old file by its own answer, and with its model taken as right. They are 1 where \
 it stays.
 
