@@ -29,6 +29,7 @@ TITLES = {
     "train": "Fitted rows",
     "held_out_runs": "Held-out runs",
     "held_out_region": "Held-out region",
+    "held_out_slips": "Held-out slips",
 }
 
 
