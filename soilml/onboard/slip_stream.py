@@ -8,17 +8,15 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.features import as_number, as_numbers
+from soilml.onboard.model_file import Session, create_session
 from soilml.onboard.set_contract import Floats
-
-if TYPE_CHECKING:
-    from soilml.onboard.model_file import Session
 
 #: Of the weights of the grounds: ends of the 90 % interval of speed and slip, and the median.
 QUANTILES = (0.02, 0.5, 0.98)
@@ -86,8 +84,6 @@ class SlipStream:
     @staticmethod
     def load(path: str | os.PathLike[str]) -> SlipStream:
         """A file of `soilml export-slip`; raises `ModelFileError` for any other."""
-        from soilml.onboard.model_file import create_session
-
         try:
             session = create_session(Path(path).read_bytes())
         except OSError as error:
