@@ -6,6 +6,7 @@ channel and gear, given the readings of the analysis.
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.numerics.smooth_functions import SmoothFunctions
 from soilml.numerics.smooth_process import process_columns, squared_exponential
@@ -30,6 +32,9 @@ MOST_POINTS, MOST_PARTS = 60, 100
 LEAST_PIVOT = 1e-9
 #: Rounding error that the length of a written factor may have.
 TOLERANCE = 1e-6
+#: Rows of an analysis that the remainder remembers, and hexadecimal digits of each: those with the
+#: smallest digests, so that a large enough part of the rows has some of them too.
+MOST_MARKS, MARK_DIGITS = 32, 8
 KEYS = ("column", "gear", "amplitude", "usual", "slip_length", "log_load_length", "slip", "load")
 
 
@@ -177,9 +182,20 @@ class Remainder:
     """The remainders of all channels and gears; parts of one channel and gear add up.
 
     A further analysis of a model with a remainder adds what it finds beside it.
+
+    rows: Digests of rows that it was learned from; none where they are not known.
     """
 
     parts: tuple[RemainderPart, ...]
+    rows: tuple[str, ...] = ()
+
+    def learned_from(self, table: Table) -> bool:
+        """Whether it was learned from rows of a table: mean and rows then say the same twice."""
+        return bool(self.rows) and not set(self.rows).isdisjoint(_marks(table))
+
+    def of_rows(self, table: Table) -> Remainder:
+        """The same, learned from the rows of a table too."""
+        return replace(self, rows=(*self.rows, *sorted(_marks(table))[:MOST_MARKS]))
 
     def of(self, channel: str, gear: str = "") -> list[RemainderPart]:
         """The parts of a channel (`torque`) of one gear."""
@@ -188,7 +204,7 @@ class Remainder:
     def of_gear(self, gear: str) -> Remainder | None:
         """The remainder of one of several gears, as of a model with this gear alone."""
         own = tuple(replace(part, gear="") for part in self.parts if part.gear == gear)
-        return Remainder(own) if own else None
+        return replace(self, parts=own) if own else None
 
     @property
     def columns(self) -> list[str]:
@@ -257,8 +273,11 @@ def take_remainder(settings: Settings, gears: Iterable[str]) -> Remainder:
     if not 1 <= len(parts) <= MOST_PARTS:
         settings.fail(f"{len(parts)} parts [[remainder.part]]; needed are 1 to {MOST_PARTS}")
     found = tuple(_take_part(part, tuple(gears)) for part in parts)
+    rows = settings.take("rows", list, "a list of texts", [])
+    if not all(isinstance(row, str) for row in rows):
+        settings.fail("rows must be a list of texts")
     settings.finish()
-    return Remainder(found)
+    return Remainder(found, tuple(rows))
 
 
 def _take_part(settings: Settings, gears: Sequence[str]) -> RemainderPart:
@@ -317,11 +336,20 @@ def _is_finite(value: object) -> bool:
 def remainder_lines(remainder: Remainder) -> list[str]:
     """The table [remainder] as lines of TOML; `take_remainder` reads the same back."""
     lines = ["[remainder]", f"format = {FORMAT}"]
+    lines += [f"rows = {_written(remainder.rows)}"] if remainder.rows else []
     for part in remainder.parts:
         lines += ["", "[[remainder.part]]"]
         values: Mapping[str, Any] = {f.name: getattr(part, f.name) for f in fields(part)}
         lines += [f"{k} = {_written(v)}" for k, v in values.items() if k != "gear" or v]
     return lines
+
+
+def _marks(table: Table) -> set[str]:
+    """Digests of the rows of a table, by slip, load and the readings of the channels."""
+    names = [n for n in ("slip", "load_N", *map(column, CHANNELS)) if n in table]
+    rows = zip(*(table[name] for name in names), strict=True)
+    texts = (",".join(f"{v:.6g}" for v in row if math.isfinite(v)) for row in rows)
+    return {hashlib.sha256(text.encode()).hexdigest()[:MARK_DIGITS] for text in texts}
 
 
 def _written(value: Any) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import MODEL
 
-from soilml import Operating, read_case, simulate
+from soilml import Operating, identify, read_case, simulate
 from soilml.cli import main
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.write_case import case_as_toml
@@ -196,3 +196,21 @@ def test_the_command_writes_the_error_where_it_is_asked_for(case, tmp_path, caps
     plain = [command[0], str(tmp_path / "plain.toml"), *command[2:], "--std"]
     assert main(plain) == 2
     assert "has no [remainder]" in capsys.readouterr().err
+
+
+def test_identify_leaves_it_out_for_the_rows_that_it_was_learned_from(case):
+    slip, load = np.tile([0.1, 0.2, 0.3, 0.4], 3), np.repeat([40.0, 70.0, 100.0], 4)
+    rows, others = (simulate(case, slip, load, seed=seed) for seed in (1, 2))
+    learned = replace(case, remainder=case.remainder.of_rows(rows))
+    assert learned.remainder.learned_from(rows.rows(np.asarray([7, 2])))
+    assert not learned.remainder.learned_from(others)
+    assert not case.remainder.learned_from(rows)
+
+    def fitted(own, table):
+        fit = identify(own, table, ["friction_angle"], "nonlinear")
+        return fit["friction_angle"], "same-rows" in [one.code for one in fit.warnings]
+
+    without = replace(case, remainder=None)
+    assert fitted(learned, rows) == (fitted(without, rows)[0], True)
+    assert fitted(learned, others) == (fitted(case, others)[0], False)
+    assert fitted(without, others)[0] != fitted(case, others)[0]
