@@ -13,6 +13,7 @@ from soilml.errors import InputError, did_you_mean
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, declared
 from soilml.physics.effects.base import Effect, SlipLoadScaling
+from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.quantities import SHEAR
 
 #: Ranges of natural soils, for parameters without a prior.
@@ -151,9 +152,14 @@ def free_soil_parameters(case: Case, free: Sequence[str] | None) -> list[Coordin
 
 
 def fixed_parameters(case: Case, free: Sequence[Coordinate]) -> list[str]:
-    """Soil and gear parameters that were fixed at the values of the model file."""
+    """Soil and gear parameters that were fixed at the values of the model file.
+
+    Beside a free kphi, kc matters with gears of several widths alone.
+    """
     freed = {c.path for c in free}
-    soil = [name for name in (*SHEAR, "kphi", "n") if name not in freed]
+    bearing = ("kphi", "n") if "kphi" in freed and not case.gears else ("kphi", "kc", "n")
+    stress = ("a0", "a1") if isinstance(case.model.gear, RigidWheel) else ()
+    soil = [name for name in (*SHEAR, *bearing, *stress) if name not in freed]
     return [*soil, *(path for path in case.parameters() if path.startswith(("gear.", "gears.")))]
 
 

@@ -228,6 +228,9 @@ def gap(
         )
         agreement = noise_agreement(case, readings, soil, analysis)
         report = _build_report(case, analysis, checks, split, held_out, agreement, seed=seed)
+        if report.model.remainder not in (None, case.remainder):
+            learned = report.model.remainder.of_rows(split.analysed)
+            report = replace(report, model=replace(report.model, remainder=learned))
         report = replace(report, next_runs=tuple(rank_by_cost(report.next_runs, known_costs)))
     lines = report_lines(report, effect_names(case))
     report = replace(report, sentence=headline(report), lines=lines)

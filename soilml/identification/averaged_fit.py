@@ -67,15 +67,21 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         undeclared=bool(readings.undeclared),
     )
     if found.noise_inflated:
-        text = (
-            f"residuals are {found.noise_scale:.1f} times what noise, typical errors and effects "
-            "of the catalogue explain: run soilml gap; std is multiplied by this factor"
-        )
-        fit = replace(fit, warnings=(*fit.warnings, Remark("excess-residuals", text)))
+        excess = beyond_all_explanations(found.noise_scale, "std is multiplied by this factor")
+        fit = replace(fit, warnings=(*fit.warnings, excess))
     if not any(one.exact for one in found.explanations):
         text = "other explanations are a hundred times as likely as the model taken as exact"
         exact = replace(exact, warnings=(*exact.warnings, Remark("unlikely", text)))
     return replace(fit, explanations=found.explanations, exact_model=replace(exact, samples=None))
+
+
+def beyond_all_explanations(factor: float, consequence: str) -> Remark:
+    """That residuals are `factor` times what any explanation leaves, and what follows."""
+    text = (
+        f"residuals are {factor:.1f} times what noise, typical errors and effects of the catalogue "
+        f"explain: run soilml gap; {consequence}"
+    )
+    return Remark("excess-residuals", text)
 
 
 def soil_samples(

@@ -22,7 +22,7 @@ from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.averaged import AveragedSamples
-from soilml.identification.averaged_fit import soil_samples
+from soilml.identification.averaged_fit import beyond_all_explanations, soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
@@ -199,7 +199,10 @@ def measured_soil(
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
     if samples.noise_inflated:
         consequence = "bands are widened and may be biased"
-        warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
+        if isinstance(samples, AveragedSamples):
+            warnings.append(beyond_all_explanations(samples.noise_scale, consequence))
+        else:
+            warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
     if isinstance(samples, AveragedSamples) and not any(e.exact for e in samples.explanations):
         first = samples.explanations[0]
         likeliest = str(first) if first.effect else "errors of sensors and model"

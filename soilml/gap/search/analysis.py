@@ -14,7 +14,7 @@ from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import predict
+from soilml.fitting.predictions import forces, predict
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import (
     RUN_EFFECT_UNITS,
@@ -40,6 +40,7 @@ from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, witho
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 from soilml.remarks import Remark
+from soilml.row_status import Status
 
 #: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
 MAX_PASSES = 2
@@ -227,7 +228,9 @@ def _search_in_passes(
     infeasible = np.flatnonzero(~np.isfinite(soil.prediction))
     if infeasible.size:
         row = int(problem.readings.row[infeasible[0]])
-        text = f"the model cannot carry the load of {place(row)}"
+        status = forces(soil.fitted(), problem.readings.at).status[row]
+        reason = Status(int(status)).reason
+        text = f"the model cannot carry the load of {place(row)}: {reason}"
         return Analysis(problem, result, error=Remark("no-equilibrium", text)), soil
     best = starts[earlier.accepted[0].names].fit if earlier and earlier.accepted else soil
     for number in range(MAX_PASSES):

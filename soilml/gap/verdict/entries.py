@@ -236,7 +236,8 @@ def _bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[
     for c, value in zip(coordinates, x, strict=True):
         if not c.effect:
             if min(value, 1.0 - value) < AT_BOUND:
-                notes.append(Remark("at-bound", f"{c.path} is at a bound of its prior", (c.path,)))
+                text = f"{c.path} is at a bound of its prior: soilml identify has its interval"
+                notes.append(Remark("at-bound", text, (c.path,)))
         elif value > c.upper - AT_BOUND * (c.upper - c.lower):
             notes.append(Remark("at-bound", f"{c.path} is at its upper bound", (c.path,)))
     return notes

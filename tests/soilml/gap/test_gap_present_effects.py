@@ -73,8 +73,8 @@ def test_added_effects_have_a_prior_with_their_uncertainty():
 def test_fixed_parameters_are_reported():
     report = gap(Case(WHEEL, SAND, PRIOR, NOISE), measured(SlipSinkage(n1=0.4)))
     (fixed,) = [one for one in report.not_claimed if one.code == "fixed-parameters"]
-    assert fixed.about[:3] == ("kphi", "n", "gear.radius")
+    assert fixed.about[:6] == ("kphi", "kc", "n", "a0", "a1", "gear.radius")
     freed = {"kphi": Prior(1e5, 1e7, log=True), "n": Prior(0.5, 1.5)}
     more = gap(replace(Case(WHEEL, SAND, PRIOR | freed, NOISE)), measured(SlipSinkage(n1=0.4)))
     (fixed,) = [one for one in more.not_claimed if one.code == "fixed-parameters"]
-    assert not {"kphi", "n"} & set(fixed.about)
+    assert not {"kphi", "kc", "n"} & set(fixed.about)

@@ -59,9 +59,9 @@ def test_a_soil_parameter_is_free_or_fixed():
     free = free_soil_parameters(case, ["cohesion"])
     assert [f.path for f in free] == ["cohesion"]
     fixed = fixed_parameters(case, free)
-    assert fixed[:4] == ["friction_angle", "shear_modulus", "kphi", "n"]
+    assert fixed[:7] == ["friction_angle", "shear_modulus", "kphi", "kc", "n", "a0", "a1"]
     gear = [path for path in case.parameters() if path.startswith("gear.")]
-    assert fixed[4:] == gear and "gear.radius" in gear
+    assert fixed[7:] == gear and "gear.radius" in gear
     alone = free_soil_parameters(replace(case, prior={}), None)
     assert {f.path for f in alone} == {"cohesion", "friction_angle", "shear_modulus"}
     one = replace(case, prior={"cohesion": case.prior["cohesion"]})
