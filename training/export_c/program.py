@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from bisect import insort
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -328,19 +329,17 @@ def _placed_in_turn(
 ) -> tuple[dict[str, int], int]:
     """Offsets of tensors that are placed one by one, as low as those before allow, and the end."""
     offsets: dict[str, int] = {}
+    placed: list[tuple[int, int, int, int]] = []  # offset, end, first and last statement
     for name in order:
         born, dead, need = lives[name]
         start = 0
-        busy = sorted(
-            (at, at + lives[other][2])
-            for other, at in offsets.items()
-            if lives[other][0] <= dead and lives[other][1] >= born
-        )
-        for begin, end in busy:
-            if begin - start >= need:
-                break
-            start = max(start, end)
+        for begin, end, first, last in placed:
+            if first <= dead and last >= born:
+                if begin - start >= need:
+                    break
+                start = max(start, end)
         offsets[name] = start
+        insort(placed, (start, start + need, born, dead))
     return offsets, max(offsets[name] + lives[name][2] for name in order)
 
 
