@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import signal
 import sys
@@ -105,6 +106,17 @@ def solved(box: dict[str, np.ndarray], effects=(), gear=None, **known):
     soil = Soil(**{name: box[name] for name in names})
     gear = (gear or Wheel)(radius=box["radius"], width=box["width"])
     return Model(gear, tuple(effects))(soil, Operating(slip=box["slip"], load=box["load"], **known))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _one_session_for_each_file():
+    """A file that many tests read is prepared once: a session keeps nothing between its runs."""
+    from soilml.onboard import model_file
+
+    with pytest.MonkeyPatch.context() as patch:
+        made = functools.lru_cache(maxsize=12)(model_file.create_session)
+        patch.setattr(model_file, "create_session", made)
+        yield
 
 
 @pytest.fixture

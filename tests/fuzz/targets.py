@@ -279,7 +279,7 @@ TARGETS: dict[str, Target] = {
     "forward-model": Target(_model, as_json(st.fixed_dictionaries(load_cases)), 2.0),
     "estimator": Target(_estimator, as_json(st.fixed_dictionaries(readings)), 0.5),
     "identify": Target(_identified, pairs, 0.2),
-    "gap": Target(_gap, pairs, 0.05),
+    "gap": Target(_gap, pairs, 0.025),
     "command": Target(
         _command, as_json(st.tuples(commands, words).map(lambda c: [c[0], *c[1]])), 0.3
     ),

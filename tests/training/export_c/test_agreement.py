@@ -25,8 +25,6 @@ MOMENTS, ENDS = (2e-4, 5e-3), (5e-3, 0.3)
 #: grows with the root of the number of rows while the standard deviation shrinks with it. The ends
 #: of the interval, steps of an empirical distribution function, magnify it.
 LONG, LONG_ENDS = 0.01, 0.05
-#: Largest difference of an estimate from one row, which is computed in double.
-SINGLE = 1e-5
 #: The prior's standard deviation is that of the data in the metadata, and that of its quantiles in
 #: the graph; a remaining share of the prior that is closer to the limit may be judged either way.
 PRIOR_EDGE = 1e-3
@@ -58,25 +56,6 @@ def assert_close(found, of_many=False):
         assert (often[:2] < MOMENTS[0]).all() and (often[2:] < ENDS[0]).all()
 
 
-def compare_singles(model, estimator, count, seed):
-    """Readings in the training range and beyond it, each by itself."""
-    rng = np.random.default_rng(seed)
-    slip = rng.uniform(-0.2, 0.9, count).astype(np.float32)
-    load = np.exp(rng.uniform(np.log(10.0), np.log(300.0), count)).astype(np.float32)
-    torque = (load * rng.uniform(-0.01, 0.09, count)).astype(np.float32)
-    expected = estimator(slip=slip, torque=torque, load=load)
-    for i in range(count):
-        code, answer = model.single(model.row(slip=slip[i], torque=torque[i], load=load[i]))
-        assert answer["in_range"] == expected.in_range[i] == (code == model.codes["OK"])
-        for name in NAMES:
-            error = np.abs(answer[name] - getattr(expected, name)[i]) / expected.prior_std
-            assert (error < SINGLE).all()
-        scale = np.outer(expected.prior_std, expected.prior_std)
-        error = answer["covariance"].reshape(scale.shape) - expected.covariance[i]
-        assert (np.abs(error) / scale < SINGLE).all()
-    assert 0.05 < expected.in_range.mean() < 0.95
-
-
 def compare_sets(model, name, sets, seed):
     """Sets of 1 to 32 rows, with channels absent at random."""
     rng, found = np.random.default_rng(seed), []
@@ -99,17 +78,6 @@ def compare_sets(model, name, sets, seed):
         found.append(differences(answer, expected))
     assert len(found) > 0.9 * sets
     assert_close(found, of_many=sets >= 100)
-
-
-def test_one_reading_by_the_linear_file(compiled):
-    compare_singles(compiled("wheel_linear"), estimator_of("wheel_linear", None), 300, 0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("compiler", ONE_FIRST)
-@pytest.mark.parametrize("name", ["wheel", "wheel_lssvm", "wheel_mlp", "kls1_wheel"])
-def test_one_reading(name, compiler, compiled):
-    compare_singles(compiled(name, compiler), estimator_of(name, None), 1500, 1)
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """C code takes the short way of readings with noise alone where they are, and only there."""
 
+import ctypes
+
 import numpy as np
 import pytest
 from compiled_c import COMPILERS, CompiledModel, compile_library
@@ -13,29 +15,35 @@ NO_ERRORS = dict.fromkeys(
 BRANCH = "    if (*noise_alone)\n"
 
 
+class Way:
+    """Compiled code that takes the way of its readings (0), always the short one (1), or never."""
+
+    def __init__(self, model, forced):
+        self.model, self.forced = model, forced
+
+    def answers(self, context, rows, parts):
+        """Estimates after each step, and the answer without new rows."""
+        ctypes.c_int.in_dll(self.model.library, "forced").value = self.forced
+        memory, found = self.model.start(**context), []
+        for part in parts:
+            rows_of_part = self.model.rows(**{k: v[part] for k, v in rows.items()})
+            found.append(self.model.update(memory, rows_of_part)[1])
+        return [*found, self.model.answer(memory)[1]]
+
+
 @pytest.fixture(scope="module", params=["wheel", "any_wheel"])
 def ways(request, exported, tmp_path_factory):
     """Name, and the file as it is, with the short way always, and with the general way always."""
     name, folder = request.param, tmp_path_factory.mktemp("ways")
     text = (exported(name) / f"{name}.c").read_text()
     assert text.count(BRANCH) == 2  # of an update, and of an answer
-    (folder / f"{name}.h").write_text((exported(name) / f"{name}.h").read_text())
-    made = []
-    for condition in ("*noise_alone", "true || *noise_alone", "false && *noise_alone"):
-        source = folder / f"{name}.c"
-        source.write_text(text.replace(BRANCH, f"    if ({condition})\n"))
-        library = compile_library(source, folder / f"{len(made)}.so", COMPILERS[0], "-O1")
-        made.append(CompiledModel(folder / f"{name}.h", library))
-    return name, made
-
-
-def answers(model, context, rows, parts):
-    """Estimates after each step, and the answer without new rows."""
-    memory, found = model.start(**context), []
-    for part in parts:
-        _, estimate = model.update(memory, model.rows(**{k: v[part] for k, v in rows.items()}))
-        found.append(estimate)
-    return [*found, model.answer(memory)[1]]
+    source, header = folder / f"{name}.c", exported(name) / f"{name}.h"
+    (folder / header.name).write_text(header.read_text())
+    switched = text.replace(BRANCH, "    if (forced ? forced > 0 : *noise_alone)\n")
+    source.write_text(f"extern int forced;\nint forced = 0;\n{switched}")
+    library = compile_library(source, folder / "ways.so", COMPILERS[0])
+    model = CompiledModel(header, library)
+    return name, [Way(model, forced) for forced in (0, 1, -1)]
 
 
 def with_noise_alone(name, seed):
@@ -62,14 +70,14 @@ def test_readings_with_noise_alone_take_the_short_way_which_changes_rounding_alo
     for seed in range(4):
         plain, rows, given = with_noise_alone(name, seed)
         context = given | NO_ERRORS
-        taken = answers(model, context, rows, PARTS)
-        assert same(taken, answers(short, context, rows, PARTS))
+        taken = model.answers(context, rows, PARTS)
+        assert same(taken, short.answers(context, rows, PARTS))
         estimator = plain.on(**context)
         memory = estimator.start()
         for part, own in zip(PARTS, taken, strict=False):
             expected, memory = estimator.step(memory, **{k: v[part] for k, v in rows.items()})
             found.append(differences(own, expected))
-        assert not same(taken, answers(general, context, rows, PARTS))  # another order of sums
+        assert not same(taken, general.answers(context, rows, PARTS))  # another order of sums
         found.append(differences(taken[-1], expected))
     assert_close(found)
 
@@ -86,6 +94,6 @@ def test_any_error_takes_the_general_way(ways, error):
         context[error] = 0.02
     # noise of slip is in the rows of the memory: an answer without new rows may be short
     own, whole, quick = (
-        answers(m, context, rows, PARTS)[: len(PARTS)] for m in (model, general, short)
+        way.answers(context, rows, PARTS)[: len(PARTS)] for way in (model, general, short)
     )
     assert same(own, whole) and not same(own, quick)

@@ -125,7 +125,7 @@ def test_a_damaged_tracker_is_refused_as_it_is_or_read(compiled):
     stored = bytes(own.tracker)
     first = type(own.tracker).blocks.offset  # counts and what else is no array of a system
     codes = []
-    for k in range(4000):
+    for k in range(1500):
         before = damaged(stored, rng, first)
         ctypes.memmove(ctypes.byref(own.tracker), before, len(before))
         code, _, answer = own.read(**rows[60 + k % 20])
