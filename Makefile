@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 # one thread for each process: threads of several processes on the same cores slow each other down
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
+# bytecode is kept: the tests start hundreds of processes, which would compile the package anew
+unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help demo demo-papers demo-import gap test test-long test-fast test-oldest test-newest test-browser check pages models limit kls1 gap-real bench bench-gap bench-gap-quick fuzz faults disk-faults coverage mutation bounds endurance release lock sbom licences audit-packages docs clean

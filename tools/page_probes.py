@@ -81,6 +81,16 @@ def _slip_models(script: ModuleType) -> Callable[[], object]:
     return start
 
 
+def _tracked_robot(script: ModuleType) -> None:
+    """Two groups of pulls in place of eight."""
+    script.GROUPS, script.draw = 2, _nothing
+
+
+def _without_pictures(script: ModuleType) -> None:
+    """All figures of a script that is quick but for what it draws."""
+    script.draw = _nothing
+
+
 def _springs(script: ModuleType) -> None:
     """Nine springs in place of 63."""
     chapter = script.chapter
@@ -190,7 +200,10 @@ def _challenge(script: ModuleType) -> Callable[[], object]:
 PROBES: dict[str, Shrink] = {
     "examples/papers/lunar_lssvm.py": _lunar,
     "examples/papers/slip_models.py": _slip_models,
+    "examples/papers/climbing.py": _without_pictures,
+    "examples/papers/force_sensor_wheel.py": _without_pictures,
     "examples/papers/stick_slip.py": _stick_slip,
+    "examples/papers/tracked_robot.py": _tracked_robot,
     "examples/papers/wheel_leg_slip.py": _wheel_leg_slip,
     "examples/papers/wheel_legs.py": _wheel_legs,
     "examples/import/wheel_leg.py": _import_wheel_leg,

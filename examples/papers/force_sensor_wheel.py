@@ -110,7 +110,7 @@ def main() -> None:
         print(f"\nA wheel with stress-shift {shift:g} on {on}, its model without:")
         print(f"  {diagnosed(shift, stiffer)}")
     OUT.mkdir(parents=True, exist_ok=True)
-    drawn(arcs, binned, estimates, wide, pulls, known, tuned)
+    draw(arcs, binned, estimates, wide, pulls, known, tuned)
 
 
 def without_noise(runs: list[SteadyRun], arcs: list[StressProfile]) -> None:
@@ -216,7 +216,7 @@ def diagnosed(shift: float, stiffer: float) -> str:
     return f"soilml gap: {report.status}; {report.sentence} {size}"
 
 
-def drawn(arcs, binned, estimates, wide, pulls, known, tuned) -> None:
+def draw(arcs, binned, estimates, wide, pulls, known, tuned) -> None:
     """Four panels."""
     figure, ((a, b), (c, d)) = plt.subplots(2, 2, figsize=(11, 7.6), layout="constrained")
     deg = np.rad2deg

@@ -54,6 +54,7 @@ PRIOR = {
 }
 SYMBOLS = ("n", r"$\varphi$", "$k_p$", "K", "c")
 UNITS = {"kphi": 1e-3, "cohesion": 1e-3}
+GROUPS = 8
 LABELS = ("simulated", "Table 1", "truth of the simulated")
 TABLE = ("n", "friction_angle", "kp", "shear_modulus", "cohesion")
 
@@ -238,7 +239,7 @@ def eight_groups() -> tuple[Case, GroupFits]:
     case = Case(Model(WANG2018.track), soil("wang2018/sand"), PRIOR, noise)
     rng = np.random.default_rng(2018)
     slips = np.linspace(0.05, 0.85, 10)
-    tables = [simulate_group(case, slips, WANG2018.load, rng) for _ in range(8)]
+    tables = [simulate_group(case, slips, WANG2018.load, rng) for _ in range(GROUPS)]
     groups = identify_groups(case, tables)
     print("\nEight groups of ten pulls each, 5 % and 10 N noise, one load, five unknowns")
     print("parameter       true     mean      std  prior std  prior remaining, a group  all rows")
@@ -342,7 +343,7 @@ def draw_groups(ax: plt.Axes, case: Case, groups: GroupFits) -> None:
         theirs = [v for k, v in book.items() if k[:6] == "table1" and k.endswith(f"_{TABLE[i]}")]
         factor = {"friction_angle": np.pi / 180.0, "kphi": 1e3, "cohesion": 1e3}.get(name, 1.0)
         shown = [prior.fraction(factor * v) for v in theirs]
-        spread = np.linspace(-0.08, 0.08, 8)
+        spread = np.linspace(-0.08, 0.08, GROUPS)
         simulated, published, truth = LABELS if i == 0 else (None, None, None)
         ax.plot(i - 0.17 + spread, ours, "o", color="#26547c", label=simulated)
         ax.plot(i + 0.17 + spread, shown, "D", mfc="none", color="#c08a2d", label=published)
