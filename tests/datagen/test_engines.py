@@ -147,7 +147,12 @@ def test_a_file_has_the_same_bytes_whatever_the_number_of_processes(tmp_path, mo
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("out", "engine"), [("data.parquet", "processes"), ("data/", "processes"), ("data/", "dask")]
+    ("out", "engine"),
+    [
+        ("data.parquet", "processes"),
+        ("data/", "processes"),
+        pytest.param("data/", "dask", marks=pytest.mark.long),
+    ],
 )
 def test_interruption_ends_all_processes_with_one_line(tmp_path, out, engine):
     if engine == "dask":

@@ -16,7 +16,7 @@ from soilml.onboard.estimator import Estimator
 ROOT = Path(__file__).parents[2]
 
 #: Prints the resident memory of the later soils above that of the earlier ones, bytes, by medians.
-#: The halves are 1000 readings apart, whose memories alone are 18 MB. It is a process of its own:
+#: The halves are 500 readings apart, whose memories alone are 9 MB. It is a process of its own:
 #: one that has run other tests takes from what they have left.
 GROWTH = """
 import sys
@@ -31,10 +31,10 @@ def leaking(self, memory, **readings):
     kept.append(memory)
     return estimate, memory
 
-run_day(steps=500, per_soil=250, seed=3)  # warms up
+run_day(steps=250, per_soil=250, seed=3)  # warms up
 if sys.argv[1] == "leaking":
     Estimator.step = leaking
-resident = run_day(steps=2000, per_soil=250, seed=4).resident
+resident = run_day(steps=1000, per_soil=250, seed=4).resident
 half = len(resident) // 2
 print(np.median(resident[half:]) - np.median(resident[:half]))
 """

@@ -118,6 +118,7 @@ def test_a_cause_that_no_catalogue_has_is_not_named_alone():
     assert report.p_gap < 0.03
 
 
+@pytest.mark.long
 def test_an_unclaimed_best_fit_is_not_in_the_model():
     report = analysed("stick-slip")
     assert report.status == "unknown"
@@ -125,7 +126,9 @@ def test_an_unclaimed_best_fit_is_not_in_the_model():
     assert any("any cause" in said for said in texts(report.not_claimed))
 
 
-@pytest.mark.parametrize("kind", ["slip-sinkage", "stick-slip", "bulldozing"])
+@pytest.mark.parametrize(
+    "kind", ["slip-sinkage", pytest.param("stick-slip", marks=pytest.mark.long), "bulldozing"]
+)
 def test_a_report_is_consistent(kind):
     report = analysed(kind)
     assert report.status in STATUSES

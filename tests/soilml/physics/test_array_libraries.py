@@ -15,7 +15,7 @@ WHEEL = Model(Wheel(radius=0.15, width=0.12))
 OF_WHEELS = {name: cls for name, cls in EFFECTS.items() if cls.applies_to(WHEEL.gear)}
 CASES = {
     "all": replace(WHEEL, effects=tuple(cls(**cls.about.reference) for cls in OF_WHEELS.values())),
-    **{name: WHEEL + cls(**cls.about.reference) for name, cls in OF_WHEELS.items()},
+    "none": WHEEL,
 }
 SAND = soil("wong1989/dry_sand")
 SLIP = np.concatenate([np.linspace(-0.5, 0.8, 9), [0.3]])

@@ -14,7 +14,7 @@ PAGE = ROOT / "docs" / "c-export.md"
 INSTALLED = ("SOILML=", "python3 -m venv", "venv/bin/pip", "sudo apt-get")
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif("gcc" not in COMPILERS or bool(MISSING), reason="no gcc, or no emulator")
 def test_the_commands_of_the_page_run_as_written(tmp_path):
     section = PAGE.read_text().split("## From an empty folder")[1].split("\n## ")[0]
