@@ -63,6 +63,16 @@ def same(one, other):
     return all(np.array_equal(a[key], b[key]) for a, b in zip(one, other, strict=True) for key in a)
 
 
+def apart(estimator, rows, found):
+    """Differences of estimates after each step from those of onnxruntime, and of an answer."""
+    memory, expected = estimator.start(), []
+    for part in PARTS:
+        answer, memory = estimator.step(memory, **{k: v[part] for k, v in rows.items()})
+        expected.append(answer)
+    expected += expected[-1:]
+    return [differences(own, other) for own, other in zip(found, expected, strict=False)]
+
+
 @pytest.mark.slow
 def test_readings_with_noise_alone_take_the_short_way_which_changes_rounding_alone(ways):
     name, (model, short, general) = ways
@@ -72,13 +82,8 @@ def test_readings_with_noise_alone_take_the_short_way_which_changes_rounding_alo
         context = given | NO_ERRORS
         taken = model.answers(context, rows, PARTS)
         assert same(taken, short.answers(context, rows, PARTS))
-        estimator = plain.on(**context)
-        memory = estimator.start()
-        for part, own in zip(PARTS, taken, strict=False):
-            expected, memory = estimator.step(memory, **{k: v[part] for k, v in rows.items()})
-            found.append(differences(own, expected))
+        found += apart(plain.on(**context), rows, taken)
         assert not same(taken, general.answers(context, rows, PARTS))  # another order of sums
-        found.append(differences(taken[-1], expected))
     assert_close(found)
 
 
@@ -86,7 +91,7 @@ def test_readings_with_noise_alone_take_the_short_way_which_changes_rounding_alo
 @pytest.mark.parametrize("error", ["slip_bias", "model_error", "slip_std"])
 def test_any_error_takes_the_general_way(ways, error):
     name, (model, short, general) = ways
-    _, rows, given = with_noise_alone(name, 9)
+    plain, rows, given = with_noise_alone(name, 9)
     context = given | NO_ERRORS
     if error == "slip_std":
         rows["slip_std"] = np.full(12, 0.01, np.float32)
@@ -97,3 +102,4 @@ def test_any_error_takes_the_general_way(ways, error):
         way.answers(context, rows, PARTS)[: len(PARTS)] for way in (model, general, short)
     )
     assert same(own, whole) and not same(own, quick)
+    assert_close(apart(plain.on(**context), rows, own))
