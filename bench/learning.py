@@ -18,7 +18,6 @@ from training.regressors.exact_solution import GAMMAS, KernelEigensystem
 from training.regressors.rbf_expansion import rbf
 
 ROOT = Path(__file__).parents[1]
-FEATURES = ("slip", "torque/load", "load")
 
 
 def comparison() -> str:

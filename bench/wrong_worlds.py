@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from drawn_errors import STD, DrawnErrors
+from drawn_errors import DrawnErrors
 
 from datagen.blind_sets.plans import MECHANISMS
 from datagen.blind_sets.reference_wheel import Mechanism, WheelState, solve_equilibrium
@@ -77,9 +77,6 @@ LAW_WORLDS = (
     World("stress-shift", mechanism=("stress-shift", 0.2)),
     World("sidewall-shear", mechanism=("sidewall-shear", 1.0)),
 )
-#: An error of the usual size, as the answer that allows for it assumes, where `x 2` is one error of
-#: 1.7 standard deviations.
-USUAL_BEARING = World("typical error of bearing", bearing_std=STD["bearing"])
 #: Mechanisms that no error of sensors or model describes, at their reference sizes.
 UNLISTED = (
     "stress-shift",
