@@ -132,6 +132,17 @@ def effects_to_fit(
     return [name for name in names if name in gains]
 
 
+#: Candidates of an earlier search, and effects by their gains, that a first look takes.
+FIRST_CANDIDATES, FIRST_GAINS = 4, 3
+
+
+def promising_sets(gains: Mapping[str, float], starts: Starts) -> list[tuple[str, ...]]:
+    """The likeliest candidates of an earlier search, and the effects of the largest gains."""
+    ranked = sorted((c.objective, names) for names, c in starts.items() if names)
+    likeliest = [names for _, names in ranked[:FIRST_CANDIDATES]]
+    return list(dict.fromkeys([*likeliest, *((n,) for n in _first(gains, FIRST_GAINS))]))
+
+
 def _largest_gains(gains: Mapping[str, float]) -> list[str]:
     """Effects in order of their predicted gain, those within the margin of the largest."""
     ordered = _first(gains, len(gains))

@@ -29,6 +29,7 @@ from soilml.gap.search.screening import (
     effects_to_fit,
     predicted_gains,
     predicted_with_and_without,
+    promising_sets,
 )
 from soilml.remarks import Remark
 
@@ -120,6 +121,7 @@ def search(
     seed: int,
     starts: Starts | None = None,
     progress: Callable[[float], None] = lambda _: None,
+    promising: bool = False,
 ) -> SearchResult:
     """Search for the effects that explain what the soil alone does not.
 
@@ -130,6 +132,7 @@ def search(
     soil: The soil alone, fitted under noise and scatter without discrepancy.
     starts: Candidates of an earlier search.
     progress: Called with the share of the search that is done, from 0 to 1.
+    promising: Fit only the likeliest of `starts`, and the effects with the largest predicted gains.
     """
     starts = starts or {}
     signatures, untestable = problem.signatures_and_untestable(soil)
@@ -140,10 +143,14 @@ def search(
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
     fitted: dict[tuple[str, ...], Explanation] = {(): soil_alone}
-    selected = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-    level = _fit_level(problem, soil, soil_alone, {(n,): soil_alone for n in selected}, starts)
+    if promising:
+        selected = promising_sets(gains, starts)
+    else:
+        singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+        selected = [(name,) for name in singles]
+    level = _fit_level(problem, soil, soil_alone, dict.fromkeys(selected, soil_alone), starts)
     fitted |= {c.names: c for c in level}
-    for effects in range(1, MAX_EFFECTS):
+    for effects in range(1, 1 if promising else MAX_EFFECTS):
         progress((1 + effects) / STEPS)
         best = min(fitted.values(), key=lambda c: c.objective)
         if best.names and _is_complete(problem, best, seed):

@@ -86,6 +86,21 @@ def test_single_effects_within_15_of_the_best_of_an_earlier_search_are_fitted_ag
     assert selected(gains, starts={c.names: c for c in earlier}) == [*"abcd", "x"]
 
 
+def test_a_first_look_takes_the_likeliest_of_an_earlier_search_and_the_largest_gains():
+    earlier = {
+        c.names: c
+        for c in [
+            made("a", "b", objective=1.0),
+            made("c", objective=2.0),
+            made(objective=0.0),
+            *(made(name, objective=9.0 + i) for i, name in enumerate("defg")),
+        ]
+    }
+    gains = {"c": 9.0, "p": 8.0, "q": 7.0, "r": 6.0}
+    expected = [("a", "b"), ("c",), ("d",), ("e",), ("p",), ("q",)]
+    assert screening.promising_sets(gains, earlier) == expected
+
+
 @pytest.fixture
 def fitting(monkeypatch):
     """Requests that were made, what they give, what shapes promise, and what is shaped."""
