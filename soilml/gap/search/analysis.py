@@ -99,8 +99,8 @@ def analyse(
     """Search for the effects that explain what the soil alone does not.
 
     Where the soil presses against its priors, the search is repeated with these opened; it counts
-    where it explains the readings far better. Where the soil alone then leaves no gap, that speaks
-    against a cause.
+    where it explains the readings far better, which a first look at few explanations tells. Where
+    the soil alone then leaves no gap, that speaks against a cause.
 
     `place` gives the file and line of a row, for messages; `progress` is called with the share that
     is done.
@@ -119,7 +119,10 @@ def analyse(
         opened = open_priors(found.problem, found.result)
         if opened is not None:
             start = replace(problem, case=opened.case, soil=opened.soil)
-            other = _without_outliers(start, seed, place, progress, found)
+            other = _first_with_opened(start, found, seed, place)
+            better = any(explains_better(found, other, c) for c in other.result.candidates)
+            if better or not other.result.has_gap:
+                other = _without_outliers(start, seed, place, progress, found)
             if any(explains_better(found, other, c) for c in other.result.candidates):
                 other = replace(other, predictions=predict_with(other.problem, other.result, seed))
                 likeliest = _predictive(other)
@@ -130,6 +133,18 @@ def analyse(
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
                 found = replace(found, opened=remark)
     return found
+
+
+def _first_with_opened(
+    problem: FitProblem, found: Analysis, seed: int, place: Callable[[int], str]
+) -> Analysis:
+    """The analysis with opened priors by the promising explanations alone, without outliers.
+
+    Where the priors are opened, the likeliest within them remain so, or one that gains most does.
+    """
+    if found.excluded is not None:
+        problem = _of_readings(problem, ~found.excluded)
+    return _search_in_passes(problem, seed, place, lambda _: None, found.result, promising=True)[0]
 
 
 def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bool:
@@ -217,8 +232,13 @@ def _search_in_passes(
     place: Callable[[int], str],
     progress: Callable[[float], None],
     earlier: SearchResult | None,
+    *,
+    promising: bool = False,
 ) -> tuple[Analysis, Solution]:
-    """Covariance and search in turn, and the best fit; see `_without_outliers`."""
+    """Covariance and search in turn, and the best fit; see `_without_outliers`.
+
+    promising: See `search`; one pass shows what it is for.
+    """
     free, starts = problem.soil, restated_candidates(problem, earlier.candidates if earlier else ())
     first = np.asarray([f.prior.fraction(f.nominal) for f in free])
     if earlier is not None:
@@ -239,10 +259,10 @@ def _search_in_passes(
         if result.accepted and _have_converged(last, problem.covariance.components):
             break
         soil = problem.fit_soil([soil.x], soil.linearisation)
-        result = search(problem, soil, seed, starts, _in_pass(number, progress))
+        result = search(problem, soil, seed, starts, _in_pass(number, progress), promising)
         starts = {c.names: c for c in result.candidates}
         best = result.accepted[0].fit if result.accepted else soil
-        if not result.accepted:
+        if promising or not result.accepted:
             break
     return Analysis(problem, result), best
 

@@ -9,7 +9,7 @@ import numpy as np
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
-from soilml.gap.search.explanation import Explanation
+from soilml.gap.search.explanation import Explanation, Starts
 from soilml.numerics.subspaces import ROUNDING, project_out
 
 
@@ -98,9 +98,6 @@ LARGE_DISCREPANCY = 2.5
 #: effects fitted again in a further search.
 WITHIN_REACH = 15.0
 
-#: Candidates of an earlier search, by effect names, whose optima are starts of this one.
-Starts = Mapping[tuple[str, ...], Explanation]
-
 
 def effects_to_fit(
     problem: FitProblem,
@@ -130,6 +127,17 @@ def effects_to_fit(
     ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])
     names = dict.fromkeys([*selected, *(name for own in ranked for name in own)])
     return [name for name in names if name in gains]
+
+
+#: Candidates of an earlier search, and effects by their gains, that a first look takes.
+FIRST_CANDIDATES, FIRST_GAINS = 4, 3
+
+
+def promising_sets(gains: Mapping[str, float], starts: Starts) -> list[tuple[str, ...]]:
+    """The likeliest candidates of an earlier search, and the effects of the largest gains."""
+    ranked = sorted((c.objective, names) for names, c in starts.items() if names)
+    likeliest = [names for _, names in ranked[:FIRST_CANDIDATES]]
+    return list(dict.fromkeys([*likeliest, *((n,) for n in _first(gains, FIRST_GAINS))]))
 
 
 def _largest_gains(gains: Mapping[str, float]) -> list[str]:

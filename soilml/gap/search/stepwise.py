@@ -16,6 +16,7 @@ from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.gap.search.explanation import (
     CandidateRequest,
     Explanation,
+    Starts,
     fit_candidates,
     fit_shapes,
     predicted_shape_gain,
@@ -25,10 +26,10 @@ from soilml.gap.search.posterior import Posterior, explanations, for_decisions, 
 from soilml.gap.search.screening import (
     LARGE_DISCREPANCY,
     WITHIN_REACH,
-    Starts,
     effects_to_fit,
     predicted_gains,
     predicted_with_and_without,
+    promising_sets,
 )
 from soilml.remarks import Remark
 
@@ -120,6 +121,7 @@ def search(
     seed: int,
     starts: Starts | None = None,
     progress: Callable[[float], None] = lambda _: None,
+    promising: bool = False,
 ) -> SearchResult:
     """Search for the effects that explain what the soil alone does not.
 
@@ -130,6 +132,7 @@ def search(
     soil: The soil alone, fitted under noise and scatter without discrepancy.
     starts: Candidates of an earlier search.
     progress: Called with the share of the search that is done, from 0 to 1.
+    promising: Fit only the likeliest of `starts`, and the effects with the largest predicted gains.
     """
     starts = starts or {}
     signatures, untestable = problem.signatures_and_untestable(soil)
@@ -140,10 +143,14 @@ def search(
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
     fitted: dict[tuple[str, ...], Explanation] = {(): soil_alone}
-    selected = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-    level = _fit_level(problem, soil, soil_alone, {(n,): soil_alone for n in selected}, starts)
+    if promising:
+        selected = promising_sets(gains, starts)
+    else:
+        singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+        selected = [(name,) for name in singles]
+    level = _fit_level(problem, soil, soil_alone, dict.fromkeys(selected, soil_alone), starts)
     fitted |= {c.names: c for c in level}
-    for effects in range(1, MAX_EFFECTS):
+    for effects in range(1, 1 if promising else MAX_EFFECTS):
         progress((1 + effects) / STEPS)
         best = min(fitted.values(), key=lambda c: c.objective)
         if best.names and _is_complete(problem, best, seed):
@@ -191,7 +198,8 @@ def _fit_level(
 ) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    Beside a large discrepancy, single effects are fitted under noise alone first.
+    Beside a large discrepancy, single effects are fitted under noise alone first, unless an earlier
+    search did so.
     """
     hidden = float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY
     single = all(not base.names for base in sets.values())
@@ -200,11 +208,8 @@ def _fit_level(
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, soil_alone.amplitude)
         noise_start = None
-        if hidden and single:
-            alone = base.noise_only
+        if hidden and single and names not in starts:
             noise_start = {path: off_bounds(x) for path, x in soil.start_values().items()}
-            if alone is not None:
-                noise_start = alone.start_values()
         fit = base.catalogue_law.fit
         requests.append(
             CandidateRequest(
@@ -222,8 +227,9 @@ def _fit_level(
         if c.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, c) < lowest
         or c.objective < lowest + WITHIN_REACH
         or (c.noise_only is not None and c.noise_only.objective < notable)
+        or (c.names in starts and starts[c.names].shape_supported)
     ]
-    shaped = {c.names: c for c in fit_shapes(problem, promising, notable)}
+    shaped = {c.names: c for c in fit_shapes(problem, promising, notable, starts)}
     return [shaped.get(c.names, c) for c in fitted]
 
 

@@ -14,10 +14,12 @@ from soilml.fitting.readings import Readings
 from soilml.gap import gap
 from soilml.gap.evidence.covariance import VarianceComponents
 from soilml.gap.search import analysis
+from soilml.gap.search.opened_priors import OpenedPriors
 from soilml.gap.search.stepwise import SearchResult
 from soilml.numerics.prior import Prior
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
+from soilml.remarks import Remark
 
 CASE = case_of()
 READINGS = fit_problem(CASE, driven(CASE)).readings
@@ -44,7 +46,7 @@ def passes(monkeypatch):
     def far_from(problem, fit, readings):
         return np.asarray([not given.explained for _ in range(len(readings))])
 
-    def search(problem, soil, seed, starts, progress):
+    def search(problem, soil, seed, starts, progress, promising):
         progress(0.5)
         given.starts.append(sorted(starts))
         names = given.accepted[len(given.starts) - 1]
@@ -134,6 +136,32 @@ def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
     found, _ = run(readings=replace(READINGS, at=heavy))
     assert str(found.error) == "the model cannot carry the load of row 5"
     assert isinstance(found.result, SearchResult) and not found.result.has_gap
+
+
+@pytest.mark.parametrize(
+    "has_gap, better, searches", [(True, False, 1), (True, True, 2), (False, False, 2)]
+)
+def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_they_count(
+    passes, monkeypatch, has_gap, better, searches
+):
+    given, run = passes
+    given.accepted = [None, None]
+    look = replace(analysis._no_result(None), candidates=(SimpleNamespace(names=("a",)),))
+    p_value = SimpleNamespace(p_value=0.001 if has_gap else 0.5)
+    look = analysis.Analysis(None, replace(look, soil_test=p_value))
+    free = free_soil_parameters(CASE, None)
+    opened = OpenedPriors(CASE, tuple(free), Remark("prior-opened", "the priors were opened"))
+    for name, value in {
+        "open_priors": lambda *_: opened,
+        "_first_with_opened": lambda *_: look,
+        "restated_candidates": lambda *_: {},
+        "restated": lambda *_: [SimpleNamespace(x=np.full(3, 0.5))],
+        "explains_better": lambda *_: better,
+    }.items():
+        monkeypatch.setattr(analysis, name, value)
+    found, _ = run()
+    assert len(given.starts) == searches
+    assert (found.opened is not None) == (searches == 2)  # the stubs find no gap in full
 
 
 def test_the_declared_noise_is_where_the_analysis_begins():
