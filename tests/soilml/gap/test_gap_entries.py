@@ -170,7 +170,7 @@ def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
 def test_estimates_at_a_bound():
     soil = Coordinate("cohesion", "Pa", Prior(0.0, 1000.0))
     size = Coordinate("slip-sinkage.n1", "1", Prior(0.0, 1.0), upper=4.0)
-    at = [f"{soil.path} is at a bound of its prior"]
+    at = [f"{soil.path} is at a bound of its prior: soilml identify has its interval"]
     assert texts(_bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
     assert _bound_notes([soil, soil], [0.0011, 0.9989]) == []
     assert texts(_bound_notes([size, size], [3.9961, 0.0])) == [
