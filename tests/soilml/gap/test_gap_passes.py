@@ -134,7 +134,8 @@ def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
     _, run = passes
     heavy = replace(READINGS.at, load=np.where(np.arange(32) == 5, 9e6, READINGS.at.load))
     found, _ = run(readings=replace(READINGS, at=heavy))
-    assert str(found.error) == "the model cannot carry the load of row 5"
+    why = "no equilibrium: the soil carries less than this load at any sinkage up to the hub"
+    assert str(found.error) == f"the model cannot carry the load of row 5: {why}"
     assert isinstance(found.result, SearchResult) and not found.result.has_gap
 
 
