@@ -248,9 +248,10 @@ def _search_in_passes(
     infeasible = np.flatnonzero(~np.isfinite(soil.prediction))
     if infeasible.size:
         row = int(problem.readings.row[infeasible[0]])
-        status = forces(soil.fitted(), problem.readings.at).status[row]
-        reason = Status(int(status)).reason
-        text = f"the model cannot carry the load of {place(row)}: {reason}"
+        status = Status(int(forces(soil.fitted(), problem.readings.at).status[row]))
+        text = f"the model cannot carry the load of {place(row)}"
+        if status not in (Status.TOO_HEAVY, Status.NOT_CONVERGED):
+            text = f"{place(row)}: {status.reason}"
         return Analysis(problem, result, error=Remark("no-equilibrium", text)), soil
     best = starts[earlier.accepted[0].names].fit if earlier and earlier.accepted else soil
     for number in range(MAX_PASSES):
