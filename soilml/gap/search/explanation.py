@@ -128,32 +128,22 @@ def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFi
     return first if first.evidence.value <= second.evidence.value else second
 
 
-#: Candidates of an earlier search, by effect names, whose optima are starts of this one.
-Starts = Mapping[tuple[str, ...], Explanation]
-
-
 def fit_shapes(
-    problem: FitProblem,
-    candidates: Sequence[Explanation],
-    limit: float = np.inf,
-    starts: Starts | None = None,
+    problem: FitProblem, candidates: Sequence[Explanation], limit: float = np.inf
 ) -> list[Explanation]:
     """The candidates with the shape coefficients of their effects estimated as well.
 
     limit: Objective from which fits under noise alone are no further starts.
-    starts: Candidates of an earlier search.
     """
     started, index = [], []
     no_discrepancy = np.zeros(len(problem.readings.channels))
     for i, candidate in enumerate(candidates):
         shapes = problem.shape_coordinates(candidate.names)
-        law = candidate.catalogue_law
-        known = (starts or {}).get(candidate.names, candidate).free_law
-        first = [((known or law).fit, (known or law).evidence.amplitude)]
+        first = [(candidate.catalogue_law.fit, candidate.amplitude)]
         if candidate.noise_only is not None and candidate.noise_only.objective < limit:
             first.append((candidate.noise_only, no_discrepancy))
-        coordinates = [*law.fit.coordinates, *shapes]
         for fit, amplitude in first if shapes else []:
+            coordinates = [*fit.coordinates, *shapes]
             started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))
             index.append(i)
     free: dict[int, MarginalFit | None] = {}

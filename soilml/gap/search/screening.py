@@ -9,7 +9,7 @@ import numpy as np
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
-from soilml.gap.search.explanation import Explanation, Starts
+from soilml.gap.search.explanation import Explanation
 from soilml.numerics.subspaces import ROUNDING, project_out
 
 
@@ -97,6 +97,9 @@ LARGE_DISCREPANCY = 2.5
 #: Objective above that of the best candidate up to which shapes are estimated, sets extended, and
 #: effects fitted again in a further search.
 WITHIN_REACH = 15.0
+
+#: Candidates of an earlier search, by effect names, whose optima are starts of this one.
+Starts = Mapping[tuple[str, ...], Explanation]
 
 
 def effects_to_fit(

@@ -16,7 +16,6 @@ from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.gap.search.explanation import (
     CandidateRequest,
     Explanation,
-    Starts,
     fit_candidates,
     fit_shapes,
     predicted_shape_gain,
@@ -26,6 +25,7 @@ from soilml.gap.search.posterior import Posterior, explanations, for_decisions, 
 from soilml.gap.search.screening import (
     LARGE_DISCREPANCY,
     WITHIN_REACH,
+    Starts,
     effects_to_fit,
     predicted_gains,
     predicted_with_and_without,
@@ -198,8 +198,7 @@ def _fit_level(
 ) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    Beside a large discrepancy, single effects are fitted under noise alone first, unless an earlier
-    search did so.
+    Beside a large discrepancy, single effects are fitted under noise alone first.
     """
     hidden = float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY
     single = all(not base.names for base in sets.values())
@@ -208,8 +207,11 @@ def _fit_level(
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, soil_alone.amplitude)
         noise_start = None
-        if hidden and single and names not in starts:
+        if hidden and single:
+            alone = base.noise_only
             noise_start = {path: off_bounds(x) for path, x in soil.start_values().items()}
+            if alone is not None:
+                noise_start = alone.start_values()
         fit = base.catalogue_law.fit
         requests.append(
             CandidateRequest(
@@ -227,9 +229,8 @@ def _fit_level(
         if c.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, c) < lowest
         or c.objective < lowest + WITHIN_REACH
         or (c.noise_only is not None and c.noise_only.objective < notable)
-        or (c.names in starts and starts[c.names].shape_supported)
     ]
-    shaped = {c.names: c for c in fit_shapes(problem, promising, notable, starts)}
+    shaped = {c.names: c for c in fit_shapes(problem, promising, notable)}
     return [shaped.get(c.names, c) for c in fitted]
 
 

@@ -110,7 +110,7 @@ def fitting(monkeypatch):
         seen.requests = requests
         return [seen.results[r.names] for r in requests if r.names in seen.results]
 
-    def fit_shapes(problem, candidates, limit, starts):
+    def fit_shapes(problem, candidates, limit):
         seen.limit = limit
         seen.shaped = [c.names for c in candidates]
         return [replace(c, noise_only="shaped") for c in candidates]
@@ -167,10 +167,12 @@ def test_a_set_starts_from_what_it_extends_or_from_an_earlier_search(fitting):
 def test_single_effects_beside_a_large_discrepancy_are_fitted_under_noise_first(fitting, largest):
     none = made(amplitude=(0.0, largest))
     soil = fit_of(0.0, {"cohesion": 1.0, "shear_modulus": 0.25})
-    level(none, {("a",): none, ("b",): none}, {("b",): made("b")}, soil)
-    # nearer to the middle of the priors, since the soil alone is often at a bound; once is enough
+    earlier = made("b", noise_only=fit_of(x={"cohesion": 0.7}))
+    level(none, {("a",): none, ("b",): none}, {("b",): earlier}, soil)
+    # nearer to the middle of the priors, since the soil alone is often at a bound
     inward = {"cohesion": pytest.approx(0.9), "shear_modulus": pytest.approx(0.3)}
-    assert [r.noise_start for r in fitting.requests] == [inward if largest >= 2.5 else None, None]
+    expected = [inward, {"cohesion": 0.7}] if largest >= 2.5 else [None, None]
+    assert [r.noise_start for r in fitting.requests] == expected
     level(none, {("a", "b"): made("a", amplitude=(0.0, largest))}, {}, soil)
     assert [r.noise_start for r in fitting.requests] == [None]
 
