@@ -54,6 +54,9 @@ INWARD = 0.8
 COMPLETE_LEVEL = 0.2
 #: Decrease of the objective by an extension below which no larger set is tried.
 MIN_IMPROVEMENT = 1.0
+#: Explanations whose soils the soil alone is fitted from again, and the decrease of its objective
+#: above which that is another optimum.
+SOILS_AGAIN, SAME_OPTIMUM = 2, 0.1
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,10 @@ def search(
         selected = [(name,) for name in singles]
     level = _fit_level(problem, soil, soil_alone, dict.fromkeys(selected, soil_alone), starts)
     fitted |= {c.names: c for c in level}
+    again = _from_soils_of(problem, soil_alone, level)
+    if again is not soil_alone:
+        gains = predicted_with_and_without(problem, again, soil, signatures)
+        soil_alone = fitted[()] = again
     for effects in range(1, 1 if promising else MAX_EFFECTS):
         progress((1 + effects) / STEPS)
         best = min(fitted.values(), key=lambda c: c.objective)
@@ -187,6 +194,23 @@ def _fit_soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Expl
     if marginal is None:  # it is feasible under noise alone
         marginal = MarginalFit(soil, problem.discrepancy.evidence(soil))
     return Explanation((), marginal)
+
+
+def _from_soils_of(
+    problem: FitProblem, soil_alone: Explanation, level: Sequence[Explanation]
+) -> Explanation:
+    """The soil alone, fitted from the soils of the best explanations too.
+
+    It is each of them without its effects. Where the soil has several optima, that of the soil
+    alone would otherwise be compared with better ones, and any effect be preferred to none.
+    """
+    started = [
+        (StartedFit(problem.case, problem.soil, c.fit.start_values()), c.amplitude)
+        for c in sorted(level, key=lambda c: c.objective)[:SOILS_AGAIN]
+    ]
+    found = [Explanation((), m) for m in fit_marginal(problem, started) if m is not None]
+    best = min([soil_alone, *found], key=lambda c: c.objective)
+    return best if best.objective < soil_alone.objective - SAME_OPTIMUM else soil_alone
 
 
 def _fit_level(
