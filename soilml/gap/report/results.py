@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from soilml.config.case import Case
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.physics.soils.soil_tests import SoilTest, deviations
 from soilml.remarks import Remark
+from soilml.report.numbers import decimal
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
@@ -62,6 +63,8 @@ class Suspect:
     predictive_gain: float | None = None
     #: Standard error of that, by which the rows kept back differ by chance
     predictive_gain_error: float | None = None
+    #: Sizes of its effects that are implausibly large, in usual ones, by name
+    times_usual: dict[str, float] = field(default_factory=dict)
 
     @property
     def prediction(self) -> str:
@@ -69,6 +72,19 @@ class Suspect:
         if self.predictive_gain is None:
             return ""
         return f"{self.predictive_gain:+.1f} +- {self.predictive_gain_error or 0.0:.1f}"
+
+    @property
+    def needs(self) -> str:
+        """The implausible sizes that it needs, in words; empty where it needs none."""
+        sizes = [
+            f"{n} at {decimal(x, 2)} times its usual size" for n, x in self.times_usual.items()
+        ]
+        return " and ".join(sizes)
+
+
+def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects that are likelier than the first, which they follow for their sizes."""
+    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
 
 
 @dataclass(frozen=True)
@@ -265,7 +281,8 @@ class GapReport:
     probabilities : dict of float
         Posterior probability of each tested effect.
     suspects : tuple of Suspect
-        Explanations with their odds, the likeliest first, wherever there is a gap.
+        Explanations with their odds wherever there is a gap: the likeliest first, or the likeliest
+        of usual size where that has a probability of at least 0.005.
     conditions : tuple of Remark
         Conditions under which these odds are valid.
     discrepancy : dict of RemainingDiscrepancy

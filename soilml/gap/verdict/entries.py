@@ -29,6 +29,7 @@ from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
+from soilml.gap.verdict.decision import implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
@@ -114,8 +115,9 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
     """Explanations with their odds against all others, the likeliest first.
 
     The first one is that whose figures are shown; see `Posterior.from_first`. After it come those
-    only whose odds the data raise. A set that adds effects to a claimed one is listed
-    as that one, since the evidence for what it adds is not decisive.
+    only whose odds the data raise, and after one of an implausible size those whose probability is
+    stated. A set that adds effects to a claimed one is listed as that one, since the evidence for
+    what it adds is not decisive.
     """
     problem, posterior = analysis.problem, analysis.result.posterior
     stated = [c.names for c in claimed]
@@ -127,9 +129,22 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
     ranked = sorted(((n, posterior.log_odds(*n)) for n in listed), key=lambda item: -item[1])
     ranked = posterior.from_first(ranked, {c.names: c.penalty for c in analysis.result.candidates})
     rest = [own for own in ranked[1:] if posterior.favours(own[0], problem.penalty(own[0]))]
-    gains = predictive_gains(analysis.predictions)
+    if ranked and ranked[0][0] in posterior.oversized and posterior.is_stated(ranked[0][0]):
+        rest = [own for own in rest if posterior.is_stated(own[0])]
+    gains, oversized = predictive_gains(analysis.predictions), posterior.oversized
+    sizes = {
+        c.names: implausible_sizes(c.fit)
+        for c in analysis.result.candidates
+        if c.names in oversized
+    }
     return [
-        Suspect(names, odds, posterior.probability(*names), *_gain(gains.get(names)))
+        Suspect(
+            names,
+            odds,
+            posterior.probability(*names),
+            *_gain(gains.get(names)),
+            times_usual=sizes.get(names, {}),
+        )
         for names, odds in [*ranked[:1], *rest[: LISTED_SUSPECTS - 1]]
     ]
 

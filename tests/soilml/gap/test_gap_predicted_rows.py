@@ -51,6 +51,19 @@ def test_a_set_of_an_implausible_size_follows_the_first_of_a_usual_size():
     assert found.from_first([], {}) == []
 
 
+def test_what_is_hopeless_does_not_come_before_an_implausible_size():
+    def first(**logs):
+        weights = {(): -9.0} | {(name,): value for name, value in logs.items()}
+        found = Posterior(weights, {("a",): frozenset()}, oversized=frozenset({("a",)}))
+        ranked = found.ranked()
+        assert [names for names, _ in ranked] == [("a",), ("b",)]
+        return found.from_first(ranked, dict.fromkeys([("a",), ("b",)], 20.0))[0][0]
+
+    assert first(a=-0.1, b=-5.0) == ("b",)  # 0.006
+    assert first(a=-0.1, b=-5.5) == ("a",)  # 0.004
+    assert first(a=-4.5, b=-5.9) == ("b",)  # neither has a stated probability
+
+
 def scored(*by_fold):
     return HeldOutPrediction(np.zeros(4), np.ones(4), by_fold)
 

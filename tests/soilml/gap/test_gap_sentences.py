@@ -130,6 +130,26 @@ def test_a_first_suspect_of_little_probability_is_doubted():
         assert said("suspected", suspects=suspects).startswith(f"A gap of uncertain cause: {words}")
 
 
+def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
+    usual, large = (
+        Suspect(("a",), -2.5, 0.07),
+        Suspect(("b", "c"), -1.3, 0.2, times_usual={"c": 5.93}),
+    )
+    parts = {"suspects": (usual, large), "best_unclaimed": ("a",)}
+    assert said("suspected", **parts).startswith(
+        "A gap of uncertain cause: first suspect of usual size is a (probability 0.07); "
+    )
+    assert lines("suspected", **parts)["suspects"] == (
+        "Suspects, the likeliest of usual size first, within the catalogue: a (odds 1 to 12); "
+        "b + c (odds 1 to 3.7). b + c is likelier, but needs c at 5.9 times its usual size."
+    )
+    alone = {"suspects": (large, replace(usual, log_odds=-3.0))}
+    assert "first suspect is b + c (probability 0.20, implausibly large)" in said(
+        "suspected", **alone
+    )
+    assert lines("suspected", **alone)["suspects"].startswith("Suspects, the likeliest first,")
+
+
 @pytest.mark.parametrize(
     "log_odds, words",
     [
