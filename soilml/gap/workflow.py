@@ -374,8 +374,8 @@ def _changed_by_outliers(
     if (other.status == "no-gap") == (decision.status == "no-gap") and named[0] == named[1]:
         return []
     text = (
-        f"the verdict depends on {len(analysis.outliers)} excluded readings: {decision.status} "
-        f"with {named[0]} without them, {other.status} with {named[1]} with them"
+        f"the verdict depends on what was excluded: {decision.status} with {named[0]} without it, "
+        f"{other.status} with {named[1]} with it"
     )
     return [Remark("outliers-matter", text, analysis.outliers)]
 

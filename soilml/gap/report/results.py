@@ -152,9 +152,10 @@ class NextRun:
 class NoiseAgreement:
     """Mean squared residuals of the soil alone, per degree of freedom, in variances of the noise.
 
-    `declared` is that of all readings under the declared noise, as `identify` states it;
-    `exceeds_noise` whether noise alone would exceed it with a probability below 0.001. `granted` is
-    that under noise, and scatter of the soil from run to run by these standard deviations.
+    Both are of the readings that were not excluded as outliers. `declared` is that under the
+    declared noise, as `identify` states it where none was excluded; `exceeds_noise` whether noise
+    alone would exceed it with a probability below 0.001. `granted` is that
+    under noise, and scatter of the soil from run to run by these standard deviations.
     """
 
     declared: float

@@ -219,6 +219,9 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
         if found.grants_scatter and found.granted <= found.declared:
             text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
         parts.append(text)
+    if count := sum(len(note.about) for note in report.notes if note.code == "outliers"):
+        without = f": without {'it' if count == 1 else 'them'}, " if parts else ""
+        parts = [f"{outliers_in_words(count)} excluded{without}{''.join(parts)}"]
     count = len(report.candidates)
     if count:
         parts.append(f"{count} explanation{'s were' if count > 1 else ' was'} fitted")
@@ -229,6 +232,15 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     ]
     text = "; ".join(parts) or "the soil alone was fitted"
     return Remark("tried", f"{text[:1].upper()}{text[1:]}.")
+
+
+def outliers_in_words(count: int) -> str:
+    """So many outliers, as the subject of a sentence in the passive."""
+    return (
+        "1 reading is an outlier and was"
+        if count == 1
+        else f"{count} readings are outliers and were"
+    )
 
 
 def _listed(report: GapReport) -> str:

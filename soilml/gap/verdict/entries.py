@@ -25,6 +25,7 @@ from soilml.gap.report.results import (
     ReadingsAndPredictions,
     Suspect,
 )
+from soilml.gap.report.sentences import outliers_in_words
 from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
@@ -205,12 +206,8 @@ def analysis_notes(
     notes = []
     if count := len(analysis.outliers):
         names = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
-        many = (
-            f"{count} readings are outliers and were"
-            if count > 1
-            else "1 reading is an outlier and was"
-        )
-        notes.append(Remark("outliers", f"{many} excluded: {names}", analysis.outliers))
+        text = f"{outliers_in_words(count)} excluded: {names}"
+        notes.append(Remark("outliers", text, analysis.outliers))
     soil = analysis.result.soil
     far = disagreeing_soil_tests(soil.case, soil.values()) if analysis.result.has_gap else []
     notes += [

@@ -126,3 +126,13 @@ def test_a_soil_that_dries_in_cohesion_and_stiffness_has_both_drifts():
     report = gap(CASE, driven(CASE, loads=loads, soils=soils))
     assert report.cause_set == (("bearing-drift", "cohesion-drift"),)
     assert report.status in ("named", "partly-named")
+
+
+@pytest.mark.slow
+def test_scatter_is_not_credited_with_what_an_exclusion_did():
+    table = driven(CASE, seed=4)
+    torque = table["torque_Nm"] * np.where(np.arange(len(table)) == 13, 10.0, 1.0)
+    report = gap(CASE, replace(table, columns=dict(table.columns) | {"torque_Nm": torque}))
+    assert not report.misfit.exceeds_noise
+    assert report.misfit.declared < 1.5 * report.misfit.granted
+    assert report.lines[0].text.startswith("1 reading is an outlier and was excluded: without it,")

@@ -67,6 +67,13 @@ def test_granted_scatter_is_named_with_its_size():
     assert lines("no-gap", misfit=SCATTER)["tried"] == (
         f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
     )
+    outliers = Remark("outliers", "...", ("torque_Nm at line 3", "sinkage_m at line 4"))
+    without = lines("no-gap", misfit=SCATTER, notes=(outliers,))["tried"]
+    assert without.startswith(
+        "2 readings are outliers and were excluded: without them, residuals are 1.7 times"
+    )
+    one = replace(outliers, about=outliers.about[:1])
+    assert lines("no-gap", notes=(one,))["tried"] == "1 reading is an outlier and was excluded."
     larger = replace(SCATTER, granted=3.0)  # scatter does not make residuals larger
     assert "scatter" not in lines("no-gap", misfit=larger)["tried"]
     none = replace(SCATTER, friction_angle_std=0.0, bearing_std=0.0)
