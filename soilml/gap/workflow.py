@@ -56,11 +56,11 @@ from soilml.gap.verdict.entries import (
     competing_explanations,
     conditions_of_suspects,
     named_effects,
+    prediction_notes,
     readings_and_predictions,
     signature_similarity,
     soil_beside_discrepancy,
     soil_marginal,
-    suspect_notes,
     suspects,
     variance_component_entries,
 )
@@ -78,6 +78,7 @@ from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
+    grown_channels,
     plain_fit,
     predict_held_out,
     without_grown,
@@ -319,9 +320,9 @@ def _build_report(
         notes=(
             *excluded,
             *checks.notes,
-            *suspect_notes(suspected),
+            *prediction_notes(suspected, analysis, not_reduced),
             *analysis_notes(analysis, written.fit, [shown.fit, *doubted], replicates),
-            *not_reduced,
+            *grown_channels(figures, addition),
             *(drift if smooth_gap else ()),
             *(hidden_effect(problem, result) if decision.status == "no-gap" else ()),
         ),

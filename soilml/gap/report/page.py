@@ -92,7 +92,7 @@ def said(report: GapReport) -> list[str]:
 
 def _content(report: GapReport) -> dict[str, Any]:
     """The variables of the templates, section by section."""
-    changed = any(s.before != s.after for s in report.gap.values())
+    changed = any(s.shrinks for s in report.gap.values())
     components = report.variance_components.items()
     return {
         "report": report,

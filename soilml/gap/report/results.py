@@ -14,7 +14,7 @@ from soilml.config.case import Case
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.physics.soils.soil_tests import SoilTest, deviations
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal
+from soilml.report.numbers import decimal, format_residual
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
@@ -123,6 +123,12 @@ class GapReduction:
     channels: dict[str, BeforeAfter]
     readings: int
     description: str
+
+    @property
+    def shrinks(self) -> bool:
+        """Whether it is smaller after, at the digits that are shown."""
+        shown = [format_residual(x) for x in (self.before, self.after)]
+        return self.after < self.before and shown[0] != shown[1]
 
 
 @dataclass(frozen=True)

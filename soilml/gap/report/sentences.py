@@ -167,6 +167,8 @@ def _shrinks(report: GapReport) -> str:
     if "train" not in report.gap:
         return ""
     before, after = report.gap["train"].before, report.gap["train"].after
+    if not report.gap["train"].shrinks:
+        return f"; the gap stays at {format_residual(before)}"
     return f"; the gap shrinks {format_residual(before)} -> {format_residual(after)}"
 
 

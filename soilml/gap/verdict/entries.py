@@ -34,7 +34,7 @@ from soilml.gap.verdict.decision import implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
-from soilml.remarks import Remark
+from soilml.remarks import Remark, texts
 from soilml.report.numbers import format_quantity
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
@@ -155,14 +155,23 @@ def _gain(gain: PredictiveGain | None) -> tuple[float | None, float | None]:
     return (None, None) if gain is None else (gain.value, gain.std_error)
 
 
-def suspect_notes(names: Sequence[str]) -> list[Remark]:
-    """A note on effects that the model contains because they predict, if there are any."""
+def prediction_notes(
+    names: Sequence[str], analysis: Analysis, not_reduced: Sequence[Remark]
+) -> list[Remark]:
+    """A note on effects that the model contains because they predict, or else on figures.
+
+    not_reduced: Figures that do not shrink without a remainder, which that note contains.
+    """
     if not names:
-        return []
+        return list(not_reduced)
+    gain = predictive_gains(analysis.predictions)[tuple(names)]
     text = (
-        f"model.toml contains {' + '.join(names)}, which is suspected and not named: rows kept "
-        "back are predicted better with it than by the soil alone"
+        f"model.toml contains {' + '.join(names)}, which is suspected and not named: beside a "
+        "smooth remainder, rows kept back are predicted better with it than by the soil alone "
+        f"(ln density {gain.value:+.1f} +- {gain.std_error:.1f})"
     )
+    if not_reduced:
+        text += f"; without a remainder they are not: {'; '.join(texts(not_reduced))}"
     return [Remark("suspect-predicts", text, tuple(names), "note")]
 
 

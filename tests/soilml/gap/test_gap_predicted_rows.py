@@ -14,10 +14,11 @@ from soilml.gap.evidence.score_test import score_test
 from soilml.gap.report.results import GapReduction
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
-from soilml.gap.verdict.reductions import without_grown
+from soilml.gap.verdict.reductions import grown_channels, without_grown
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS
+from soilml.remarks import texts
 
 DIGGING = EFFECTS["slip-sinkage"]
 
@@ -110,6 +111,25 @@ def test_a_figure_that_grew_is_a_remark_and_no_reduction():
     kept, remarks = without_grown(figures, "slip-sinkage")
     assert list(kept) == ["train"]
     assert [(r.code, r.about) for r in remarks] == [("not-reduced", ("held_out_runs",))]
+    equal = {name: replace(g, before=8.061, after=8.059) for name, g in figures.items()}
+    kept, remarks = without_grown(equal, "clogging")
+    assert list(kept) == ["train"] and not kept["train"].shrinks
+    assert texts(remarks) == [
+        "every run: the mean squared residual is 8.06 with and without clogging"
+    ]
+    assert without_grown(equal, "") == (equal, [])
+    assert replace(equal["train"], after=8.05).shrinks
+
+
+def test_a_channel_that_grows_is_a_note():
+    def codes(**channels):
+        figures = {"train": GapReduction(9.0, 5.0, channels, 30, "all rows fitted")}
+        return [(r.code, r.about, r.text) for r in grown_channels(figures, "grousers")]
+
+    assert codes(torque_Nm=(9.0, 2.0), sinkage_m=(2.3, 2.4)) == codes(sinkage_m=(0.5, 0.9)) == []
+    ((code, about, text),) = codes(torque_Nm=(9.0, 2.0), sinkage_m=(2.3, 12.0))
+    assert (code, about) == ("channel-grows", ("sinkage_m",))
+    assert text.endswith("a channel grows: sinkage from 2.3 to 12 (all rows fitted)")
 
 
 @pytest.mark.slow
