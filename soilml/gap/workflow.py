@@ -21,7 +21,7 @@ from soilml.gap.checks import (
     DataCheckResult,
     check_readings,
     estimate_repeat_noise,
-    without_duplicate_rows,
+    without_copies,
 )
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
@@ -185,11 +185,11 @@ def gap(
     effects = candidate_effects(case, effects)
     case = without_learned_discrepancy(case).without_suspected()
     known_costs = check_costs(costs or {})
-    table = with_rover_columns(case, with_order_columns(case, as_table(table), FROM_ORDER))
+    table, copies = without_copies(as_table(table))
+    table = with_rover_columns(case, with_order_columns(case, table, FROM_ORDER))
     check_wheel_size(case, table)
     _check_size(table)
     table, excluded_rows = answered_rows(table)
-    table, duplicate_rows = without_duplicate_rows(table)
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
 
@@ -198,11 +198,11 @@ def gap(
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
     notes += [*readings.notes, *exclusions]
-    checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
+    checks = check_readings(readings, split.analysed, len(soil))
     if checks.errors:
         errors = (*checks.errors, *checks.naming_obstacles)
-        return _bad_data_report(case, errors, checks.notes, seed)
-    checks = replace(checks, notes=(*notes, *excluded_rows, *checks.notes))
+        return _bad_data_report(case, errors, (*copies, *checks.notes), seed)
+    checks = replace(checks, notes=(*copies, *notes, *excluded_rows, *checks.notes))
 
     from threadpoolctl import threadpool_limits
 
