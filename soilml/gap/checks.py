@@ -23,7 +23,9 @@ MIN_REPEAT_DEGREES_OF_FREEDOM = 6
 #: fewer, the noise cannot be told from the declared one.
 MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS = 4, 8
 ONE_LOAD = "one-load"  # Code of the obstacle that one load cannot test the soil parameters
-MAX_DUPLICATE_FRACTION = 0.2  # Fraction of duplicate rows above which the table itself is suspect
+#: Fraction of copied rows above which the note on them is a warning, and rows from which a run that
+#: repeats another one exactly is a copy of it: a row or two can agree by chance.
+MANY_COPIES, COPIED_ROWS = 0.2, 3
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,6 @@ class CheckedData:
 
     readings: Readings
     rows: int
-    duplicate_rows: int
     parameters: int
 
 
@@ -56,15 +57,9 @@ class Consequence(Enum):
 Finding = tuple[Consequence, Remark]
 
 
-def check_readings(
-    readings: Readings, table: Table, duplicate_rows: int, parameters: int
-) -> DataCheckResult:
-    """Run all data checks.
-
-    duplicate_rows: Number of duplicate rows that were removed from `table` before.
-    parameters: Number of free soil parameters.
-    """
-    data = CheckedData(readings, len(table), duplicate_rows, parameters)
+def check_readings(readings: Readings, table: Table, parameters: int) -> DataCheckResult:
+    """Run all data checks; `parameters` is the number of free soil parameters."""
+    data = CheckedData(readings, len(table), parameters)
     findings = [finding for check in CHECKS for finding in check(data)]
     errors, obstacles, notes = (
         tuple(remark for consequence, remark in findings if consequence is wanted)
@@ -95,14 +90,6 @@ def _check_channels(data: CheckedData) -> Iterator[Finding]:
         if values.size > 3 and np.ptp(values) == 0.0:
             text = f"{key} is the same in every row: check the sensor"
             yield Consequence.ERROR, Remark("constant-channel", text, (key,))
-
-
-def _check_duplicate_rows(data: CheckedData) -> Iterator[Finding]:
-    if data.duplicate_rows:
-        many = data.duplicate_rows > MAX_DUPLICATE_FRACTION * (data.rows + data.duplicate_rows)
-        text = f"{data.duplicate_rows} rows are exact duplicates and were excluded"
-        remark = Remark("duplicate-rows", text, severity="warning" if many else "note")
-        yield Consequence.ERROR if many else Consequence.NOTE, remark
 
 
 def _check_count(data: CheckedData) -> Iterator[Finding]:
@@ -142,19 +129,42 @@ def _check_variety(data: CheckedData) -> Iterator[Finding]:
 #: All data checks, in the order in which their findings are reported.
 CHECKS: tuple[Callable[[CheckedData], Iterator[Finding]], ...] = (
     _check_channels,
-    _check_duplicate_rows,
     _check_count,
     _check_variety,
 )
 
 
-def without_duplicate_rows(table: Table) -> tuple[Table, int]:
-    """The table without exact duplicates of earlier rows, and the number of duplicates."""
-    names = [n for n in table.columns if n != "source"]
-    keys = list(zip(*[[str(v) for v in table[n]] for n in names], strict=True))
-    first = {key: i for i, key in reversed(list(enumerate(keys)))}
-    kept = np.asarray(sorted(first.values()), dtype=np.int64)
-    return (table, 0) if kept.size == len(table) else (table.rows(kept), len(table) - kept.size)
+def without_copies(table: Table) -> tuple[Table, list[Remark]]:
+    """The table without exact copies of earlier rows and runs, and a remark on how many there were.
+
+    A run is a copy if its rows are those of an earlier run but for their name, at least
+    `COPIED_ROWS` of them.
+    """
+    names = [n for n in table.columns if n not in ("source", "run")]
+    cells = list(zip(*[[str(v) for v in table[n]] for n in names], strict=True))
+    run = [str(v) for v in table["run"]] if "run" in table else [""] * len(table)
+    rows: dict[str, dict[tuple[str, ...], int]] = {}
+    for i, (own, key) in enumerate(zip(run, cells, strict=True)):
+        rows.setdefault(own, {}).setdefault(key, i)
+    first: dict[tuple[tuple[str, ...], ...], str] = {}
+    copied, kept = [], []
+    for own, of_run in rows.items():
+        if first.setdefault(tuple(sorted(of_run)), own) != own and len(of_run) >= COPIED_ROWS:
+            copied.append(own)
+        else:
+            kept += of_run.values()
+    count = len(table) - len(kept)
+    if not count:
+        return table, []
+    text = f"{'1 row is an exact copy' if count == 1 else f'{count} rows are exact copies'}"
+    text += f" of {'another' if count == 1 else 'others'} and {'was' if count == 1 else 'were'} "
+    text += f"excluded; {len(kept)} are analysed"
+    if copied:
+        repeats = "repeats another run" if len(copied) == 1 else "repeat other runs"
+        text += f": run{'s' if len(copied) > 1 else ''} {', '.join(copied)} {repeats}"
+    many = count > MANY_COPIES * len(table)
+    remark = Remark("duplicate-rows", text, tuple(copied), "warning" if many else "note")
+    return table.rows(np.asarray(sorted(kept), dtype=np.int64)), [remark]
 
 
 def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Remark]]:

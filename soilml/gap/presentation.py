@@ -13,7 +13,7 @@ from soilml.report.terminal import rounded, shown_unit, significant
 
 if TYPE_CHECKING:
     from soilml.gap.design.identifiability import Audit
-    from soilml.gap.report.results import GapReport
+    from soilml.gap.report.results import GapReport, RemainingDiscrepancy
 
 
 def gap_files(
@@ -32,7 +32,8 @@ def gap_files(
     comments = [report.sentence]
     if names := report.model.suspected:
         comments += [
-            f"{' + '.join(names)} is suspected, not named: it predicts rows kept back better."
+            f"{' + '.join(names)} is suspected, not named: beside a remainder, "
+            "it predicts rows kept back better."
         ]
     return {
         "report.html": page(report, model_name, runs_name, origin),
@@ -75,11 +76,13 @@ def _residual(x: float) -> str:
 
 
 def _gap_table(report: GapReport) -> str:
-    rows = [
-        (name.replace("_", " "), _residual(s.before), _residual(s.after), s.description)
-        for name, s in report.gap.items()
-    ]
-    return format_table(("gap", "before", "after", "rows"), rows, last_left=True) if rows else ""
+    changed = any(s.shrinks for s in report.gap.values())
+    rows = []
+    for name, s in report.gap.items():
+        after = [_residual(s.after) if s.shrinks else "not smaller"] if changed else []
+        rows.append((name.replace("_", " "), _residual(s.before), *after, s.description))
+    head = ("gap", "before", "after", "rows") if changed else ("gap", "soil alone", "rows")
+    return format_table(head, rows, last_left=True) if rows else ""
 
 
 def _effect_table(report: GapReport) -> str:
@@ -97,10 +100,10 @@ def _in_shown_unit(value: float, std: float, unit: str) -> tuple[str, str, str]:
     return rounded(factor * value, factor * std), rounded(factor * std, factor * std), shown
 
 
-def _both(d: Any) -> tuple[str, str, str]:
-    """A discrepancy before and after, and their unit."""
+def _left(d: RemainingDiscrepancy) -> tuple[str, str]:
+    """A discrepancy that is left, and its unit."""
     factor, shown = shown_unit(d.unit)
-    return significant(factor * d.before_value, 3), significant(factor * d.after_value, 3), shown
+    return significant(factor * d.after_value, 3), shown
 
 
 def _suspect_table(report: GapReport) -> str:
@@ -122,12 +125,12 @@ def _suspect_table(report: GapReport) -> str:
 
 def _discrepancy_table(report: GapReport) -> str:
     rows = [
-        (name.rpartition("_")[0], *_both(d), f"{d.after_sigma:.2g}")
+        (name.rpartition("_")[0], *_left(d), f"{d.after_sigma:.2g}")
         for name, d in report.discrepancy.items()
     ]
     if not any(d.after_sigma > 0.0 for d in report.discrepancy.values()):
         return ""
-    return format_table(("discrepancy (rms)", "before", "after", "unit", "sigma"), rows)
+    return format_table(("discrepancy left (rms)", "size", "unit", "sigma"), rows)
 
 
 def audit_text(found: Audit) -> str:

@@ -21,7 +21,7 @@ from soilml.gap.checks import (
     DataCheckResult,
     check_readings,
     estimate_repeat_noise,
-    without_duplicate_rows,
+    without_copies,
 )
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
@@ -56,11 +56,11 @@ from soilml.gap.verdict.entries import (
     competing_explanations,
     conditions_of_suspects,
     named_effects,
+    prediction_notes,
     readings_and_predictions,
     signature_similarity,
     soil_beside_discrepancy,
     soil_marginal,
-    suspect_notes,
     suspects,
     variance_component_entries,
 )
@@ -78,6 +78,7 @@ from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
+    grown_channels,
     plain_fit,
     predict_held_out,
     without_grown,
@@ -184,11 +185,11 @@ def gap(
     effects = candidate_effects(case, effects)
     case = without_learned_discrepancy(case).without_suspected()
     known_costs = check_costs(costs or {})
-    table = with_rover_columns(case, with_order_columns(case, as_table(table), FROM_ORDER))
+    table, copies = without_copies(as_table(table))
+    table = with_rover_columns(case, with_order_columns(case, table, FROM_ORDER))
     check_wheel_size(case, table)
     _check_size(table)
     table, excluded_rows = answered_rows(table)
-    table, duplicate_rows = without_duplicate_rows(table)
     split = split_holdout(table, holdout, seed)
     soil = free_soil_parameters(case, free)
 
@@ -197,11 +198,11 @@ def gap(
     repeat_noise, notes = estimate_repeat_noise(readings)
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
     notes += [*readings.notes, *exclusions]
-    checks = check_readings(readings, split.analysed, duplicate_rows, len(soil))
+    checks = check_readings(readings, split.analysed, len(soil))
     if checks.errors:
         errors = (*checks.errors, *checks.naming_obstacles)
-        return _bad_data_report(case, errors, checks.notes, seed)
-    checks = replace(checks, notes=(*notes, *excluded_rows, *checks.notes))
+        return _bad_data_report(case, errors, (*copies, *checks.notes), seed)
+    checks = replace(checks, notes=(*copies, *notes, *excluded_rows, *checks.notes))
 
     from threadpoolctl import threadpool_limits
 
@@ -322,9 +323,9 @@ def _build_report(
         notes=(
             *excluded,
             *checks.notes,
-            *suspect_notes(suspected),
+            *prediction_notes(suspected, analysis, not_reduced),
             *analysis_notes(analysis, written.fit, [shown.fit, *doubted], replicates),
-            *not_reduced,
+            *grown_channels(figures, addition),
             *(drift if smooth_gap else ()),
             *(hidden_effect(problem, result) if decision.status == "no-gap" else ()),
         ),
@@ -377,8 +378,8 @@ def _changed_by_outliers(
     if (other.status == "no-gap") == (decision.status == "no-gap") and named[0] == named[1]:
         return []
     text = (
-        f"the verdict depends on {len(analysis.outliers)} excluded readings: {decision.status} "
-        f"with {named[0]} without them, {other.status} with {named[1]} with them"
+        f"the verdict depends on what was excluded: {decision.status} with {named[0]} without it, "
+        f"{other.status} with {named[1]} with it"
     )
     return [Remark("outliers-matter", text, analysis.outliers)]
 

@@ -174,6 +174,7 @@ def _environment(package: str) -> Environment:
         "chance": numbers.format_p_value,
         "channel": numbers.channel_name,
         "gain": numbers.format_gain,
+        "probability": numbers.format_probability,
         "quantity": numbers.format_quantity,
         "sentence": lambda text: numbers.capitalised(str(text)),
     }

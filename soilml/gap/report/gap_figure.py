@@ -84,7 +84,7 @@ def plot_gap(gap: Mapping[str, GapReduction], ax: Any = None, part: str = "train
     if part not in gap:
         known = ", ".join(gap) or "none: it could not be analysed"
         raise InputError(f"part is {part!r}; this report has {known}")
-    rows = _bars(gap[part], any(s.before != s.after for s in gap.values()))
+    rows = _bars(gap[part], gap[part].shrinks)
     axes: Axes = take_axes(ax, 1, 1, (5.4, 0.9 + 0.6 * len(rows)))[0, 0]
     draw_bars(axes, rows, *_range(gap[part]))
     axes.set_title(TITLES.get(part, part.replace("_", " ")))
@@ -119,7 +119,8 @@ def gap_bars(report: GapReport, changed: bool) -> list[GapBars]:
     most, least = _range(*report.gap.values())
     charts = []
     for key, reduction in report.gap.items():
-        rows, title = _bars(reduction, changed), TITLES.get(key, key.replace("_", " "))
+        rows = _bars(reduction, changed and reduction.shrinks)
+        title = TITLES.get(key, key.replace("_", " "))
         chart = _bar_chart(rows, most, least, f"{title}: {_as_text(rows)}")
         charts.append(GapBars(title, reduction, chart))
     return charts

@@ -12,7 +12,12 @@ from typing import Any
 
 from soilml.gap.report.gap_figure import gap_bars
 from soilml.gap.report.prediction_curves import prediction_curves
-from soilml.gap.report.results import STATUSES, EstimatedValue, GapReport
+from soilml.gap.report.results import (
+    STATUSES,
+    EstimatedValue,
+    GapReport,
+    likelier_than_first,
+)
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import Z_90
@@ -87,7 +92,7 @@ def said(report: GapReport) -> list[str]:
 
 def _content(report: GapReport) -> dict[str, Any]:
     """The variables of the templates, section by section."""
-    changed = any(s.before != s.after for s in report.gap.values())
+    changed = any(s.shrinks for s in report.gap.values())
     components = report.variance_components.items()
     return {
         "report": report,
@@ -104,6 +109,7 @@ def _content(report: GapReport) -> dict[str, Any]:
         "soil_tests": soil_test_table(report),
         "soil_changed": report.soil_before != report.soil_after,
         "suspects": suspect_table(report),
+        "by_size": bool(likelier_than_first(report.suspects)),
         "given": conditions_text(report.conditions),
         "variance_components": [
             numbers.format_variance_component(key, value) for key, value in components
@@ -200,6 +206,7 @@ def suspect_table(report: GapReport) -> list[dict[str, Any]]:
     return [
         {
             "effects": s.effects,
+            "needs": s.needs,
             "log_odds": s.log_odds,
             "probability": format_probability(s.probability),
             "prediction": s.prediction,

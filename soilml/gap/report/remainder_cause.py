@@ -32,7 +32,8 @@ class RemainderCause:
     channels
         Channels whose readings it changes by more than half of their noise.
     probability
-        That the remainder acts at this stage, all others and several causes together included.
+        That the remainder acts at this stage, all others, several causes together and unknown ones
+        included: at most 0.95.
     predictive_gain
         Log density of rows kept back, above that of a smooth remainder in each channel; mean over
         the parts.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from soilml.config.case import Case
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.physics.soils.soil_tests import SoilTest, deviations
 from soilml.remarks import Remark
+from soilml.report.numbers import decimal, format_residual
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
@@ -62,6 +63,8 @@ class Suspect:
     predictive_gain: float | None = None
     #: Standard error of that, by which the rows kept back differ by chance
     predictive_gain_error: float | None = None
+    #: Sizes of its effects that are implausibly large, in usual ones, by name
+    times_usual: dict[str, float] = field(default_factory=dict)
 
     @property
     def prediction(self) -> str:
@@ -69,6 +72,19 @@ class Suspect:
         if self.predictive_gain is None:
             return ""
         return f"{self.predictive_gain:+.1f} +- {self.predictive_gain_error or 0.0:.1f}"
+
+    @property
+    def needs(self) -> str:
+        """The implausible sizes that it needs, in words; empty where it needs none."""
+        sizes = [
+            f"{n} at {decimal(x, 2)} times its usual size" for n, x in self.times_usual.items()
+        ]
+        return " and ".join(sizes)
+
+
+def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects that are likelier than the first, which they follow for their sizes."""
+    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
 
 
 @dataclass(frozen=True)
@@ -108,6 +124,12 @@ class GapReduction:
     readings: int
     description: str
 
+    @property
+    def shrinks(self) -> bool:
+        """Whether it is smaller after, at the digits that are shown."""
+        shown = [format_residual(x) for x in (self.before, self.after)]
+        return self.after < self.before and shown[0] != shown[1]
+
 
 @dataclass(frozen=True)
 class CandidateSummary:
@@ -136,9 +158,10 @@ class NextRun:
 class NoiseAgreement:
     """Mean squared residuals of the soil alone, per degree of freedom, in variances of the noise.
 
-    `declared` is that of all readings under the declared noise, as `identify` states it;
-    `exceeds_noise` whether noise alone would exceed it with a probability below 0.001. `granted` is
-    that under noise, and scatter of the soil from run to run by these standard deviations.
+    Both are of the readings that were not excluded as outliers. `declared` is that under the
+    declared noise, as `identify` states it where none was excluded; `exceeds_noise` whether noise
+    alone would exceed it with a probability below 0.001. `granted` is that
+    under noise, and scatter of the soil from run to run by these standard deviations.
     """
 
     declared: float
@@ -265,7 +288,8 @@ class GapReport:
     probabilities : dict of float
         Posterior probability of each tested effect.
     suspects : tuple of Suspect
-        Explanations with their odds, the likeliest first, wherever there is a gap.
+        Explanations with their odds wherever there is a gap: the likeliest first, or the likeliest
+        of usual size where that has a probability of at least 0.005.
     conditions : tuple of Remark
         Conditions under which these odds are valid.
     discrepancy : dict of RemainingDiscrepancy

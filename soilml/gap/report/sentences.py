@@ -11,7 +11,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from soilml.fitting.misfit import excess_residuals
-from soilml.gap.report.results import GapReport, NoiseAgreement, RemainingDiscrepancy
+from soilml.gap.report.results import (
+    GapReport,
+    NoiseAgreement,
+    RemainingDiscrepancy,
+    Suspect,
+    likelier_than_first,
+)
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal, format_probability, format_residual
 
@@ -87,10 +93,8 @@ def headline(report: GapReport) -> str:
         case "suspected":
             first = report.suspects[0] if report.suspects else None
             names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
-            sure = f" (probability {format_probability(first.probability)})" if first else ""
-            likely = first is None or first.probability >= UNLIKELY_SUSPECT
-            which = "first suspect is" if likely else "no effect is likely, the first is"
-            return f"A gap of uncertain cause: {which} {names}{sure}{_shrinks(report)}."
+            sure = f" ({_probability(first)})" if first else ""
+            return f"A gap of uncertain cause: {_first(report)} {names}{sure}{_shrinks(report)}."
     names = " + ".join(e.name for e in report.effects)
     sure = _sure(report)
     if report.status == "class":
@@ -100,6 +104,22 @@ def headline(report: GapReport) -> str:
         return f"{names} explains a part of the gap{sure}{_shrinks(report)}."
     law = ", by another law than the catalogue's" if report.status == "form-open" else ""
     return f"{names} explains the gap{law}{sure}{_shrinks(report)}."
+
+
+def _first(report: GapReport) -> str:
+    """How the first suspect is introduced."""
+    if not report.suspects:
+        return "first suspect is"
+    if likelier_than_first(report.suspects):
+        return "first suspect of usual size is"
+    first = report.suspects[0]
+    likely = first.probability >= UNLIKELY_SUSPECT or first.times_usual
+    return "first suspect is" if likely else "no effect is likely, the first is"
+
+
+def _probability(suspect: Suspect) -> str:
+    size = ", implausibly large" if suspect.times_usual else ""
+    return f"probability {format_probability(suspect.probability)}{size}"
 
 
 def _faults(report: GapReport) -> str:
@@ -147,6 +167,8 @@ def _shrinks(report: GapReport) -> str:
     if "train" not in report.gap:
         return ""
     before, after = report.gap["train"].before, report.gap["train"].after
+    if not report.gap["train"].shrinks:
+        return f"; the gap stays at {format_residual(before)}"
     return f"; the gap shrinks {format_residual(before)} -> {format_residual(after)}"
 
 
@@ -199,6 +221,9 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
         if found.grants_scatter and found.granted <= found.declared:
             text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
         parts.append(text)
+    if count := sum(len(note.about) for note in report.notes if note.code == "outliers"):
+        without = f": without {'it' if count == 1 else 'them'}, " if parts else ""
+        parts = [f"{outliers_in_words(count)} excluded{without}{''.join(parts)}"]
     count = len(report.candidates)
     if count:
         parts.append(f"{count} explanation{'s were' if count > 1 else ' was'} fitted")
@@ -211,15 +236,29 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     return Remark("tried", f"{text[:1].upper()}{text[1:]}.")
 
 
+def outliers_in_words(count: int) -> str:
+    """So many outliers, as the subject of a sentence in the passive."""
+    return (
+        "1 reading is an outlier and was"
+        if count == 1
+        else f"{count} readings are outliers and were"
+    )
+
+
 def _listed(report: GapReport) -> str:
-    """The explanations that remain, the likeliest first; suspects with their odds."""
+    """The explanations that remain, in the order of the report; suspects with their odds."""
     if report.status == "class":
         sets = ", or ".join(" + ".join(names) for names in report.cause_set)
         return f"These runs cannot distinguish, the likeliest first: {sets}."
     listed = "; ".join(
         f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in report.suspects[:LISTED_SUSPECTS]
     )
-    return f"Suspects, the likeliest first, within the catalogue: {listed}." if listed else ""
+    if not listed:
+        return ""
+    likelier = likelier_than_first(report.suspects)
+    order = "the likeliest of usual size first" if likelier else "the likeliest first"
+    why = [f" {' + '.join(s.effects)} is likelier, but needs {s.needs}." for s in likelier]
+    return f"Suspects, {order}, within the catalogue: {listed}.{''.join(why)}"
 
 
 def _odds(log_odds: float) -> str:

@@ -26,6 +26,9 @@ OTHER_LAW = 0.3
 #: Rise of log odds, by half, from which rows speak for an effect. One that they leave as likely as
 #: it was beforehand, such as a sensor's gain that nothing tests, is no further suspect.
 RAISED = 0.4
+#: Probability from which it is stated as a number, not as a bound: beside a likelier suspect, one
+#: below it is none.
+LEAST_STATED = 0.005
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
 
@@ -42,7 +45,8 @@ class Posterior:
 
     Of these, the sets in `unlisted` are no suspects: they predict rows that were kept back worse
     than the soil alone does, beyond sampling error, or need an implausible fault of a sensor. Those
-    in `oversized` need an implausible size: none of them comes first where another set is listed.
+    in `oversized` need an implausible size: none of them comes first where another set is listed,
+    which has a probability of at least `LEAST_STATED` where theirs is.
     Those in `unproven` predict them no better, within sampling error: they can be suspected, not
     named.
     """
@@ -74,6 +78,10 @@ class Posterior:
         logs = self.log_weights
         return logs.get(names, -np.inf) - logs.get((), -np.inf) > RAISED - 0.5 * penalty
 
+    def is_stated(self, names: Names) -> bool:
+        """Whether the probability of a set of effects is more than a bound."""
+        return self.probability(*names) >= LEAST_STATED
+
     def ranked(self) -> list[tuple[Names, float]]:
         """Sets of effects with the natural logarithm of their odds, the likeliest first.
 
@@ -99,8 +107,8 @@ class Posterior:
     ) -> list[tuple[Names, float]]:
         """Ranked sets from the first suspect: the likeliest of usual size that was fitted in full.
 
-        Likelier ones of an implausible size follow it, if the data raise its odds; without such a
-        one, the likeliest comes first.
+        Likelier ones of an implausible size follow it, if the data raise its odds, and if it has a
+        probability that is stated where theirs is. Without such a one, the likeliest comes first.
 
         fitted: -2 ln of the prior odds of each set that was fitted.
         """
@@ -109,6 +117,8 @@ class Posterior:
         usual = [i for i in raised if ranked[i][0] not in self.oversized]
         if known and ranked[known[0]][0] not in self.oversized:
             usual = known
+        elif known and self.is_stated(ranked[known[0]][0]):
+            usual = [i for i in usual if self.is_stated(ranked[i][0])]
         first = (usual or known or [0])[0]
         before = [own for own in ranked[:first] if own[0] in self.oversized]
         return [*ranked[first : first + 1], *before, *ranked[first + 1 :]]

@@ -38,10 +38,13 @@ NOTABLE_CHANGE = {"drawbar_pull": 0.01, "sinkage": 1e-5}
 def noise_agreement(
     case: Case, readings: Readings, soil: Sequence[Coordinate], analysis: Analysis
 ) -> NoiseAgreement | None:
-    """The misfit under the declared noise, as `identify` has it, and under noise and scatter.
+    """The misfit under the declared noise, and under noise and scatter, of the same readings.
 
-    readings: All readings, outliers included. None where no fit is possible.
+    readings: All readings; those that the analysis excluded count in neither. None where no fit is
+    possible.
     """
+    if analysis.excluded is not None:
+        readings = readings.subset(~analysis.excluded)
     start = None if analysis.opened is not None else analysis.result.soil.x
     found = declared_misfit(case, readings, soil, start)
     if found is None:
@@ -59,14 +62,14 @@ def noise_agreement(
 
 
 def misfit_remarks(found: NoiseAgreement | None, case: Case, analysis: Analysis) -> list[Remark]:
-    """Residuals beyond the declared noise that neither scatter nor outliers account for.
+    """Residuals beyond the declared noise that scatter does not account for.
 
     The score test does not see those that another soil beyond the priors would explain.
     """
     if found is None or not found.exceeds_noise:
         return []
     left = max(len(analysis.problem.readings) - len(analysis.problem.soil), 1)
-    if (found.grants_scatter or analysis.outliers) and found.granted <= misfit_limit(left):
+    if found.grants_scatter and found.granted <= misfit_limit(left):
         return []
     factor = float(np.sqrt(found.declared))
     if pressed := pressed_priors(analysis.result.soil):

@@ -17,6 +17,7 @@ from soilml.gap.evidence.marginal_likelihood import TEMPERING, DiscrepancyModel,
 from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.evidence.stage_changes import stage_changes
 from soilml.gap.report.remainder_cause import RemainderCause
+from soilml.gap.search.posterior import IN_CATALOGUE
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
@@ -93,6 +94,7 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
     )
     told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
     channels = _changed_channels(problem, fit, best)
+    probability *= IN_CATALOGUE  # as of any cause that is stated
     return RemainderCause(stage, variable if told else "", channels, probability, gain)
 
 

@@ -201,7 +201,7 @@ def with_refused_outside(
     unlisted = {c.names for c in candidates if _implausible_faults(c.fit)}
     unlisted |= {names for names, gain in gains.items() if gain.is_worse}
     unproven = frozenset(names for names, gain in gains.items() if not gain.is_better)
-    oversized = {c.names for c in candidates if _implausibly_large(c.fit)} - unlisted
+    oversized = {c.names for c in candidates if implausible_sizes(c.fit)} - unlisted
     far = unlisted | oversized
     far |= {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
     parts = [set(c.names) for c in result.accepted if c.names not in far]
@@ -243,12 +243,13 @@ def _implausible_faults(fit: Solution) -> tuple[str, ...]:
     )
 
 
-def _implausibly_large(fit: Solution) -> bool:
-    """Whether an effect of the soil or the gear is far larger than it usually is."""
-    return any(
-        c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > LARGEST_SIZE
+def implausible_sizes(fit: Solution) -> dict[str, float]:
+    """Sizes, in usual ones, of the effects of soil and gear that are far larger, by name."""
+    return {
+        c.effect: float(abs(x))
         for c, x in zip(fit.coordinates, fit.x, strict=True)
-    )
+        if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > LARGEST_SIZE
+    }
 
 
 def reasons(

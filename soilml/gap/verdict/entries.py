@@ -25,14 +25,16 @@ from soilml.gap.report.results import (
     ReadingsAndPredictions,
     Suspect,
 )
+from soilml.gap.report.sentences import outliers_in_words
 from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
+from soilml.gap.verdict.decision import implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
-from soilml.remarks import Remark
+from soilml.remarks import Remark, texts
 from soilml.report.numbers import format_quantity
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
@@ -114,8 +116,9 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
     """Explanations with their odds against all others, the likeliest first.
 
     The first one is that whose figures are shown; see `Posterior.from_first`. After it come those
-    only whose odds the data raise. A set that adds effects to a claimed one is listed
-    as that one, since the evidence for what it adds is not decisive.
+    only whose odds the data raise, and after one of an implausible size those whose probability is
+    stated. A set that adds effects to a claimed one is listed as that one, since the evidence for
+    what it adds is not decisive.
     """
     problem, posterior = analysis.problem, analysis.result.posterior
     stated = [c.names for c in claimed]
@@ -127,9 +130,22 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
     ranked = sorted(((n, posterior.log_odds(*n)) for n in listed), key=lambda item: -item[1])
     ranked = posterior.from_first(ranked, {c.names: c.penalty for c in analysis.result.candidates})
     rest = [own for own in ranked[1:] if posterior.favours(own[0], problem.penalty(own[0]))]
-    gains = predictive_gains(analysis.predictions)
+    if ranked and ranked[0][0] in posterior.oversized and posterior.is_stated(ranked[0][0]):
+        rest = [own for own in rest if posterior.is_stated(own[0])]
+    gains, oversized = predictive_gains(analysis.predictions), posterior.oversized
+    sizes = {
+        c.names: implausible_sizes(c.fit)
+        for c in analysis.result.candidates
+        if c.names in oversized
+    }
     return [
-        Suspect(names, odds, posterior.probability(*names), *_gain(gains.get(names)))
+        Suspect(
+            names,
+            odds,
+            posterior.probability(*names),
+            *_gain(gains.get(names)),
+            times_usual=sizes.get(names, {}),
+        )
         for names, odds in [*ranked[:1], *rest[: LISTED_SUSPECTS - 1]]
     ]
 
@@ -139,14 +155,23 @@ def _gain(gain: PredictiveGain | None) -> tuple[float | None, float | None]:
     return (None, None) if gain is None else (gain.value, gain.std_error)
 
 
-def suspect_notes(names: Sequence[str]) -> list[Remark]:
-    """A note on effects that the model contains because they predict, if there are any."""
+def prediction_notes(
+    names: Sequence[str], analysis: Analysis, not_reduced: Sequence[Remark]
+) -> list[Remark]:
+    """A note on effects that the model contains because they predict, or else on figures.
+
+    not_reduced: Figures that do not shrink without a remainder, which that note contains.
+    """
     if not names:
-        return []
+        return list(not_reduced)
+    gain = predictive_gains(analysis.predictions)[tuple(names)]
     text = (
-        f"model.toml contains {' + '.join(names)}, which is suspected and not named: rows kept "
-        "back are predicted better with it than by the soil alone"
+        f"model.toml contains {' + '.join(names)}, which is suspected and not named: beside a "
+        "smooth remainder, rows kept back are predicted better with it than by the soil alone "
+        f"(ln density {gain.value:+.1f} +- {gain.std_error:.1f})"
     )
+    if not_reduced:
+        text += f"; without a remainder they are not: {'; '.join(texts(not_reduced))}"
     return [Remark("suspect-predicts", text, tuple(names), "note")]
 
 
@@ -190,12 +215,8 @@ def analysis_notes(
     notes = []
     if count := len(analysis.outliers):
         names = ", ".join(analysis.outliers[:LISTED_OUTLIERS])
-        many = (
-            f"{count} readings are outliers and were"
-            if count > 1
-            else "1 reading is an outlier and was"
-        )
-        notes.append(Remark("outliers", f"{many} excluded: {names}", analysis.outliers))
+        text = f"{outliers_in_words(count)} excluded: {names}"
+        notes.append(Remark("outliers", text, analysis.outliers))
     soil = analysis.result.soil
     far = disagreeing_soil_tests(soil.case, soil.values()) if analysis.result.has_gap else []
     notes += [

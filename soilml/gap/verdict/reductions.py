@@ -20,7 +20,11 @@ from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.stepwise import off_bounds
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal
+from soilml.report.numbers import channel_name, decimal
+
+FITTED = "train"  # Key of the figures of the fitted rows
+#: Ratio from which a channel's figure is said to grow, where it is above that of noise alone.
+NOTABLE_GROWTH = 1.1
 
 
 def gap_reduction(
@@ -92,7 +96,7 @@ def gap_reductions(
     none = np.zeros(len(readings.channels))
     models = [(soil, none)] if shown is None else [(soil, none), (after, none)]
     plain = predict_parts(problem, models, parts)
-    figures = {"train": fitted}
+    figures = {FITTED: fitted}
     for name, folds in parts.items():
         means = plain[0][name].mean, plain[-1][name].mean
         figures[name] = _of_part(readings, std, folds, *means)
@@ -116,22 +120,36 @@ def _of_part(
 def without_grown(
     figures: dict[str, GapReduction], addition: str
 ) -> tuple[dict[str, GapReduction], list[Remark]]:
-    """The figures that did not grow, and a remark on each that did.
+    """The figures of the fitted rows and those that shrank, and a remark on each other one.
 
-    addition: What was added to the model.
+    addition: What was added to the model; where that is nothing, all figures stay as they are.
     """
-    grown = {name: g for name, g in figures.items() if g.after > g.before}
-    remarks = [
-        Remark(
-            "not-reduced",
-            f"{g.description}: with {addition} the mean squared residual is "
-            f"{decimal(g.after, 2)}, without it {decimal(g.before, 2)}",
-            (name,),
-            "note",
-        )
-        for name, g in grown.items()
-    ]
+    grown = {n: g for n, g in figures.items() if addition and n != FITTED and not g.shrinks}
+    remarks = []
+    for name, g in grown.items():
+        before, after = (decimal(x, 3) for x in (g.before, g.after))
+        text = f"with {addition} the mean squared residual is {after}, without it {before}"
+        if before == after:
+            text = f"the mean squared residual is {after} with and without {addition}"
+        remarks.append(Remark("not-reduced", f"{g.description}: {text}", (name,), "note"))
     return {name: g for name, g in figures.items() if name not in grown}, remarks
+
+
+def grown_channels(figures: dict[str, GapReduction], addition: str) -> list[Remark]:
+    """A remark on the channels whose figures grow although those of all readings shrink."""
+    grown = [
+        (name, f"{channel_name(name)} from {decimal(b, 2)} to {decimal(a, 2)} ({g.description})")
+        for g in figures.values()
+        for name, (b, a) in g.channels.items()
+        if a > max(NOTABLE_GROWTH * b, 1.0)
+    ]
+    if not grown:
+        return []
+    text = (
+        f"with {addition}, the mean squared residual of all readings shrinks, but that of a "
+        f"channel grows: {'; '.join(text for _, text in grown)}"
+    )
+    return [Remark("channel-grows", text, tuple(dict.fromkeys(n for n, _ in grown)), "note")]
 
 
 def predict_held_out(

@@ -36,7 +36,6 @@ class BearingDrift(SlipLoadScaling):
         signs={"sinkage": -1},
         isolate="the first run again at the end of the campaign",
         uses=("progress",),
-        family="drift of the soil",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
     growth: Annotated[Real, Parameter("1", -2.0, 2.0, "a, growth of ln k in the campaign")] = 0.0

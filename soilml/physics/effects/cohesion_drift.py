@@ -36,7 +36,6 @@ class CohesionDrift(SlipLoadScaling):
         signs={"torque": +1, "drawbar_pull": +1},
         isolate="the first run again at the end of the campaign; the moisture of the soil",
         uses=("progress",),
-        family="drift of the soil",
     )
     law_terms: ClassVar[tuple[str, ...]] = ()
     gain: Annotated[Real, Parameter("Pa", -1e4, 1e4, "c_1, gained in the campaign")] = 0.0

@@ -113,3 +113,26 @@ def test_a_drift_leaves_no_agreement_but_a_doubt(monkeypatch):
 def test_scatter_that_was_not_granted_is_not_named():
     none = NoiseAgreement(1.0, False, 1.0, 0.0, 0.0)
     assert not none.grants_scatter and replace(none, bearing_std=0.1).grants_scatter
+
+
+@pytest.mark.slow
+def test_a_soil_that_dries_in_cohesion_and_stiffness_has_both_drifts():
+    progress = np.linspace(0.0, 1.0, 9)
+    soils = {
+        "cohesion": CASE.soil.cohesion * (1.0 - 0.7 * progress),
+        "kphi": CASE.soil.kphi * np.exp(-0.4 * progress),
+    }
+    loads = (60.0, 40.0, 90.0, 40.0, 90.0, 60.0, 40.0, 90.0, 60.0)
+    report = gap(CASE, driven(CASE, loads=loads, soils=soils))
+    assert report.cause_set == (("bearing-drift", "cohesion-drift"),)
+    assert report.status in ("named", "partly-named")
+
+
+@pytest.mark.slow
+def test_scatter_is_not_credited_with_what_an_exclusion_did():
+    table = driven(CASE, seed=4)
+    torque = table["torque_Nm"] * np.where(np.arange(len(table)) == 13, 10.0, 1.0)
+    report = gap(CASE, replace(table, columns=dict(table.columns) | {"torque_Nm": torque}))
+    assert not report.misfit.exceeds_noise
+    assert report.misfit.declared < 1.5 * report.misfit.granted
+    assert report.lines[0].text.startswith("1 reading is an outlier and was excluded: without it,")

@@ -68,7 +68,7 @@ def test_a_weaker_soil_at_high_slip_is_a_change_of_the_shear_stress():
     found = report_of(Shaken(size=0.25)).remainder_cause
     assert found.stage == "shear stress"
     assert found.depends_on == "slip"
-    assert found.probability > 10.0 / 11.0
+    assert 0.95 * 10.0 / 11.0 < found.probability <= 0.95
     assert found.predictive_gain > 0.0
     assert "torque" in found.channels
 

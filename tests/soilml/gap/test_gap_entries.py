@@ -114,6 +114,22 @@ def test_suspects_are_the_likeliest_eight_under_stated_conditions():
     assert ", and if the bed was the same for all rows, and if the soil" in conditions_text(one)
 
 
+def test_what_is_hopeless_is_no_suspect_beside_one_of_an_implausible_size():
+    def listed(second):
+        given = analysed(made("a"), weights={("a",): -0.1, ("b",): second, (): -9.0})
+        given.result.posterior = replace(
+            given.result.posterior,
+            refused={("a",): frozenset()},
+            oversized=frozenset({("a",)}),
+        )
+        given.result.candidates[0].fit.coordinates = ()
+        given.result.candidates[0].fit.x = ()
+        return [s.effects for s in suspects(given, ())]
+
+    assert listed(-5.0) == [("a",), ("b",)]  # b was not fitted: it does not come first
+    assert listed(-5.5) == [("a",)]
+
+
 def test_a_pair_that_contains_a_named_effect_is_listed_as_that_effect():
     weights = {("a", "b"): -0.1, ("a",): -3.0, ("c",): -8.0, (): -30.0}
     given = analysed(made("a"), made("a", "b"), weights=weights)

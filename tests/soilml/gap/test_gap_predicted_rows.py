@@ -14,10 +14,11 @@ from soilml.gap.evidence.score_test import score_test
 from soilml.gap.report.results import GapReduction
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
-from soilml.gap.verdict.reductions import without_grown
+from soilml.gap.verdict.reductions import grown_channels, without_grown
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.physics.effects import EFFECTS
+from soilml.remarks import texts
 
 DIGGING = EFFECTS["slip-sinkage"]
 
@@ -49,6 +50,19 @@ def test_a_set_of_an_implausible_size_follows_the_first_of_a_usual_size():
     assert order({("a",)}) == ["a", "b", "c"]  # nothing of a usual size was fitted
     assert order(every, penalty=-4.0) == ["a", "b", "c"]  # the rows do not raise the odds of b, c
     assert found.from_first([], {}) == []
+
+
+def test_what_is_hopeless_does_not_come_before_an_implausible_size():
+    def first(**logs):
+        weights = {(): -9.0} | {(name,): value for name, value in logs.items()}
+        found = Posterior(weights, {("a",): frozenset()}, oversized=frozenset({("a",)}))
+        ranked = found.ranked()
+        assert [names for names, _ in ranked] == [("a",), ("b",)]
+        return found.from_first(ranked, dict.fromkeys([("a",), ("b",)], 20.0))[0][0]
+
+    assert first(a=-0.1, b=-5.0) == ("b",)  # 0.006
+    assert first(a=-0.1, b=-5.5) == ("a",)  # 0.004
+    assert first(a=-4.5, b=-5.9) == ("b",)  # neither has a stated probability
 
 
 def scored(*by_fold):
@@ -97,6 +111,25 @@ def test_a_figure_that_grew_is_a_remark_and_no_reduction():
     kept, remarks = without_grown(figures, "slip-sinkage")
     assert list(kept) == ["train"]
     assert [(r.code, r.about) for r in remarks] == [("not-reduced", ("held_out_runs",))]
+    equal = {name: replace(g, before=8.061, after=8.059) for name, g in figures.items()}
+    kept, remarks = without_grown(equal, "clogging")
+    assert list(kept) == ["train"] and not kept["train"].shrinks
+    assert texts(remarks) == [
+        "every run: the mean squared residual is 8.06 with and without clogging"
+    ]
+    assert without_grown(equal, "") == (equal, [])
+    assert replace(equal["train"], after=8.05).shrinks
+
+
+def test_a_channel_that_grows_is_a_note():
+    def codes(**channels):
+        figures = {"train": GapReduction(9.0, 5.0, channels, 30, "all rows fitted")}
+        return [(r.code, r.about, r.text) for r in grown_channels(figures, "grousers")]
+
+    assert codes(torque_Nm=(9.0, 2.0), sinkage_m=(2.3, 2.4)) == codes(sinkage_m=(0.5, 0.9)) == []
+    ((code, about, text),) = codes(torque_Nm=(9.0, 2.0), sinkage_m=(2.3, 12.0))
+    assert (code, about) == ("channel-grows", ("sinkage_m",))
+    assert text.endswith("a channel grows: sinkage from 2.3 to 12 (all rows fitted)")
 
 
 @pytest.mark.slow

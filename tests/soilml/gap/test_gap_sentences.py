@@ -67,6 +67,13 @@ def test_granted_scatter_is_named_with_its_size():
     assert lines("no-gap", misfit=SCATTER)["tried"] == (
         f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
     )
+    outliers = Remark("outliers", "...", ("torque_Nm at line 3", "sinkage_m at line 4"))
+    without = lines("no-gap", misfit=SCATTER, notes=(outliers,))["tried"]
+    assert without.startswith(
+        "2 readings are outliers and were excluded: without them, residuals are 1.7 times"
+    )
+    one = replace(outliers, about=outliers.about[:1])
+    assert lines("no-gap", notes=(one,))["tried"] == "1 reading is an outlier and was excluded."
     larger = replace(SCATTER, granted=3.0)  # scatter does not make residuals larger
     assert "scatter" not in lines("no-gap", misfit=larger)["tried"]
     none = replace(SCATTER, friction_angle_std=0.0, bearing_std=0.0)
@@ -128,6 +135,26 @@ def test_a_first_suspect_of_little_probability_is_doubted():
     for probability, words in ((0.1, "first suspect is a"), (0.01, "no effect is likely, the")):
         suspects = (Suspect(("a",), -3.0, probability),)
         assert said("suspected", suspects=suspects).startswith(f"A gap of uncertain cause: {words}")
+
+
+def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
+    usual, large = (
+        Suspect(("a",), -2.5, 0.07),
+        Suspect(("b", "c"), -1.3, 0.2, times_usual={"c": 5.93}),
+    )
+    parts = {"suspects": (usual, large), "best_unclaimed": ("a",)}
+    assert said("suspected", **parts).startswith(
+        "A gap of uncertain cause: first suspect of usual size is a (probability 0.07); "
+    )
+    assert lines("suspected", **parts)["suspects"] == (
+        "Suspects, the likeliest of usual size first, within the catalogue: a (odds 1 to 12); "
+        "b + c (odds 1 to 3.7). b + c is likelier, but needs c at 5.9 times its usual size."
+    )
+    alone = {"suspects": (large, replace(usual, log_odds=-3.0))}
+    assert "first suspect is b + c (probability 0.20, implausibly large)" in said(
+        "suspected", **alone
+    )
+    assert lines("suspected", **alone)["suspects"].startswith("Suspects, the likeliest first,")
 
 
 @pytest.mark.parametrize(

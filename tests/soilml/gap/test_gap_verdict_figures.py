@@ -8,7 +8,7 @@ import pytest
 from soilml import Table
 from soilml.errors import InputError
 from soilml.gap import checks
-from soilml.gap.checks import CheckedData, Consequence, without_duplicate_rows
+from soilml.gap.checks import CheckedData, Consequence, without_copies
 from soilml.gap.design.run_kinds import LISTED, check_costs, rank_by_cost
 from soilml.gap.design.run_options import (
     HIGHEST_SLIP,
@@ -144,18 +144,9 @@ def test_amplitudes_of_the_updated_model_are_those_of_intervals():
 
 
 def severities(check, **values):
-    data = CheckedData(**{"readings": None, "rows": 10, "duplicate_rows": 0, "parameters": 3} |
+    data = CheckedData(**{"readings": None, "rows": 10, "parameters": 3} |
                        values)  # fmt: skip
     return [severity for severity, _ in check(data)]
-
-
-def test_duplicates_are_an_error_from_a_fifth_of_the_table_on():
-    def found(rows, duplicates):
-        return severities(checks._check_duplicate_rows, rows=rows, duplicate_rows=duplicates)
-
-    assert found(10, 0) == []
-    assert found(8, 2) == [Consequence.NOTE]
-    assert found(79, 21) == [Consequence.ERROR]
 
 
 @pytest.mark.parametrize(
@@ -190,13 +181,10 @@ def test_noise_and_life_of_a_channel(values, std, expected):
 
 def test_the_first_of_equal_rows_stays():
     table = made({"slip": [0.1, 0.2, 0.1, 0.1], "torque_Nm": [1.0, 2.0, 1.0, 3.0]})
-    kept, count = without_duplicate_rows(table)
-    assert (kept["slip"].tolist(), kept["torque_Nm"].tolist(), count) == (
-        [0.1, 0.2, 0.1],
-        [1.0, 2.0, 3.0],
-        1,
-    )
-    assert without_duplicate_rows(kept)[0] is kept
+    kept, remarks = without_copies(table)
+    assert (kept["slip"].tolist(), kept["torque_Nm"].tolist()) == ([0.1, 0.2, 0.1], [1.0, 2.0, 3.0])
+    assert texts(remarks) == ["1 row is an exact copy of another and was excluded; 3 are analysed"]
+    assert without_copies(kept)[0] is kept
 
 
 def test_repeats_give_the_noise_by_their_degrees_of_freedom():
