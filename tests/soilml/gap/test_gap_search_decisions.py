@@ -228,7 +228,10 @@ def test_a_set_is_complete_where_noise_explains_the_rest(monkeypatch, amplitude,
 @pytest.fixture
 def searched(monkeypatch):
     """A search of which each level of sets has a best objective; the levels that were fitted."""
-    seen = SimpleNamespace(levels=[], objective={0: 100.0}, complete=None, p_value=0.001, done=[])
+    seen = SimpleNamespace(
+        levels=[], objective={0: 100.0}, complete=None, p_value=0.001, again=None
+    )
+    seen.done = []
 
     def fit_level(problem, soil, none, sets, starts):
         seen.levels.append(sorted(sets))
@@ -243,6 +246,7 @@ def searched(monkeypatch):
         "_fit_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
         "effects_to_fit": lambda *_, **__: ["a"],
+        "_from_soils_of": lambda problem, soil_alone, level: seen.again or soil_alone,
         "_fit_level": fit_level,
         "_extensions": grown,
         "_is_complete": lambda problem, best, seed: best.names == seen.complete,
@@ -313,3 +317,30 @@ def test_an_explanation_leaves_a_remainder_from_one_in_a_thousand(searched, p_va
     seen, run = searched
     seen.p_value, seen.objective = p_value, {0: 100.0, 1: 50.0}
     assert run().adequate == adequate
+
+
+def test_a_better_optimum_of_the_soil_alone_takes_its_place(searched):
+    seen, run = searched
+    seen.objective |= {1: 60.0}
+    assert run().soil_alone.objective == 100.0
+    assert run().posterior.probability("a") > 0.9
+    seen.again = made(objective=50.0)
+    assert run().soil_alone is seen.again
+    assert run().posterior.probability("a") < 0.2
+
+
+def test_the_soil_alone_starts_from_the_soils_of_the_two_best_explanations(monkeypatch):
+    started = []
+
+    def fit_marginal(problem, fits):
+        started.append(fits)
+        return [made(objective=value).catalogue_law for value in objectives]
+
+    monkeypatch.setattr(stepwise, "fit_marginal", fit_marginal)
+    level = [made("a", objective=30.0), made("b", objective=10.0), made("c", objective=20.0)]
+    problem, own = SimpleNamespace(case=None, soil=()), made(objective=50.0)
+    objectives = [49.95, 60.0]
+    assert stepwise._from_soils_of(problem, own, level) is own  # the same optimum again
+    assert len(started[0]) == 2
+    objectives = [60.0, 40.0]
+    assert stepwise._from_soils_of(problem, own, level).objective == 40.0
