@@ -19,7 +19,12 @@ from soilml.gap.report.results import (
     likelier_than_first,
 )
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal, format_probability, format_residual
+from soilml.report.numbers import (
+    decimal,
+    format_p_value,
+    format_probability,
+    format_residual,
+)
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
@@ -88,7 +93,10 @@ def headline(report: GapReport) -> str:
             which = ", and no effect of the catalogue explains it"
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
-            size = f"mean squared residual {_before(report)}; noise alone gives 1"
+            pattern = format_p_value(report.p_gap).replace("\N{NO-BREAK SPACE}", " ")
+            size = (
+                f"mean squared residual {_before(report)}; noise gives 1, such a pattern {pattern}"
+            )
             return f"There is a gap{which} ({size})."
         case "suspected":
             first = report.suspects[0] if report.suspects else None
@@ -353,7 +361,4 @@ def unsupported_conclusions(
         if region.after > 0.5 * region.before and region.before > 1.5:
             text = f"extrapolation: on {region.description} the gap is hardly reduced"
             found.append(Remark("extrapolation", text))
-    return found + [
-        replace(report.untestable[name], text=f"{name}: {report.untestable[name]}")
-        for name in sorted(report.untestable)
-    ]
+    return found
