@@ -16,8 +16,8 @@ from soilml.gap.report.results import (
     STATUSES,
     EstimatedValue,
     GapReport,
-    likelier_than_first,
 )
+from soilml.gap.report.sentences import likelier_than_first, needed_sizes
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import Z_90
@@ -210,7 +210,7 @@ def suspect_table(report: GapReport) -> list[dict[str, Any]]:
     return [
         {
             "effects": s.effects,
-            "needs": s.needs,
+            "needs": needed_sizes(s),
             "log_odds": s.log_odds,
             "probability": format_probability(s.probability),
             "prediction": s.prediction,

@@ -16,7 +16,6 @@ from soilml.gap.report.results import (
     NoiseAgreement,
     RemainingDiscrepancy,
     Suspect,
-    likelier_than_first,
 )
 from soilml.remarks import Remark
 from soilml.report.numbers import (
@@ -123,6 +122,17 @@ def _first(report: GapReport) -> str:
     first = report.suspects[0]
     likely = first.probability >= UNLIKELY_SUSPECT or first.times_usual
     return "first suspect is" if likely else "no effect is likely, the first is"
+
+
+def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects that are likelier than the first, which they follow for their sizes."""
+    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
+
+
+def needed_sizes(suspect: Suspect) -> str:
+    """The implausible sizes that a suspect needs, in words; empty where it needs none."""
+    sizes = suspect.times_usual.items()
+    return " and ".join(f"{name} at {decimal(x, 2)} times its usual size" for name, x in sizes)
 
 
 def _probability(suspect: Suspect) -> str:
@@ -265,7 +275,7 @@ def _listed(report: GapReport) -> str:
         return ""
     likelier = likelier_than_first(report.suspects)
     order = "the likeliest of usual size first" if likelier else "the likeliest first"
-    why = [f" {' + '.join(s.effects)} is likelier, but needs {s.needs}." for s in likelier]
+    why = [f" {' + '.join(s.effects)} is likelier, but needs {needed_sizes(s)}." for s in likelier]
     return f"Suspects, {order}, within the catalogue: {listed}.{''.join(why)}"
 
 
