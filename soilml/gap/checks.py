@@ -147,7 +147,8 @@ def without_copies(table: Table) -> tuple[Table, list[Remark]]:
     for i, (own, key) in enumerate(zip(run, cells, strict=True)):
         rows.setdefault(own, {}).setdefault(key, i)
     first: dict[tuple[tuple[str, ...], ...], str] = {}
-    copied, kept = [], []
+    copied: list[str] = []
+    kept: list[int] = []
     for own, of_run in rows.items():
         if first.setdefault(tuple(sorted(of_run)), own) != own and len(of_run) >= COPIED_ROWS:
             copied.append(own)

@@ -115,8 +115,10 @@ class Table:
                     f"{self.source}: column {name} contains numbers; {value!r} is not a number"
                 ) from None
         if not mask.any():
-            some = ", ".join(str(v) for v in np.unique(column)[:6])
-            raise TableError(f"{self.source}: no row has {name} = {value}; values are: {some}, ...")
+            known = np.unique(column)
+            some = ", ".join([str(v) for v in known[:6]] + ["..."] * (len(known) > 6))
+            are = "values are" if len(known) > 1 else "the only value is"
+            raise TableError(f"{self.source}: no row has {name} = {value}; {are} {some}")
         return self.rows(mask)
 
     def groups(self, name: str = "run") -> Iterator[tuple[str, Table]]:

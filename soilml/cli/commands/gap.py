@@ -133,11 +133,12 @@ def run(args: argparse.Namespace) -> int:
 def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:
     found = {}
     for text in texts:
-        name, _, value = text.partition("=")
+        name, given, value = text.partition("=")
         kinds = {n for n, e in effects.items() if e.about.kind in ("sensor", "rig")}
-        if name not in kinds:
-            names = ", ".join(sorted(kinds))
-            raise InputError(f"--checked {text!r}: needed is EFFECT=STD, with one of {names}")
+        if name not in kinds or not given:
+            names = f", with one of {', '.join(sorted(kinds))}" if name not in kinds else ""
+            like = f", as in {name}=0.003" if name in kinds else ""
+            raise InputError(f"--checked {text!r}: needed is EFFECT=STD{names}{like}")
         try:
             found[name] = read_number(value)
         except ValueError:

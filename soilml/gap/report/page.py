@@ -16,8 +16,8 @@ from soilml.gap.report.results import (
     STATUSES,
     EstimatedValue,
     GapReport,
-    likelier_than_first,
 )
+from soilml.gap.report.sentences import likelier_than_first, needed_sizes
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import Z_90
@@ -125,7 +125,8 @@ _ADVICE = {
     "suspected": "Make the first run under Next runs. model.toml contains the first suspect, "
     "marked as such, where it predicts rows kept back better; else the soil alone.",
     "partly-named": "model.toml contains the effect and, under [discrepancy], the size of what is "
-    "left, which widens every interval computed from it. Make the first run under Next runs.",
+    "left, which widens every interval computed from it.{learned} Make the first run under Next "
+    "runs.",
     "named": "model.toml contains the effect. Make the first run under Next runs to confirm it.",
     "class": "Make the first run under Next runs: it discriminates best between the explanations.",
     "form-open": "model.toml contains the effect with a law fitted to these data. Use it within "
@@ -146,7 +147,10 @@ def advice(report: GapReport) -> str:
     """What the reader should do."""
     if report.status in _ADVISES_NEXT_RUN and not report.next_runs:
         return "Make runs at other slips and loads, and analyse all runs together."
-    return _ADVICE.get(report.status, "")
+    learned = ""
+    if report.model.remainder is not None:
+        learned = " Under [remainder] it contains what is left, as it was learned."
+    return _ADVICE.get(report.status, "").format(learned=learned)
 
 
 def shown_model(report: GapReport) -> str:
@@ -206,7 +210,7 @@ def suspect_table(report: GapReport) -> list[dict[str, Any]]:
     return [
         {
             "effects": s.effects,
-            "needs": s.needs,
+            "needs": needed_sizes(s),
             "log_odds": s.log_odds,
             "probability": format_probability(s.probability),
             "prediction": s.prediction,

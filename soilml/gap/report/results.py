@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, NamedTuple
 
@@ -14,7 +14,7 @@ from soilml.config.case import Case
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.physics.soils.soil_tests import SoilTest, deviations
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal, format_residual
+from soilml.report.numbers import format_residual
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
@@ -72,19 +72,6 @@ class Suspect:
         if self.predictive_gain is None:
             return ""
         return f"{self.predictive_gain:+.1f} +- {self.predictive_gain_error or 0.0:.1f}"
-
-    @property
-    def needs(self) -> str:
-        """The implausible sizes that it needs, in words; empty where it needs none."""
-        sizes = [
-            f"{n} at {decimal(x, 2)} times its usual size" for n, x in self.times_usual.items()
-        ]
-        return " and ".join(sizes)
-
-
-def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects that are likelier than the first, which they follow for their sizes."""
-    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
 
 
 @dataclass(frozen=True)

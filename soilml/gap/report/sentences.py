@@ -16,10 +16,14 @@ from soilml.gap.report.results import (
     NoiseAgreement,
     RemainingDiscrepancy,
     Suspect,
-    likelier_than_first,
 )
 from soilml.remarks import Remark
-from soilml.report.numbers import decimal, format_probability, format_residual
+from soilml.report.numbers import (
+    decimal,
+    format_p_value,
+    format_probability,
+    format_residual,
+)
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
@@ -88,7 +92,10 @@ def headline(report: GapReport) -> str:
             which = ", and no effect of the catalogue explains it"
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
-            size = f"mean squared residual {_before(report)}; noise alone gives 1"
+            pattern = format_p_value(report.p_gap).replace("\N{NO-BREAK SPACE}", " ")
+            size = (
+                f"mean squared residual {_before(report)}; noise gives 1, such a pattern {pattern}"
+            )
             return f"There is a gap{which} ({size})."
         case "suspected":
             first = report.suspects[0] if report.suspects else None
@@ -115,6 +122,17 @@ def _first(report: GapReport) -> str:
     first = report.suspects[0]
     likely = first.probability >= UNLIKELY_SUSPECT or first.times_usual
     return "first suspect is" if likely else "no effect is likely, the first is"
+
+
+def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
+    """The suspects that are likelier than the first, which they follow for their sizes."""
+    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
+
+
+def needed_sizes(suspect: Suspect) -> str:
+    """The implausible sizes that a suspect needs, in words; empty where it needs none."""
+    sizes = suspect.times_usual.items()
+    return " and ".join(f"{name} at {decimal(x, 2)} times its usual size" for name, x in sizes)
 
 
 def _probability(suspect: Suspect) -> str:
@@ -257,7 +275,7 @@ def _listed(report: GapReport) -> str:
         return ""
     likelier = likelier_than_first(report.suspects)
     order = "the likeliest of usual size first" if likelier else "the likeliest first"
-    why = [f" {' + '.join(s.effects)} is likelier, but needs {s.needs}." for s in likelier]
+    why = [f" {' + '.join(s.effects)} is likelier, but needs {needed_sizes(s)}." for s in likelier]
     return f"Suspects, {order}, within the catalogue: {listed}.{''.join(why)}"
 
 
@@ -353,7 +371,4 @@ def unsupported_conclusions(
         if region.after > 0.5 * region.before and region.before > 1.5:
             text = f"extrapolation: on {region.description} the gap is hardly reduced"
             found.append(Remark("extrapolation", text))
-    return found + [
-        replace(report.untestable[name], text=f"{name}: {report.untestable[name]}")
-        for name in sorted(report.untestable)
-    ]
+    return found

@@ -239,8 +239,8 @@ def analysis_notes(
         text = (
             f"run-to-run variation of the soil cannot be estimated from fewer than {FEW_RUNS} "
             f"runs: {np.degrees(components.friction_angle_std):.2g} deg of friction angle and "
-            f"{components.bearing_std:.0%} of bearing strength are assumed, so mean squared "
-            "residuals may be below 1"
+            f"{100.0 * components.bearing_std:.2g} % of bearing strength are assumed, so mean "
+            "squared residuals may be below 1"
         )
         notes.append(Remark("few-runs", text, severity="note"))
     if components.autocorrelation > 0.0:

@@ -169,7 +169,7 @@ def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
     assert few.startswith("run-to-run variation of the soil cannot be estimated from fewer than 6")
     for runs in ("ab", "abc"):
         assert notes(analysed(runs=tuple(runs)))[-1].startswith("run-to-run variation")
-    assert "0.57 deg of friction angle and 4% of bearing strength are assumed" in few
+    assert "0.57 deg of friction angle and 4 % of bearing strength are assumed" in few
 
 
 def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):

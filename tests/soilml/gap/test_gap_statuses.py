@@ -157,10 +157,13 @@ def test_an_implausible_size_is_suspected_after_an_explanation_of_a_usual_size()
         return decide(PROBLEM, result, (), ()), result.posterior
 
     assert found(0.99 * LARGEST_SIZE)[0].status == "named"
-    made, chances = found(1.01 * LARGEST_SIZE, candidate("plough", 48.0))
+    made, chances = found(1.01 * LARGEST_SIZE, candidate("plough", 29.0))
     assert (made.status, made.shown.names) == ("suspected", ("plough",))
     assert (made.reason.code, made.reason.about) == ("implausible-size", ("dig",))
     assert chances.probability("dig") > chances.probability("plough")
+    hopeless, chances = found(1.01 * LARGEST_SIZE, candidate("plough", 48.0))
+    assert (hopeless.status, hopeless.shown.names) == ("suspected", ("dig",))
+    assert not chances.is_stated(("plough",))
     assert found(1.01 * LARGEST_SIZE)[0].status == "unknown"  # nothing else can come first
 
 
