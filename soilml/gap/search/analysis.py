@@ -36,7 +36,14 @@ from soilml.gap.evidence.score_test import ScoreTest
 from soilml.gap.search.explanation import Explanation, restated_candidates
 from soilml.gap.search.opened_priors import open_priors
 from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
-from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, without_search
+from soilml.gap.search.stepwise import (
+    GAP_LEVEL,
+    ResidualTest,
+    SearchResult,
+    residual_test,
+    search,
+    without_search,
+)
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -133,8 +140,22 @@ def analyse(
             elif not (other.error or other.outliers or other.result.has_gap):
                 text = f"{opened.remark}, and the soil alone then agrees with the rows"
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
-                found = replace(found, opened=remark)
+                found = _explained_by_soil(replace(found, opened=remark), seed)
     return found
+
+
+def _explained_by_soil(found: Analysis, seed: int) -> Analysis:
+    """An analysis whose gap a soil outside the priors explains, without a search if it is all.
+
+    The gap is then one within the priors alone: what doubts them is no evidence of an effect.
+    """
+    result = found.result
+    signatures = result.soil_test.signatures
+    test = residual_test(found.problem, result.soil, signatures, seed)
+    if test.p_value < GAP_LEVEL:
+        return found
+    result = without_search(result.soil, test, result.untestable)
+    return replace(found, result=result, predictions={}, opened=None)
 
 
 def _first_with_opened(
