@@ -162,6 +162,7 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
         "restated_candidates": lambda *_: {},
         "restated": lambda *_: [SimpleNamespace(x=np.full(3, 0.5))],
         "explains_better": lambda *_: better,
+        "_explained_by_soil": lambda found, _: found,
     }.items():
         monkeypatch.setattr(analysis, name, value)
     found, _ = run()
