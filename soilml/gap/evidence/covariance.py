@@ -145,7 +145,11 @@ def _whitening_matrix(matrix: Floats, run: NDArray[np.int64]) -> Floats:
 
 
 def estimate_covariance(
-    readings: Readings, columns: Floats, residual: Floats, space: Floats
+    readings: Readings,
+    columns: Floats,
+    residual: Floats,
+    space: Floats,
+    smooth: Floats | None = None,
 ) -> Covariance:
     r"""Estimate the variance components by restricted maximum likelihood with weak priors.
 
@@ -157,11 +161,12 @@ def estimate_covariance(
     residual (m,): r, the residuals of any fit.
     space (m, q): X, all that soil, effects and smooth functions could explain: the fixed effects.
         Only the component of the residuals outside its span contributes to the estimate.
+    smooth (m, k): Smooth functions beside it, of channels with few readings.
 
     References: Patterson and Thompson, Biometrika 58, 1971.
     """
-    whitened = space / readings.std[:, None]
-    basis = column_space(whitened, **FIXED_EFFECT_TOLERANCES) * readings.std[:, None]
+    std = readings.std[:, None]
+    basis = fixed_effects(space / std, None if smooth is None else smooth / std) * std
     grid = _run_effect_grid(len(readings.runs))
     best, lowest = _coordinate_search(
         restricted_likelihood(readings, columns, residual, basis, 0.0), 0.0, grid
@@ -175,6 +180,19 @@ def estimate_covariance(
     degrees_of_freedom = max(float(len(readings) - basis.shape[1]), PRIOR_DEGREES)
     best = replace(best, degrees_of_freedom=degrees_of_freedom)
     return assemble_covariance(readings, columns, best)
+
+
+def fixed_effects(space: Floats, smooth: Floats | None) -> Floats:
+    """Orthonormal basis of the whitened directions (m, q) and smooth functions (m, k) beside them.
+
+    The functions are kept beside directions of any length. A small part of a signature is too weak
+    to absorb noise, but what is smooth is no noise at any size.
+    """
+    basis = column_space(space, **FIXED_EFFECT_TOLERANCES)
+    if smooth is None:
+        return basis
+    beside = smooth - basis @ (basis.T @ smooth)
+    return np.hstack([basis, column_space(beside, **FIXED_EFFECT_TOLERANCES)])
 
 
 def _run_effect_grid(runs: int) -> tuple[float, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
 
@@ -17,6 +18,9 @@ from soilml.fitting.readings import Readings
 SLIP_DEGREE, LOAD_DEGREE = 4, 2
 #: Readings of a channel per smooth function, so that noise cannot be fitted.
 READINGS_PER_FUNCTION = 4
+#: The same where noise is told from what is smooth, in channels with few readings, and the number
+#: of functions up to which a channel has few.
+READINGS_PER_FUNCTION_OF_FEW, FUNCTIONS_OF_FEW = 2, 4
 #: Bins along slip and along load of the discrepancy map at most, and readings that a region needs.
 SLIP_BINS, LOAD_BINS, MIN_READINGS = 4, 3, 2
 MOST_LEFT_OUT = 0.1  # Share of the readings in regions with too few for which fewer bins are made
@@ -28,6 +32,25 @@ def smooth_basis(readings: Readings) -> Floats:
     Each column is in the unit of its channel's noise. The degree is limited by the number of
     levels of slip and load.
     """
+    return _smooth_functions(readings, lambda count: count // READINGS_PER_FUNCTION)
+
+
+def smooth_basis_of_few(readings: Readings) -> Floats:
+    """The same, of up to four functions for each channel with fewer readings than sixteen, (m, q).
+
+    Two readings per function: they leave what is rough in few rows, from which noise is estimated.
+    Channels with more readings have none.
+    """
+
+    def most(count: int) -> int:
+        few = count // READINGS_PER_FUNCTION < FUNCTIONS_OF_FEW
+        return min(count // READINGS_PER_FUNCTION_OF_FEW, FUNCTIONS_OF_FEW) if few else 0
+
+    return _smooth_functions(readings, most)
+
+
+def _smooth_functions(readings: Readings, most: Callable[[int], int]) -> Floats:
+    """So many functions of each channel and gear, by the number of its readings, (m, q)."""
     slip, load = _scaled(readings.slip), _scaled(np.log(readings.load))
     degrees = (
         min(SLIP_DEGREE, readings.slip_levels.count - 1),
@@ -36,8 +59,7 @@ def smooth_basis(readings: Readings) -> Floats:
     columns = []
     for channel, gear in product(range(len(readings.channels)), np.unique(readings.gear)):
         in_channel = (readings.channel == channel) & (readings.gear == gear)
-        most = int(in_channel.sum()) // READINGS_PER_FUNCTION
-        for i, j in _orders(*degrees)[:most]:
+        for i, j in _orders(*degrees)[: most(int(in_channel.sum()))]:
             basis = np.polynomial.legendre.Legendre.basis(i)(slip)
             basis = basis * np.polynomial.legendre.Legendre.basis(j)(load)
             std = np.median(readings.std[in_channel])

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Integers
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import FIXED_EFFECT_TOLERANCES, Covariance
-from soilml.numerics.subspaces import column_space
+from soilml.gap.evidence.covariance import Covariance, fixed_effects
 from soilml.quantities import Z_50
 
 #: Studentised residual above which a reading is an outlier: chance exceeds it once in 150 000
@@ -30,6 +29,7 @@ def outliers(
     space: Floats,
     replicate_group: Integers | None = None,
     run: Integers | None = None,
+    smooth: Floats | None = None,
 ) -> NDArray[np.bool_]:
     r"""Readings (m,) whose studentised residual is large, and which no repeat confirms.
 
@@ -45,10 +45,11 @@ def outliers(
         with it is a strange but repeatable response and no outlier.
     run (m,): Run of each reading. Where a group has several runs, only another
         run confirms a reading: neighbouring samples of one run may share a fault.
+    smooth (m, k): Smooth functions beside X, of channels with few readings.
     References: Cook and Weisberg, Residuals and Influence in Regression, 1982.
     """
     whiten = covariance.whiten
-    basis = column_space(whiten @ space, **FIXED_EFFECT_TOLERANCES)
+    basis = fixed_effects(whiten @ space, None if smooth is None else whiten @ smooth)
     white, explained = whiten @ residual, whiten.T @ basis
     projected = whiten.T @ (white - basis @ (basis.T @ white))  # P r
     diagonal = (whiten**2).sum(axis=0) - (explained**2).sum(axis=1)  # of P

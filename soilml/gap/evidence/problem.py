@@ -227,6 +227,24 @@ def restated(problem: FitProblem, fits: Sequence[Solution]) -> list[Solution]:
     return [one.at(x, raised(y)) for one, x, y in zip(own, points, found, strict=True)]
 
 
+#: Distance from a bound, as a fraction of the prior, at which a coordinate is at it.
+AT_BOUND = 1e-3
+
+
+def within_bounds(fit: Solution) -> Floats:
+    """The whitened Jacobian of a fit (m, k) without changes of the soil beyond its priors.
+
+    The columns of coordinates that the fit presses against a bound are zero: they cannot explain
+    what is left.
+    """
+    descent = fit.jacobian.T @ fit.residual
+    free = [
+        bool(c.effect) or (x - c.lower if slope < 0.0 else c.upper - x) >= AT_BOUND
+        for c, x, slope in zip(fit.coordinates, fit.x, descent, strict=True)
+    ]
+    return np.asarray(fit.jacobian * np.asarray(free, dtype=np.float64))
+
+
 def covariance_at(problem: FitProblem, fit: Solution, readings: Readings) -> Covariance:
     """The covariance of other readings, by the variance components of the problem."""
     components = problem.covariance.components

@@ -24,7 +24,7 @@ from soilml.gap.evidence.covariance import (
     estimate_covariance,
     run_effect_columns,
 )
-from soilml.gap.evidence.directions import smooth_basis
+from soilml.gap.evidence.directions import smooth_basis, smooth_basis_of_few
 from soilml.gap.evidence.outliers import (
     MAX_OUTLIER_FRACTION,
     OUTLIER_SIGMA,
@@ -36,7 +36,14 @@ from soilml.gap.evidence.score_test import ScoreTest
 from soilml.gap.search.explanation import Explanation, restated_candidates
 from soilml.gap.search.opened_priors import open_priors
 from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
-from soilml.gap.search.stepwise import ResidualTest, SearchResult, search, without_search
+from soilml.gap.search.stepwise import (
+    GAP_LEVEL,
+    ResidualTest,
+    SearchResult,
+    residual_test,
+    search,
+    without_search,
+)
 from soilml.physics.effects.base import Effect
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -46,6 +53,8 @@ from soilml.row_status import Status
 MAX_PASSES = 2
 #: Searches at most, each without the readings that strayed from the explanation of the last.
 OUTLIER_ROUNDS = 4
+#: Outliers that the reason for bad data states; its remark names all of them.
+OUTLIERS_STATED = 3
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the
@@ -131,8 +140,22 @@ def analyse(
             elif not (other.error or other.outliers or other.result.has_gap):
                 text = f"{opened.remark}, and the soil alone then agrees with the rows"
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
-                found = replace(found, opened=remark)
+                found = _explained_by_soil(replace(found, opened=remark), seed)
     return found
+
+
+def _explained_by_soil(found: Analysis, seed: int) -> Analysis:
+    """An analysis whose gap a soil outside the priors explains, without a search if it is all.
+
+    The gap is then one within the priors alone: what doubts them is no evidence of an effect.
+    """
+    result = found.result
+    signatures = result.soil_test.signatures
+    test = residual_test(found.problem, result.soil, signatures, seed)
+    if test.p_value < GAP_LEVEL:
+        return found
+    result = without_search(result.soil, test, result.untestable)
+    return replace(found, result=result, predictions={}, opened=None)
 
 
 def _first_with_opened(
@@ -205,19 +228,33 @@ def _without_outliers(
         again[~excluded] = _stray(found.problem, fit, found.result.final_test.signatures)
         count = int(np.count_nonzero(again))
         if count > MAX_OUTLIER_FRACTION * len(readings):
-            text = f"{count} readings are outliers: check the sensors first"
-            nothing = _no_result(found.result.soil)
-            return Analysis(problem, nothing, error=Remark("many-outliers", text))
+            error = _many_outliers(_names_of(readings, again, place))
+            return Analysis(problem, _no_result(found.result.soil), error=error)
         if not left or np.array_equal(again, excluded):
             break
         excluded = again
     if not excluded.any():
         return found
-    names = tuple(
-        f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
-        for i in np.flatnonzero(excluded)
-    )
+    names = _names_of(readings, excluded, place)
     return replace(found, outliers=names, excluded=excluded, of_all=of_all)
+
+
+def _names_of(
+    readings: Readings, selected: NDArray[np.bool_], place: Callable[[int], str]
+) -> tuple[str, ...]:
+    """The selected readings (m,) by channel and place."""
+    return tuple(
+        f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
+        for i in np.flatnonzero(selected)
+    )
+
+
+def _many_outliers(names: Sequence[str]) -> Remark:
+    """Why the readings of these names forbid an analysis; the text has the first of them."""
+    more = len(names) - OUTLIERS_STATED
+    text = f"{len(names)} readings are outliers: check the sensors first: "
+    text += ", ".join(names[:OUTLIERS_STATED]) + (f" and {more} more" if more > 0 else "")
+    return Remark("many-outliers", text, tuple(names))
 
 
 def _of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
@@ -299,7 +336,8 @@ def _with_estimated_covariance(
     space = _explained_space(problem, fit, signatures)
     residual = readings.measured - fit.prediction
     readings, columns = _with_noise_of_fit(problem, fit, residual, space)
-    covariance = estimate_covariance(readings, columns, residual, space)
+    smooth = smooth_basis_of_few(readings)
+    covariance = estimate_covariance(readings, columns, residual, space, smooth)
     return replace(problem, readings=readings, covariance=covariance)
 
 
@@ -340,14 +378,18 @@ def _stray(
 ) -> NDArray[np.bool_]:
     """The readings (m,) that stray from a fit, from what resembles it, and from smooth functions.
 
-    The last reading of a monotone series is none of them.
+    In channels with few readings they stray from both the few smooth functions of a test and the
+    larger number that separates rough from smooth. The last reading of a monotone series is none.
     """
     space = _explained_space(problem, fit, signatures)
     residual = problem.readings.measured - fit.prediction
     readings, columns = _with_noise_of_fit(problem, fit, residual, space)
     covariance = assemble_covariance(readings, columns, VarianceComponents.usual(readings))
     replicates = readings.replicates * len(readings.channels) + readings.channel
-    found = outliers(covariance, residual, space, replicates, readings.run[readings.row])
+    run, smooth = readings.run[readings.row], smooth_basis_of_few(readings)
+    found = outliers(covariance, residual, space, replicates, run)
+    if smooth.shape[1]:
+        found &= outliers(covariance, residual, space, replicates, run, smooth)
     return found & ~ends_of_monotone_series(readings)
 
 

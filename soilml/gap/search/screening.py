@@ -8,7 +8,7 @@ import numpy as np
 
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.evidence.problem import FitProblem, MarginalFit, within_bounds
 from soilml.gap.search.explanation import Explanation
 from soilml.numerics.subspaces import ROUNDING, project_out
 
@@ -62,7 +62,7 @@ def free_law_gains(
     gains = {}
     for s in signatures:
         columns = s.column[:, None] * np.column_stack([np.ones_like(slip), slip, load])
-        projected = project_out(whiten @ columns, fit.jacobian)
+        projected = project_out(whiten @ columns, within_bounds(fit))
         coefficient = np.linalg.lstsq(projected, fit.residual, rcond=ROUNDING)[0]
         possible = s.sign == 0 or coefficient[0] * s.sign > 0.0
         explained = float(np.sum((projected @ coefficient) ** 2))
@@ -78,7 +78,7 @@ def noise_only_gains(
     fit = fit.whitened_by(whiten)
     gains = {}
     for s in signatures:
-        column = project_out((whiten @ s.column)[:, None], fit.jacobian)[:, 0]
+        column = project_out((whiten @ s.column)[:, None], within_bounds(fit))[:, 0]
         power = float(column @ column)
         moment = float(column @ fit.residual)
         possible = power > 0.0 and (s.sign == 0 or moment * s.sign > 0.0)
@@ -90,8 +90,9 @@ def noise_only_gains(
 #: the largest in any case; the prediction is linear and can be wrong by that much.
 GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
 FITTED_BY_OWN_LAW = 6  # So many effects more: those that would explain most by a law of their own
-#: Beside a large discrepancy, so many effects more: those that explain most under noise alone.
-FITTED_HIDDEN = 6
+#: Beside a large discrepancy, so many effects more: those that explain most under noise alone, and
+#: those that explain at least this share of what the first of them does.
+FITTED_HIDDEN, HIDDEN_SHARE = 6, 0.8
 #: Amplitude, in usual ones, from which a discrepancy can hide an effect that explains it.
 LARGE_DISCREPANCY = 2.5
 #: Objective above that of the best candidate up to which shapes are estimated, sets extended, and
@@ -124,7 +125,10 @@ def effects_to_fit(
         _first(free_law_gains(problem, soil_alone, f, signatures)) for f in (soil_alone.fit, soil)
     ]
     if float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY:
-        ranked.append(_first(noise_only_gains(problem, soil, signatures), FITTED_HIDDEN))
+        hidden = noise_only_gains(problem, soil, signatures)
+        least = HIDDEN_SHARE * max(hidden.values(), default=0.0)
+        close = sum(gain > least for gain in hidden.values())
+        ranked.append(_first(hidden, max(FITTED_HIDDEN, close)))
     lowest = min((c.objective for c in starts.values()), default=0.0)
     single = [c for names, c in starts.items() if len(names) == 1]
     ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])

@@ -11,7 +11,13 @@ from soilml.arrays import Floats
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.directions import smooth_basis
-from soilml.gap.evidence.problem import FitProblem, MarginalFit, StartedFit, fit_marginal
+from soilml.gap.evidence.problem import (
+    FitProblem,
+    MarginalFit,
+    StartedFit,
+    fit_marginal,
+    within_bounds,
+)
 from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.gap.search.explanation import (
     CandidateRequest,
@@ -139,7 +145,7 @@ def search(
     """
     starts = starts or {}
     signatures, untestable = problem.signatures_and_untestable(soil)
-    soil_test = residual_test(problem, soil, signatures, seed)
+    soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
     if soil_test.p_value >= GAP_LEVEL:
         return without_search(soil, soil_test, untestable)
     progress(1 / STEPS)
@@ -325,13 +331,21 @@ class ResidualTest:
 
 
 def residual_test(
-    problem: FitProblem, fit: Solution, signatures: Sequence[Signature], seed: int
+    problem: FitProblem,
+    fit: Solution,
+    signatures: Sequence[Signature],
+    seed: int,
+    *,
+    within_priors: bool = False,
 ) -> ResidualTest:
     """Test the residuals of a fit against noise, scatter and the declared discrepancy, if any.
 
     All that the coordinates of the fit can explain is projected out, with second-order terms in
     the laws of its effects; see `soilml.gap.search.explanation.shape_directions`. What another
     soil could explain is, with tests of the soil, what these permit.
+
+    within_priors: Do not project out coordinates of the soil that the fit presses against a bound:
+        a soil that the priors exclude explains nothing.
     """
     whiten = problem.discrepancy.whiten(problem.declared_amplitude)
     fit = fit.whitened_by(whiten)
@@ -339,7 +353,8 @@ def residual_test(
     columns = whiten @ np.column_stack([*[s.column for s in signatures], smooth])
     signs = np.asarray([s.sign for s in signatures] + [0] * smooth.shape[1], dtype=np.float64)
     directions = [whiten @ columns for columns in shape_directions(problem, fit)]
-    space = np.column_stack([fit.jacobian, *directions])
+    jacobian = within_bounds(fit) if within_priors else fit.jacobian
+    space = np.column_stack([jacobian, *directions])
     # tests of the soil are residuals that no effect changes: a change of the soil costs something
     deviation, rates = fit.soil_tests.deviation(fit.x), fit.soil_tests.rates(fit.x)
     tests, k = len(deviation), len(fit.x)

@@ -125,8 +125,10 @@ def test_more_than_a_tenth_of_outliers_is_bad_data(passes, count, too_many):
     assert len(READINGS) == 96
     given.outliers = [list(range(count))]
     found, _ = run()
-    said = f"{count} readings are outliers: check the sensors first"
+    names = [f"torque_Nm at row {row}" for row in range(3)]
+    said = f"{count} readings are outliers: check the sensors first: {', '.join(names)} and 7 more"
     assert str(found.error) == (said if too_many else "None")
+    assert not too_many or len(found.error.about) == count
     assert (found.outliers == ()) == too_many
 
 
@@ -160,6 +162,7 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
         "restated_candidates": lambda *_: {},
         "restated": lambda *_: [SimpleNamespace(x=np.full(3, 0.5))],
         "explains_better": lambda *_: better,
+        "_explained_by_soil": lambda found, _: found,
     }.items():
         monkeypatch.setattr(analysis, name, value)
     found, _ = run()

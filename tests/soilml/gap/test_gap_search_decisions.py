@@ -242,7 +242,7 @@ def searched(monkeypatch):
         return {(*c.names, "abc"[len(c.names)]): c for c in level}
 
     for name, value in {
-        "residual_test": lambda *_: SimpleNamespace(p_value=seen.p_value),
+        "residual_test": lambda *_, **_kw: SimpleNamespace(p_value=seen.p_value),
         "_fit_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
         "effects_to_fit": lambda *_, **__: ["a"],
