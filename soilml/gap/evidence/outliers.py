@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats, Integers
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.covariance import Covariance, fixed_effects
-from soilml.quantities import Z_50
+from soilml.quantities import Z_50, column
+from soilml.remarks import Remark
 
 #: Studentised residual above which a reading is an outlier: chance exceeds it once in 150 000
 #: readings.
@@ -118,3 +121,25 @@ def ends_of_monotone_series(readings: Readings) -> NDArray[np.bool_]:
                 if (sign * change > -noise).all() and sign * change[-1] > 0.0:
                     found[own[-1]] = True
     return found
+
+
+#: Outliers that the reason for bad data states; its remark names all of them.
+OUTLIERS_STATED = 3
+
+
+def names_of(
+    readings: Readings, selected: NDArray[np.bool_], place: Callable[[int], str]
+) -> tuple[str, ...]:
+    """The selected readings (m,) by channel and place."""
+    return tuple(
+        f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
+        for i in np.flatnonzero(selected)
+    )
+
+
+def many_outliers(names: Sequence[str]) -> Remark:
+    """Why the readings of these names forbid an analysis; the text has the first of them."""
+    more = len(names) - OUTLIERS_STATED
+    text = f"{len(names)} readings are outliers: check the sensors first: "
+    text += ", ".join(names[:OUTLIERS_STATED]) + (f" and {more} more" if more > 0 else "")
+    return Remark("many-outliers", text, tuple(names))

@@ -29,6 +29,8 @@ from soilml.gap.evidence.outliers import (
     MAX_OUTLIER_FRACTION,
     OUTLIER_SIGMA,
     ends_of_monotone_series,
+    many_outliers,
+    names_of,
     outliers,
 )
 from soilml.gap.evidence.problem import FitProblem, covariance_at, restated
@@ -45,7 +47,6 @@ from soilml.gap.search.stepwise import (
     without_search,
 )
 from soilml.physics.effects.base import Effect
-from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.row_status import Status
 
@@ -53,8 +54,6 @@ from soilml.row_status import Status
 MAX_PASSES = 2
 #: Searches at most, each without the readings that strayed from the explanation of the last.
 OUTLIER_ROUNDS = 4
-#: Outliers that the reason for bad data states; its remark names all of them.
-OUTLIERS_STATED = 3
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the
@@ -228,33 +227,15 @@ def _without_outliers(
         again[~excluded] = _stray(found.problem, fit, found.result.final_test.signatures)
         count = int(np.count_nonzero(again))
         if count > MAX_OUTLIER_FRACTION * len(readings):
-            error = _many_outliers(_names_of(readings, again, place))
+            error = many_outliers(names_of(readings, again, place))
             return Analysis(problem, _no_result(found.result.soil), error=error)
         if not left or np.array_equal(again, excluded):
             break
         excluded = again
     if not excluded.any():
         return found
-    names = _names_of(readings, excluded, place)
+    names = names_of(readings, excluded, place)
     return replace(found, outliers=names, excluded=excluded, of_all=of_all)
-
-
-def _names_of(
-    readings: Readings, selected: NDArray[np.bool_], place: Callable[[int], str]
-) -> tuple[str, ...]:
-    """The selected readings (m,) by channel and place."""
-    return tuple(
-        f"{column(readings.channels[readings.channel[i]])} at {place(int(readings.row[i]))}"
-        for i in np.flatnonzero(selected)
-    )
-
-
-def _many_outliers(names: Sequence[str]) -> Remark:
-    """Why the readings of these names forbid an analysis; the text has the first of them."""
-    more = len(names) - OUTLIERS_STATED
-    text = f"{len(names)} readings are outliers: check the sensors first: "
-    text += ", ".join(names[:OUTLIERS_STATED]) + (f" and {more} more" if more > 0 else "")
-    return Remark("many-outliers", text, tuple(names))
 
 
 def _of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
