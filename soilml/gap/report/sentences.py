@@ -93,9 +93,7 @@ def headline(report: GapReport) -> str:
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
             pattern = format_p_value(report.p_gap).replace("\N{NO-BREAK SPACE}", " ")
-            size = (
-                f"mean squared residual {_before(report)}; noise gives 1, such a pattern {pattern}"
-            )
+            size = f"mean squared residual {_before(report)}; noise alone gives 1; {pattern}"
             return f"There is a gap{which} ({size})."
         case "suspected":
             first = report.suspects[0] if report.suspects else None

@@ -112,7 +112,7 @@ def test_an_implausibly_large_fault_is_named_in_the_headline():
     fault = Remark("implausible-fault", "...", ("drawbar-offset",))
     assert said("unknown", reasons=(fault,)) == (
         "There is a gap, which only an implausibly large drawbar-offset explains (mean squared "
-        "residual 8.80; noise gives 1, such a pattern p = 0.12)."
+        "residual 8.80; noise alone gives 1; p = 0.12)."
     )
 
 
