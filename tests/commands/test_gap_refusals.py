@@ -109,7 +109,10 @@ OPTIONS = {
     "cost of nothing": (["--cost", "reverse=0"], "needed is a number above zero"),
     "checked physics": (["--checked", "bulldozing=1"], "needed is EFFECT=STD, with one of"),
     "checked nonsense": (["--checked", "mood=1"], "needed is EFFECT=STD, with one of"),
-    "checked without value": (["--checked", "torque-gain"], "must be a number above zero"),
+    "checked without value": (
+        ["--checked", "torque-gain"],
+        "needed is EFFECT=STD, as in torque-gain=",
+    ),
     "checked to nothing": (["--checked", "torque-gain=0"], "must be a number above zero"),
     "checked to text": (["--checked", "torque-gain=good"], "must be a number above zero"),
     "checked to infinity": (["--checked", "torque-gain=inf"], "must be a number above zero"),

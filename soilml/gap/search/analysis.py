@@ -160,9 +160,9 @@ def _explained_by_soil(found: Analysis, seed: int) -> Analysis:
 def _first_with_opened(
     problem: FitProblem, found: Analysis, seed: int, place: Callable[[int], str]
 ) -> Analysis:
-    """The analysis with opened priors by the promising explanations alone, without outliers.
+    """The analysis with opened priors by single effects and the likeliest sets, without outliers.
 
-    Where the priors are opened, the likeliest within them remain so, or one that gains most does.
+    If none of them explains far more, sets that extend them seldom do.
     """
     if found.excluded is not None:
         problem = _of_readings(problem, ~found.excluded)

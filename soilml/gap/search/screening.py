@@ -136,15 +136,13 @@ def effects_to_fit(
     return [name for name in names if name in gains]
 
 
-#: Candidates of an earlier search, and effects by their gains, that a first look takes.
-FIRST_CANDIDATES, FIRST_GAINS = 4, 3
+FIRST_CANDIDATES = 4  # Candidates of an earlier search that a first look takes
 
 
-def promising_sets(gains: Mapping[str, float], starts: Starts) -> list[tuple[str, ...]]:
-    """The likeliest candidates of an earlier search, and the effects of the largest gains."""
+def likeliest_sets(starts: Starts) -> list[tuple[str, ...]]:
+    """The likeliest candidates of an earlier search."""
     ranked = sorted((c.objective, names) for names, c in starts.items() if names)
-    likeliest = [names for _, names in ranked[:FIRST_CANDIDATES]]
-    return list(dict.fromkeys([*likeliest, *((n,) for n in _first(gains, FIRST_GAINS))]))
+    return [names for _, names in ranked[:FIRST_CANDIDATES]]
 
 
 def _largest_gains(gains: Mapping[str, float]) -> list[str]:

@@ -33,9 +33,9 @@ from soilml.gap.search.screening import (
     WITHIN_REACH,
     Starts,
     effects_to_fit,
+    likeliest_sets,
     predicted_gains,
     predicted_with_and_without,
-    promising_sets,
 )
 from soilml.remarks import Remark
 
@@ -141,7 +141,7 @@ def search(
     soil: The soil alone, fitted under noise and scatter without discrepancy.
     starts: Candidates of an earlier search.
     progress: Called with the share of the search that is done, from 0 to 1.
-    promising: Fit only the likeliest of `starts`, and the effects with the largest predicted gains.
+    promising: Fit single effects and the likeliest of `starts`, and extend none of them.
     """
     starts = starts or {}
     signatures, untestable = problem.signatures_and_untestable(soil)
@@ -152,11 +152,10 @@ def search(
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
     fitted: dict[tuple[str, ...], Explanation] = {(): soil_alone}
+    singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+    selected: list[tuple[str, ...]] = [(name,) for name in singles]
     if promising:
-        selected = promising_sets(gains, starts)
-    else:
-        singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-        selected = [(name,) for name in singles]
+        selected = list(dict.fromkeys([*likeliest_sets(starts), *selected]))
     level = _fit_level(problem, soil, soil_alone, dict.fromkeys(selected, soil_alone), starts)
     fitted |= {c.names: c for c in level}
     again = _from_soils_of(problem, soil_alone, level)
