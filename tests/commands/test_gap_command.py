@@ -315,7 +315,6 @@ def test_no_decision_is_made_from_the_words_of_a_remark(
 
 
 def test_a_calibration_without_a_number_says_how_it_is_written():
-
     with pytest.raises(InputError, match=r"needed is EFFECT=STD, as in torque-gain=0\.003"):
         _calibration(["torque-gain"], EFFECTS)
     with pytest.raises(InputError, match="must be a number above zero"):

@@ -227,7 +227,7 @@ def restated(problem: FitProblem, fits: Sequence[Solution]) -> list[Solution]:
     return [one.at(x, raised(y)) for one, x, y in zip(own, points, found, strict=True)]
 
 
-#: Distance from a bound, as a fraction of the prior, at which a coordinate is at it.
+#: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
 AT_BOUND = 1e-3
 
 

@@ -12,11 +12,7 @@ from typing import Any
 
 from soilml.gap.report.gap_figure import gap_bars
 from soilml.gap.report.prediction_curves import prediction_curves
-from soilml.gap.report.results import (
-    STATUSES,
-    EstimatedValue,
-    GapReport,
-)
+from soilml.gap.report.results import STATUSES, EstimatedValue, GapReport
 from soilml.gap.report.sentences import likelier_than_first, needed_sizes
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS

@@ -147,8 +147,8 @@ class NoiseAgreement:
 
     Both are of the readings that were not excluded as outliers. `declared` is that under the
     declared noise, as `identify` states it where none was excluded; `exceeds_noise` whether noise
-    alone would exceed it with a probability below 0.001. `granted` is that
-    under noise, and scatter of the soil from run to run by these standard deviations.
+    alone would exceed it with a probability below 0.001. `granted` is that under noise, and scatter
+    of the soil from run to run by these standard deviations.
     """
 
     declared: float

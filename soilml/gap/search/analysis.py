@@ -107,7 +107,7 @@ def analyse(
     """Search for the effects that explain what the soil alone does not.
 
     Where the soil presses against its priors, the search is repeated with these opened; it counts
-    where it explains the readings far better, which a first look at few explanations tells. Where
+    where it explains the readings far better, which a first look tells. Where
     the soil alone then leaves no gap, that speaks against a cause.
 
     `place` gives the file and line of a row, for messages; `progress` is called with the share that
@@ -166,7 +166,7 @@ def _first_with_opened(
     """
     if found.excluded is not None:
         problem = _of_readings(problem, ~found.excluded)
-    return _search_in_passes(problem, seed, place, lambda _: None, found.result, promising=True)[0]
+    return _search_in_passes(problem, seed, place, lambda _: None, found.result, first_look=True)[0]
 
 
 def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bool:
@@ -251,11 +251,11 @@ def _search_in_passes(
     progress: Callable[[float], None],
     earlier: SearchResult | None,
     *,
-    promising: bool = False,
+    first_look: bool = False,
 ) -> tuple[Analysis, Solution]:
     """Covariance and search in turn, and the best fit; see `_without_outliers`.
 
-    promising: See `search`; one pass shows what it is for.
+    first_look: See `search`; one pass shows what it is for.
     """
     free, starts = problem.soil, restated_candidates(problem, earlier.candidates if earlier else ())
     first = np.asarray([f.prior.fraction(f.nominal) for f in free])
@@ -278,10 +278,10 @@ def _search_in_passes(
         if result.accepted and _have_converged(last, problem.covariance.components):
             break
         soil = problem.fit_soil([soil.x], soil.linearisation)
-        result = search(problem, soil, seed, starts, _in_pass(number, progress), promising)
+        result = search(problem, soil, seed, starts, _in_pass(number, progress), first_look)
         starts = {c.names: c for c in result.candidates}
         best = result.accepted[0].fit if result.accepted else soil
-        if promising or not result.accepted:
+        if first_look or not result.accepted:
             break
     return Analysis(problem, result), best
 

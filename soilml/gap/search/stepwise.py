@@ -130,7 +130,7 @@ def search(
     seed: int,
     starts: Starts | None = None,
     progress: Callable[[float], None] = lambda _: None,
-    promising: bool = False,
+    first_look: bool = False,
 ) -> SearchResult:
     """Search for the effects that explain what the soil alone does not.
 
@@ -141,7 +141,7 @@ def search(
     soil: The soil alone, fitted under noise and scatter without discrepancy.
     starts: Candidates of an earlier search.
     progress: Called with the share of the search that is done, from 0 to 1.
-    promising: Fit single effects and the likeliest of `starts`, and extend none of them.
+    first_look: Fit single effects and the likeliest of `starts`, and extend none of them.
     """
     starts = starts or {}
     signatures, untestable = problem.signatures_and_untestable(soil)
@@ -154,7 +154,7 @@ def search(
     fitted: dict[tuple[str, ...], Explanation] = {(): soil_alone}
     singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
     selected: list[tuple[str, ...]] = [(name,) for name in singles]
-    if promising:
+    if first_look:
         selected = list(dict.fromkeys([*likeliest_sets(starts), *selected]))
     level = _fit_level(problem, soil, soil_alone, dict.fromkeys(selected, soil_alone), starts)
     fitted |= {c.names: c for c in level}
@@ -162,7 +162,7 @@ def search(
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
         soil_alone = fitted[()] = again
-    for effects in range(1, 1 if promising else MAX_EFFECTS):
+    for effects in range(1, 1 if first_look else MAX_EFFECTS):
         progress((1 + effects) / STEPS)
         best = min(fitted.values(), key=lambda c: c.objective)
         if best.names and _is_complete(problem, best, seed):

@@ -16,7 +16,7 @@ from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.covariance import FEW_RUNS
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.evidence.problem import AT_BOUND, FitProblem, MarginalFit
 from soilml.gap.evidence.repeats import overstated_noise_notes
 from soilml.gap.evidence.score_test import SignatureSimilarity
 from soilml.gap.report.results import (
@@ -39,8 +39,6 @@ from soilml.report.numbers import format_quantity
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 LISTED_SUSPECTS = 8  # Suspects that are listed
-#: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
-AT_BOUND = 1e-3
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
 
 

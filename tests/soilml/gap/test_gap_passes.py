@@ -46,7 +46,7 @@ def passes(monkeypatch):
     def far_from(problem, fit, readings):
         return np.asarray([not given.explained for _ in range(len(readings))])
 
-    def search(problem, soil, seed, starts, progress, promising):
+    def search(problem, soil, seed, starts, progress, first_look):
         progress(0.5)
         given.starts.append(sorted(starts))
         names = given.accepted[len(given.starts) - 1]
