@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from soilml.fitting.predictions import (
     predict_many,
 )
 
+T = TypeVar("T")
+
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 25
 #: A descent has converged where the linearised model promises to lower the objective by less than
@@ -27,6 +29,9 @@ MAX_ITERATIONS = 25
 #: than the fraction `SHARE` of its excess over the number of readings (while the model is far from
 #: the data); and where the best of several steps lowers it by less than `ENOUGH` or `STEP_SHARE`.
 ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
+#: A descent that creeps has converged too: so many iterations have together lowered the objective
+#: by less than the first figure, or by less than this share of its excess.
+CREEPING, CREEPING_ENOUGH, CREEPING_SHARE = 4, 0.15, 2e-3
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several.
 KEPT_PROMISE = 0.5
@@ -86,11 +91,9 @@ class DampedSteps:
 
         It is zero where the bounds hold every coordinate.
         """
-        descent = self._descent(x, residual, jacobian)
-        normal = self._normal(x, jacobian.T @ jacobian)
-        damped = normal + LEAST_DAMPING * np.diag(np.diag(normal) + LEAST_SCALE)
-        step = bounded_step(damped, descent, self._free(x, descent), *self._ends(x))
-        return float(2.0 * descent @ step - step @ normal @ step)
+        normal, descent = self._normal(x, jacobian.T @ jacobian), jacobian.T @ residual
+        step, descent = self._steps(x[None], descent[None], normal[None], np.full(1, LEAST_DAMPING))
+        return float(2.0 * descent[0] @ step[0] - step[0] @ normal @ step[0])
 
     def from_points(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
         r"""Where damped steps lead from several points, (b, p).
@@ -106,15 +109,25 @@ class DampedSteps:
         jacobian (m, p): Whitened derivatives of the readings, the same for all points.
         damping (b,): Factor lambda of each step.
         """
-        moved, gram = np.empty_like(x), jacobian.T @ jacobian
-        for i, point in enumerate(x):
-            normal = self._normal(point, gram)
-            descent = self._descent(point, residual[i], jacobian)
-            free = self._free(point, descent)
-            damped = normal + damping[i] * np.diag(np.diag(normal) + LEAST_SCALE)
-            step = bounded_step(damped, descent, free, *self._ends(point))
-            moved[i] = self.moved(point, step)
-        return self.within(moved)
+        gram = jacobian.T @ jacobian
+        normal = np.stack([self._normal(point, gram) for point in x])
+        return self.within(self.moved(x, self._steps(x, residual @ jacobian, normal, damping)[0]))
+
+    def _steps(
+        self, x: Floats, of_readings: Floats, normal: Floats, damping: Floats
+    ) -> tuple[Floats, Floats]:
+        """Damped steps (b, p) from points (b, p), and half the negative gradient (b, p) there.
+
+        of_readings (b, p): Half the negative gradient of what the readings contribute.
+        normal (b, p, p): Half the curvature of the linearised objective at each point.
+        """
+        descent = of_readings - self.precision * (x - self.centre) - self._of_tests(x)
+        held = ((x <= self.lower) & (descent < 0)) | ((x >= self.upper) & (descent > 0))
+        diagonal = np.arange(x.shape[1])
+        damped = normal.copy()
+        own = normal[:, diagonal, diagonal] + LEAST_SCALE
+        damped[:, diagonal, diagonal] += damping[:, None] * own
+        return bounded_steps(damped, descent, ~held, *self._ends(x)), descent
 
     def between(self, x: Floats, to: Floats) -> Floats:
         """The step (p,) from coordinates (p,) to others; see `moved`."""
@@ -131,37 +144,33 @@ class DampedSteps:
             normal += of_tests.T @ of_tests
         return np.asarray(normal)
 
-    def _descent(self, x: Floats, residual: Floats, jacobian: Floats) -> Floats:
-        """Half the negative gradient of the objective, (p,)."""
-        of_tests = self.tests.rates(x).T @ self.tests.deviation(x)
-        return np.asarray(jacobian.T @ residual - self.precision * (x - self.centre) - of_tests)
-
-    def _free(self, x: Floats, descent: Floats) -> NDArray[np.bool_]:
-        """The coordinates that no bound holds, (p,)."""
-        held = ((x <= self.lower) & (descent < 0)) | ((x >= self.upper) & (descent > 0))
-        return np.asarray(~held)
+    def _of_tests(self, x: Floats) -> Floats | float:
+        """Half the gradient of what the tests of the soil contribute, at points (b, p)."""
+        if self.tests.case is None or not self.tests.case.soil_tests:
+            return 0.0
+        return np.stack([self.tests.rates(one).T @ self.tests.deviation(one) for one in x])
 
     def moved(self, x: Floats, step: Floats) -> Floats:
-        """Coordinates (p,) after steps (p,): those that move by ratios follow an exponential."""
+        """Coordinates (..., p) after steps: those that move by ratios follow an exponential."""
         multiple = x + self.offset
         with np.errstate(invalid="ignore"):
             growth = np.expm1(np.minimum(step / multiple, MOST_LOG_STEP))
             return np.where(np.isfinite(multiple), x + multiple * growth, x + step)
 
     def _ends(self, x: Floats) -> tuple[Floats, Floats]:
-        """The steps (p,) from coordinates within the bounds to the lower and to the upper ones."""
-        low, high, multiple = self.lower - x, self.upper - x, x + self.offset
-        by_ratio = np.isfinite(multiple)
-        of = multiple[by_ratio]
-        low[by_ratio] = of * np.log1p(low[by_ratio] / of)
-        high[by_ratio] = of * np.minimum(np.log1p(high[by_ratio] / of), MOST_LOG_STEP)
+        """The steps (b, p) from coordinates (b, p) to the lower and to the upper bounds."""
+        low, high = self.lower - x, self.upper - x
+        by_ratio = np.isfinite(self.offset)
+        of = x[:, by_ratio] + self.offset[by_ratio]
+        low[:, by_ratio] = of * np.log1p(low[:, by_ratio] / of)
+        high[:, by_ratio] = of * np.minimum(np.log1p(high[:, by_ratio] / of), MOST_LOG_STEP)
         return low, high
 
 
-def bounded_step(
+def bounded_steps(
     normal: Floats, descent: Floats, free: NDArray[np.bool_], low: Floats, high: Floats
 ) -> Floats:
-    r"""Step of the free coordinates that lowers a quadratic function between bounds, (p,).
+    r"""Steps of the free coordinates that lower quadratic functions between bounds, (b, p).
 
     .. math:: \tfrac{1}{2}\, \Delta u^T N\, \Delta u - d^T \Delta u
 
@@ -169,31 +178,32 @@ def bounded_step(
     go on to the minimum that belongs to it. To leave coordinates outside their bounds and move them
     back afterwards would leave the valley of a function whose minimum lies far outside.
 
-    normal (p, p), descent (p,): N and d.
-    low, high (p,): Bounds of the step, around zero.
+    normal (b, p, p), descent (b, p): N and d of each function.
+    free (b, p): The coordinates that move.
+    low, high (b, p): Bounds of the step, around zero.
 
     References: Nocedal and Wright, Numerical Optimization, 2006, section 16.5 (active sets).
     """
-    if free.all():  # most steps meet no bound
-        step = np.linalg.solve(normal, descent)
-        if ((step >= low) & (step <= high)).all():
-            return np.asarray(step)
-    step, free = np.zeros(len(descent)), free.copy()
-    while free.any():
-        index = np.flatnonzero(free)
-        left = descent[index] - normal[index] @ np.where(free, 0.0, step)
-        change = np.linalg.solve(normal[np.ix_(index, index)], left) - step[index]
-        room = np.where(change < 0.0, low[index], high[index]) - step[index]
-        beyond = np.abs(change) > np.abs(room)
+    step, free = np.zeros_like(descent), free.copy()
+    each, identity = np.arange(len(descent)), np.eye(descent.shape[1])
+    while True:
+        # the step of a coordinate that is not free stays what it is
+        moving = free[:, :, None] & free[:, None, :]
+        fixed = np.where(free, 0.0, step)
+        left = np.where(free, descent - (normal @ fixed[:, :, None])[:, :, 0], fixed)
+        change = np.linalg.solve(np.where(moving, normal, identity), left[:, :, None])[:, :, 0]
+        change -= step
+        room = np.where(change < 0.0, low, high) - step
+        beyond = free & (np.abs(change) > np.abs(room))
         if not beyond.any():
-            step[index] += change
-            break
+            return np.asarray(step + change)
         share = np.where(beyond, room / np.where(beyond, change, 1.0), 1.0)
-        first = int(np.argmin(share))
-        step[index] += share[first] * change
-        step[index[first]] = (low if change[first] < 0.0 else high)[index[first]]
-        free[index[first]] = False
-    return step
+        first = share.argmin(axis=1)
+        step = step + share[each, first, None] * change
+        met = each[beyond.any(axis=1)]
+        at = met, first[met]
+        step[at] = np.where(change[at] < 0.0, low[at], high[at])
+        free[at] = False
 
 
 def _offset(coordinate: Coordinate) -> float:
@@ -232,38 +242,47 @@ def descend_together(
 
     References: Nocedal and Wright, Numerical Optimization, 2006, section 10.3.
     """
-    results: dict[int, Solution | InputError] = {}
     near = known or [None] * len(problems)
-    descents = [_descent(*own) for own in zip(problems, starts, near, strict=True)]
-    asked: dict[int, _Question] = {}
-    answers: dict[int, Any] = dict.fromkeys(range(len(problems)))
-    while answers:
-        for i, answer in answers.items():
-            asked.pop(i, None)
-            if isinstance(answer, InputError):
-                results[i] = answer
-                continue
-            try:
-                asked[i] = descents[i].send(answer)
-            except StopIteration as end:
-                results[i] = end.value
-        answers = _answers(asked) if asked else {}
-    return [results[i] for i in range(len(problems))]
+    return in_step([descent(*own) for own in zip(problems, starts, near, strict=True)])
 
 
 @dataclass(frozen=True)
-class _Question:
+class ModelQuestion:
     """What a descent asks of the model: predictions, or a linearisation."""
 
     request: PredictionRequest
     linearise: bool
 
 
-#: A descent: asks questions, is sent the answers, and returns its fit.
-_Descent: TypeAlias = Generator[_Question, Any, Solution]
+#: Work that asks questions of the model, is sent the answers, and returns what it found. It may be
+#: several descents, one after the other.
+Asking: TypeAlias = Generator[ModelQuestion, Any, T]
 
 
-def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation | InputError]:
+def in_step(works: Sequence[Asking[T]]) -> list[T | InputError]:
+    """What works return that go on in step, so that each call of the model serves all.
+
+    The `InputError` of a question that the model refuses is raised where it was asked; one that is
+    not caught there takes the place of the result.
+    """
+    results: dict[int, T | InputError] = {}
+    asked: dict[int, ModelQuestion] = {}
+    answers: dict[int, Any] = dict.fromkeys(range(len(works)))
+    while answers:
+        for i, answer in answers.items():
+            asked.pop(i, None)
+            refused = isinstance(answer, InputError)
+            try:
+                asked[i] = works[i].throw(answer) if refused else works[i].send(answer)
+            except StopIteration as end:
+                results[i] = end.value
+            except InputError as error:
+                results[i] = error
+        answers = _answers(asked) if asked else {}
+    return [results[i] for i in range(len(works))]
+
+
+def _answers(asked: Mapping[int, ModelQuestion]) -> dict[int, Floats | Linearisation | InputError]:
     """The answers to the questions of one kind, predictions first.
 
     Descents that ask for a linearisation wait until all do, so that one call serves them.
@@ -275,7 +294,9 @@ def _answers(asked: Mapping[int, _Question]) -> dict[int, Floats | Linearisation
     return dict(zip(these, answer([asked[i].request for i in these]), strict=True))
 
 
-def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation | None) -> _Descent:
+def descent(
+    problem: LeastSquaresProblem, start: Floats, known: Linearisation | None = None
+) -> Asking[Solution]:
     """One descent; see `descend_together`.
 
     As long as the linearised model keeps its promise, each iteration is one step, at the end of
@@ -287,23 +308,28 @@ def _descent(problem: LeastSquaresProblem, start: Floats, known: Linearisation |
     """
     steps = DampedSteps.of(problem)
 
-    def at(last: Solution, x: Floats) -> _Question:
+    def at(last: Solution, x: Floats) -> ModelQuestion:
         sinkage = last.linearisation.sinkage_at((x - last.x)[None, :])
-        return _Question(problem.request(x[None, :], sinkage), linearise=True)
+        return ModelQuestion(problem.request(x[None, :], sinkage), linearise=True)
 
-    def trials(last: Solution, x: Floats) -> _Question:
+    def trials(last: Solution, x: Floats) -> ModelQuestion:
         sinkage = replace(last.linearisation.sinkage_at(x - last.x), nearest=True)
-        return _Question(problem.request(x, sinkage), linearise=False)
+        return ModelQuestion(problem.request(x, sinkage), linearise=False)
 
     x, repeated = steps.within(start), np.zeros((0, len(start)))
     if known is None or not np.array_equal(known.x, x):
-        known = yield _Question(problem.request(x[None, :]), linearise=True)
+        known = yield ModelQuestion(problem.request(x[None, :]), linearise=True)
     last = problem.at(x, known)
     damping, converged, trusted = FIRST_DAMPING, False, True
+    passed: list[float] = []  # the objectives that iterations began with
     for _ in range(MAX_ITERATIONS):
+        passed.append(last.objective)
         excess = last.objective - len(last.residual)
         promised = steps.promised(last.x, last.residual, last.jacobian)
-        converged = promised < max(ENOUGH, SHARE * excess)
+        creeps = passed[-1 - CREEPING :][0] - last.objective < max(
+            CREEPING_ENOUGH, CREEPING_SHARE * excess
+        )
+        converged = promised < max(ENOUGH, SHARE * excess) or (len(passed) > CREEPING and creeps)
         if converged:
             break
         if trusted:

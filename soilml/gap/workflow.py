@@ -29,7 +29,8 @@ from soilml.gap.evidence.holdout_split import HoldoutSplit, split_holdout
 from soilml.gap.evidence.order_trend import order_trends
 from soilml.gap.report.results import GapReport, NoiseAgreement
 from soilml.gap.report.sentences import headline, report_lines, unsupported_conclusions
-from soilml.gap.search.analysis import Analysis, analyse
+from soilml.gap.search.analysis import analyse
+from soilml.gap.search.passes import Analysis
 from soilml.gap.search.prediction import predictive_gains
 from soilml.gap.verdict.agreement import (
     hidden_effect,

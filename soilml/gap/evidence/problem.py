@@ -14,7 +14,7 @@ from soilml.errors import InputError, raised
 from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coordinate
 from soilml.fitting.covariance import Whitening, discrepancy_process
-from soilml.fitting.damped_descents import descend_together
+from soilml.fitting.damped_descents import Asking, descend_together, descent, in_step
 from soilml.fitting.effect_signatures import Signature, current_size, effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation, linearise_many
@@ -185,29 +185,19 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
     from there, the fit starts again with all effects at zero; where it refuses again, its
     `InputError` takes the place of the fit.
     """
+    return in_step([_fit(problem, fit) for fit in fits])
 
-    problems = [
-        LeastSquaresProblem(
-            fit.case,
-            fit.coordinates,
-            problem.readings,
-            problem.covariance.whiten if fit.whiten is None else fit.whiten,
+
+def _fit(problem: FitProblem, fit: StartedFit) -> Asking[Solution]:
+    """One fit; see `fit_many`."""
+    whiten = problem.covariance.whiten if fit.whiten is None else fit.whiten
+    own = LeastSquaresProblem(fit.case, fit.coordinates, problem.readings, whiten)
+    try:
+        return (
+            yield from descent(own, problem.first_coordinates(own.coordinates, fit.start), fit.near)
         )
-        for fit in fits
-    ]
-    found = descend_together(
-        problems,
-        [problem.first_coordinates(fit.coordinates, fit.start) for fit in fits],
-        [fit.near for fit in fits],
-    )
-    refused = [i for i, result in enumerate(found) if isinstance(result, InputError)]
-    again = descend_together(
-        [problems[i] for i in refused],
-        [_without_effects(fits[i].coordinates, fits[i].start) for i in refused],
-    )
-    for i, result in zip(refused, again, strict=True):
-        found[i] = result
-    return found
+    except InputError:
+        return (yield from descent(own, _without_effects(own.coordinates, fit.start)))
 
 
 def restated(problem: FitProblem, fits: Sequence[Solution]) -> list[Solution]:
@@ -305,36 +295,37 @@ def fit_marginal(
 
     Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
     are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
-    above the lowest of them, and `lowest`, that of an earlier fit.
+    above the lowest so far, and `lowest`, that of an earlier fit. All share the calls of the model.
     """
-    found: list[MarginalFit | None] = [None] * len(requests)
-    waiting = dict(enumerate(requests))
+    best = [lowest]
+    found = in_step([_marginal(problem, *request, best) for request in requests])
+    return [None if isinstance(fit, InputError) else fit for fit in found]
+
+
+def _marginal(
+    problem: FitProblem, start: StartedFit, amplitude: Floats, best: list[float]
+) -> Asking[MarginalFit | None]:
+    """One fit with its evidence; see `fit_marginal`.
+
+    best: The lowest evidence of all fits so far, which this one may lower.
+    """
+    found: MarginalFit | None = None
     for _ in range(MAX_ROUNDS):
-        started = [
-            replace(fit, whiten=problem.discrepancy.whiten(amplitude))
-            for fit, amplitude in waiting.values()
-        ]
-        fits = fit_many(problem, started)
-        again = {}
-        for (i, (request, amplitude)), fit in zip(waiting.items(), fits, strict=True):
-            if isinstance(fit, InputError):
-                continue
-            evidence = problem.discrepancy.evidence(fit, amplitude)
-            if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
-                continue
-            earlier = found[i]
-            found[i] = MarginalFit(fit, evidence, earlier.first if earlier else fit)
-            lowest = min(lowest, evidence.value)
-            if _changed(amplitude, evidence.amplitude):
-                request = replace(request, start=fit.start_values(), near=fit.linearisation)
-                again[i] = request, evidence.amplitude
-        waiting = {}
-        for i, repeated in again.items():
-            marginal = found[i]
-            if marginal is not None and marginal.evidence.value < lowest + HOPELESS:
-                waiting[i] = repeated
-        if not waiting:
+        whiten = problem.discrepancy.whiten(amplitude)
+        try:
+            fit = yield from _fit(problem, replace(start, whiten=whiten))
+        except InputError:
             break
+        evidence = problem.discrepancy.evidence(fit, amplitude)
+        if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
+            break
+        found = MarginalFit(fit, evidence, found.first if found else fit)
+        best[0] = min(best[0], evidence.value)
+        hopeless = evidence.value >= best[0] + HOPELESS
+        if hopeless or not _changed(amplitude, evidence.amplitude):
+            break
+        start = replace(start, start=fit.start_values(), near=fit.linearisation)
+        amplitude = evidence.amplitude
     return found
 
 

@@ -1,65 +1,28 @@
-"""The analysis: covariance, outliers, fit of the soil and search for effects, iterated."""
+"""The analysis: a search within the priors of the soil, and beyond them where that matters."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
-
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.covariance import noise_of_operation
-from soilml.fitting.effect_signatures import Signature
-from soilml.fitting.least_squares import Solution
-from soilml.fitting.predictions import forces, predict
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import (
-    RUN_EFFECT_UNITS,
-    Covariance,
-    VarianceComponents,
-    assemble_covariance,
-    estimate_covariance,
-    run_effect_columns,
-)
-from soilml.gap.evidence.directions import smooth_basis, smooth_basis_of_few
-from soilml.gap.evidence.outliers import (
-    MAX_OUTLIER_FRACTION,
-    OUTLIER_SIGMA,
-    ends_of_monotone_series,
-    many_outliers,
-    names_of,
-    outliers,
-)
-from soilml.gap.evidence.problem import FitProblem, covariance_at, restated
-from soilml.gap.evidence.score_test import ScoreTest
-from soilml.gap.search.explanation import Explanation, restated_candidates
+from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.opened_priors import open_priors
-from soilml.gap.search.prediction import Predictions, predict_with, predictive_gains
-from soilml.gap.search.stepwise import (
-    GAP_LEVEL,
-    ResidualTest,
-    SearchResult,
-    residual_test,
-    search,
-    without_search,
+from soilml.gap.search.passes import (
+    Analysis,
+    begin,
+    declared_covariance,
+    of_readings,
+    without_outliers,
 )
+from soilml.gap.search.prediction import predict_with, predictive_gains
+from soilml.gap.search.residual_test import residual_test
+from soilml.gap.search.stepwise import GAP_LEVEL, is_complete, without_search
 from soilml.physics.effects.base import Effect
-from soilml.remarks import Remark
-from soilml.row_status import Status
 
-#: Passes of covariance, outliers and search; each uses the residuals of the best fit of the last.
-MAX_PASSES = 2
-#: Searches at most, each without the readings that strayed from the explanation of the last.
-OUTLIER_ROUNDS = 4
-#: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
-SOIL_STARTS = (0.5, 0.25)
-#: Variance components have converged when noise scales differ by less than this fraction and the
-#: run-to-run standard deviations by less than this many units: weights of the readings then differ
-#: by less than their estimation error.
-SCALE_TOLERANCE, RUN_EFFECT_TOLERANCE = 0.2, 0.3
 #: Code of the remark that no effect is needed where the priors of the soil are opened.
 OUTSIDE_PRIORS = "soil-outside-priors"
 #: Decrease of the objective from which an analysis with opened priors replaces the one with those
@@ -68,30 +31,6 @@ OPENED_MARGIN = 9.0
 #: The same where less than half the remainder is left. Its evidence may then be a little smaller:
 #: wider priors cost evidence, and what a large remainder takes up is not explained.
 NO_MARGIN = -6.0
-#: Singular values below this fraction of the largest are ignored in the generalised least squares
-#: fit that smooths the noise: its columns are nearly collinear, and only their span matters.
-GLS_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True)
-class Analysis:
-    """The final fit problem, the result of the search on it, and the excluded outliers.
-
-    `predictions` are those of rows kept back, by the soil alone and the likeliest explanations.
-    `of_all` is the analysis of all readings, where some were excluded.
-    `excluded` (m,) are the readings of `outliers` among all.
-    `opened` says which priors of the soil were opened where that matters, which forbids a name.
-    `error` is the reason why the data could not be analysed, if they could not.
-    """
-
-    problem: FitProblem
-    result: SearchResult
-    outliers: tuple[str, ...] = ()
-    excluded: NDArray[np.bool_] | None = None
-    predictions: Predictions = field(default_factory=dict)
-    of_all: Analysis | None = None
-    opened: Remark | None = None
-    error: Remark | None = None
 
 
 def analyse(
@@ -117,20 +56,28 @@ def analyse(
         case=case,
         soil=tuple(free),
         readings=readings,
-        covariance=_declared_covariance(readings),
+        covariance=declared_covariance(readings),
         effects=effects,
         calibration=calibration,
     )
-    found = _without_outliers(problem, seed, place, progress)
+    found = without_outliers(problem, seed, place, progress)
     if not found.error:
         found = replace(found, predictions=predict_with(found.problem, found.result, seed))
         opened = open_priors(found.problem, found.result)
         if opened is not None:
             start = replace(problem, case=opened.case, soil=opened.soil)
-            other = _first_with_opened(start, found, seed, place)
+            kept = start if found.excluded is None else of_readings(start, ~found.excluded)
+            # if no effect explains far more here, sets of several seldom do; and none explains
+            # more than one alone that leaves nothing
+            rival = _rival(found)
+            complete = len(rival.names) == 1 and is_complete(
+                found.problem, rival, found.result, seed
+            )
+            begun = begin(kept, seed, place, found.result, likeliest=True, only_test=complete)
+            other, _ = begun
             better = any(explains_better(found, other, c) for c in other.result.candidates)
             if better or not other.result.has_gap:
-                other = _without_outliers(start, seed, place, progress, found)
+                other = without_outliers(start, seed, place, progress, found, begun)
             if any(explains_better(found, other, c) for c in other.result.candidates):
                 other = replace(other, predictions=predict_with(other.problem, other.result, seed))
                 likeliest = _predictive(other)
@@ -157,18 +104,6 @@ def _explained_by_soil(found: Analysis, seed: int) -> Analysis:
     return replace(found, result=result, predictions={}, opened=None)
 
 
-def _first_with_opened(
-    problem: FitProblem, found: Analysis, seed: int, place: Callable[[int], str]
-) -> Analysis:
-    """The analysis with opened priors by single effects and the likeliest sets, without outliers.
-
-    If none of them explains far more, sets that extend them seldom do.
-    """
-    if found.excluded is not None:
-        problem = _of_readings(problem, ~found.excluded)
-    return _search_in_passes(problem, seed, place, lambda _: None, found.result, first_look=True)[0]
-
-
 def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bool:
     """Whether an explanation, of an analysis with opened priors, is far better than all of another.
 
@@ -178,12 +113,17 @@ def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bo
         return False
     if len(other.problem.readings) != len(found.problem.readings):
         return False
-    rivals = [c for c in (_predictive(found), found.result.soil_alone) if c is not None]
-    rival = min(rivals, key=lambda c: c.objective)
+    rival = _rival(found)
     value = found.problem.discrepancy.evidence(opened.fit, opened.amplitude).value
     value += opened.penalty
     explains_more = opened.amplitude.max() < 0.5 * rival.amplitude.max()
     return value < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
+
+
+def _rival(found: Analysis) -> Explanation:
+    """The likeliest explanation that predicts rows kept back, the soil alone among them."""
+    rivals = [c for c in (_predictive(found), found.result.soil_alone) if c is not None]
+    return min(rivals, key=lambda c: c.objective)
 
 
 def _predictive(found: Analysis) -> Explanation | None:
@@ -194,204 +134,3 @@ def _predictive(found: Analysis) -> Explanation | None:
     gains = predictive_gains(found.predictions)
     scored = (c for c in found.result.candidates if c.names in gains)
     return next((c for c in scored if not gains[c.names].is_worse), None)
-
-
-def _without_outliers(
-    problem: FitProblem,
-    seed: int,
-    place: Callable[[int], str],
-    progress: Callable[[float], None],
-    earlier: Analysis | None = None,
-) -> Analysis:
-    """The analysis of all readings; without those that no explanation accounts for, if there are.
-
-    A reading is an outlier if it strays from the best explanation of all readings, and from that
-    of the readings without it. Each search starts from the explanations of the last; the first one
-    from those of an `earlier` analysis, without the readings that it excluded.
-    """
-    readings = problem.readings
-    excluded = np.zeros(len(readings), dtype=np.bool_)
-    of_all, last = None, None
-    if earlier is not None:
-        of_all, last = earlier.of_all, earlier.result
-        excluded = excluded if earlier.excluded is None else earlier.excluded
-    for left in reversed(range(OUTLIER_ROUNDS)):
-        own = _of_readings(problem, ~excluded)
-        found, fit = _search_in_passes(own, seed, place, progress, last)
-        of_all, last = of_all or found, found.result
-        if found.error:
-            return found
-        again = excluded.copy()
-        if excluded.any():
-            again[excluded] = _far_from(found.problem, fit, readings.subset(excluded))
-        again[~excluded] = _stray(found.problem, fit, found.result.final_test.signatures)
-        count = int(np.count_nonzero(again))
-        if count > MAX_OUTLIER_FRACTION * len(readings):
-            error = many_outliers(names_of(readings, again, place))
-            return Analysis(problem, _no_result(found.result.soil), error=error)
-        if not left or np.array_equal(again, excluded):
-            break
-        excluded = again
-    if not excluded.any():
-        return found
-    names = names_of(readings, excluded, place)
-    return replace(found, outliers=names, excluded=excluded, of_all=of_all)
-
-
-def _of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
-    """The problem of some of its readings, with their declared noise."""
-    readings = problem.readings.subset(kept)
-    return replace(problem, readings=readings, covariance=_declared_covariance(readings))
-
-
-def _search_in_passes(
-    problem: FitProblem,
-    seed: int,
-    place: Callable[[int], str],
-    progress: Callable[[float], None],
-    earlier: SearchResult | None,
-    *,
-    first_look: bool = False,
-) -> tuple[Analysis, Solution]:
-    """Covariance and search in turn, and the best fit; see `_without_outliers`.
-
-    first_look: See `search`; one pass shows what it is for.
-    """
-    free, starts = problem.soil, restated_candidates(problem, earlier.candidates if earlier else ())
-    first = np.asarray([f.prior.fraction(f.nominal) for f in free])
-    if earlier is not None:
-        first = restated(problem, [earlier.soil])[0].x
-    soil = problem.fit_soil([first, *(np.full(len(free), x) for x in SOIL_STARTS)])
-    result = _no_result(soil)
-    infeasible = np.flatnonzero(~np.isfinite(soil.prediction))
-    if infeasible.size:
-        row = int(problem.readings.row[infeasible[0]])
-        status = Status(int(forces(soil.fitted(), problem.readings.at).status[row]))
-        text = f"the model cannot carry the load of {place(row)}"
-        if status not in (Status.TOO_HEAVY, Status.NOT_CONVERGED):
-            text = f"{place(row)}: {status.reason}"
-        return Analysis(problem, result, error=Remark("no-equilibrium", text)), soil
-    best = starts[earlier.accepted[0].names].fit if earlier and earlier.accepted else soil
-    for number in range(MAX_PASSES):
-        last = problem.covariance.components
-        problem = _with_estimated_covariance(problem, best, result.final_test.signatures)
-        if result.accepted and _have_converged(last, problem.covariance.components):
-            break
-        soil = problem.fit_soil([soil.x], soil.linearisation)
-        result = search(problem, soil, seed, starts, _in_pass(number, progress), first_look)
-        starts = {c.names: c for c in result.candidates}
-        best = result.accepted[0].fit if result.accepted else soil
-        if first_look or not result.accepted:
-            break
-    return Analysis(problem, result), best
-
-
-def _in_pass(number: int, progress: Callable[[float], None]) -> Callable[[float], None]:
-    """A function of the share of one pass that is done."""
-    return lambda share: progress((number + share) / MAX_PASSES)
-
-
-def _declared_covariance(readings: Readings) -> Covariance:
-    """The declared noise alone."""
-    components = VarianceComponents.usual(readings, units=0.0)
-    return assemble_covariance(readings, np.zeros((len(readings), 2)), components)
-
-
-def _have_converged(last: VarianceComponents, new: VarianceComponents) -> bool:
-    """Whether two estimates of the variance components weight the readings nearly equally."""
-    angle = abs(last.friction_angle_std - new.friction_angle_std)
-    bearing = abs(last.bearing_std - new.bearing_std)
-    return (
-        bool(np.all(np.abs(last.noise_scale / new.noise_scale - 1.0) < SCALE_TOLERANCE))
-        and last.autocorrelation == new.autocorrelation
-        and angle < RUN_EFFECT_TOLERANCE * RUN_EFFECT_UNITS["friction_angle"]
-        and bearing < RUN_EFFECT_TOLERANCE * RUN_EFFECT_UNITS["bearing"]
-    )
-
-
-def _with_estimated_covariance(
-    problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
-) -> FitProblem:
-    """The problem with the covariance that is estimated from a fit's residuals."""
-    readings = problem.readings
-    space = _explained_space(problem, fit, signatures)
-    residual = readings.measured - fit.prediction
-    readings, columns = _with_noise_of_fit(problem, fit, residual, space)
-    smooth = smooth_basis_of_few(readings)
-    covariance = estimate_covariance(readings, columns, residual, space, smooth)
-    return replace(problem, readings=readings, covariance=covariance)
-
-
-def _explained_space(problem: FitProblem, fit: Solution, signatures: Sequence[Signature]) -> Floats:
-    """All that soil, effects and smooth functions could explain, (m, q)."""
-    readings = problem.readings
-    if not signatures or len(signatures[0].column) != len(readings):
-        signatures = problem.signatures_beside(fit)
-    declared = problem.declared_amplitude[problem.discrepancy.process.channel] > 0.0
-    return np.column_stack(
-        [
-            fit.derivatives,
-            *[s.column for s in signatures],
-            smooth_basis(readings),
-            problem.discrepancy.process.columns[:, declared],
-        ]
-    )
-
-
-def _with_noise_of_fit(
-    problem: FitProblem, fit: Solution, residual: Floats, space: Floats
-) -> tuple[Readings, Floats]:
-    """The readings with their noise at a fit, and their changes from run to run, (m, 2).
-
-    Noise that is a fraction of the reading is evaluated at a smoothed prediction.
-    """
-    case, readings = fit.fitted(), problem.readings
-    columns = run_effect_columns(case, readings)
-    several_runs = len(readings.runs) > 1
-    typical = VarianceComponents.usual(readings)
-    smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
-    readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))
-    return readings.with_noise_of_operation(noise_of_operation(case, readings)), columns
-
-
-def _stray(
-    problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
-) -> NDArray[np.bool_]:
-    """The readings (m,) that stray from a fit, from what resembles it, and from smooth functions.
-
-    In channels with few readings they stray from both the few smooth functions of a test and the
-    larger number that separates rough from smooth. The last reading of a monotone series is none.
-    """
-    space = _explained_space(problem, fit, signatures)
-    residual = problem.readings.measured - fit.prediction
-    readings, columns = _with_noise_of_fit(problem, fit, residual, space)
-    covariance = assemble_covariance(readings, columns, VarianceComponents.usual(readings))
-    replicates = readings.replicates * len(readings.channels) + readings.channel
-    run, smooth = readings.run[readings.row], smooth_basis_of_few(readings)
-    found = outliers(covariance, residual, space, replicates, run)
-    if smooth.shape[1]:
-        found &= outliers(covariance, residual, space, replicates, run, smooth)
-    return found & ~ends_of_monotone_series(readings)
-
-
-def _far_from(problem: FitProblem, fit: Solution, readings: Readings) -> NDArray[np.bool_]:
-    """The readings (m,) that a fit to others does not predict, remainder included."""
-    prediction = predict(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
-    index = [problem.readings.channels.index(readings.channels[c]) for c in readings.channel]
-    usual = problem.discrepancy.process.usual[index]
-    std = np.hypot(covariance_at(problem, fit, readings).std, usual)
-    far = np.abs(readings.measured - prediction) > OUTLIER_SIGMA * std
-    return np.asarray(far | ~np.isfinite(prediction))
-
-
-def _gls_prediction(covariance: Covariance, residual: Floats, space: Floats) -> Floats:
-    """Component of the residuals in a column space, by generalised least squares."""
-    white = covariance.whiten @ space
-    weights = np.linalg.lstsq(white, covariance.whiten @ residual, rcond=GLS_TOLERANCE)[0]
-    return np.asarray(space @ weights)
-
-
-def _no_result(soil: Solution) -> SearchResult:
-    """The result before any search: no candidates, and a test without scores."""
-    no_test = ResidualTest((), ScoreTest(np.zeros(0), np.zeros(1), np.zeros(0), np.zeros(0)))
-    return without_search(soil, no_test)

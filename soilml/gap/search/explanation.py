@@ -140,8 +140,10 @@ def fit_shapes(
     for i, candidate in enumerate(candidates):
         shapes = problem.shape_coordinates(candidate.names)
         first = [(candidate.catalogue_law.fit, candidate.amplitude)]
-        if candidate.noise_only is not None and candidate.noise_only.objective < limit:
-            first.append((candidate.noise_only, no_discrepancy))
+        alone = candidate.noise_only
+        same = alone is candidate.catalogue_law.fit and not candidate.amplitude.any()
+        if alone is not None and alone.objective < limit and not same:
+            first.append((alone, no_discrepancy))
         for fit, amplitude in first if shapes else []:
             coordinates = [*fit.coordinates, *shapes]
             started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))

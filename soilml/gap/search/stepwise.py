@@ -3,37 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from soilml.arrays import Floats
-from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.directions import smooth_basis
 from soilml.gap.evidence.problem import (
     FitProblem,
     MarginalFit,
     StartedFit,
     fit_marginal,
-    within_bounds,
 )
-from soilml.gap.evidence.score_test import ScoreTest, score_test
 from soilml.gap.search.explanation import (
     CandidateRequest,
     Explanation,
     fit_candidates,
     fit_shapes,
     predicted_shape_gain,
-    shape_directions,
 )
 from soilml.gap.search.posterior import Posterior, explanations, for_decisions, posterior
+from soilml.gap.search.residual_test import ResidualTest, residual_test
 from soilml.gap.search.screening import (
     LARGE_DISCREPANCY,
     WITHIN_REACH,
     Starts,
     effects_to_fit,
-    likeliest_sets,
     predicted_gains,
     predicted_with_and_without,
 )
@@ -130,7 +124,7 @@ def search(
     seed: int,
     starts: Starts | None = None,
     progress: Callable[[float], None] = lambda _: None,
-    first_look: bool = False,
+    begun: SearchResult | None = None,
 ) -> SearchResult:
     """Search for the effects that explain what the soil alone does not.
 
@@ -141,50 +135,78 @@ def search(
     soil: The soil alone, fitted under noise and scatter without discrepancy.
     starts: Candidates of an earlier search.
     progress: Called with the share of the search that is done, from 0 to 1.
-    first_look: Fit single effects and the likeliest of `starts`, and extend none of them.
+    begun: The first look of this search, where it is known.
     """
     starts = starts or {}
+    first = begun or first_look(problem, soil, seed, starts)
+    if first.has_gap:
+        progress(1 / STEPS)
+    fitted = {c.names: c for c in first.candidates}
+    level = [c for names, c in fitted.items() if len(names) == 1]
+    for effects in range(1, MAX_EFFECTS if level else 1):
+        progress((1 + effects) / STEPS)
+        best = min(fitted.values(), key=lambda c: c.objective)
+        if is_complete(problem, best, first, seed):
+            break
+        extensions = _extensions(problem, level, best.objective)
+        known = [fitted[names] for names in extensions if names in fitted]
+        new = {names: base for names, base in extensions.items() if names not in fitted}
+        level = [*known, *_fit_level(problem, soil, fitted[()], new, starts)]
+        fitted |= {c.names: c for c in level}
+        if not level or min(c.objective for c in level) > best.objective - MIN_IMPROVEMENT:
+            break
+    return _concluded(problem, first, fitted, seed)
+
+
+def first_look(
+    problem: FitProblem,
+    soil: Solution,
+    seed: int,
+    starts: Starts,
+    sets: Sequence[tuple[str, ...]] = (),
+    *,
+    only_test: bool = False,
+) -> SearchResult:
+    """The test for a gap, and where there is one the explanations by single effects.
+
+    sets: Larger sets that are fitted too.
+    only_test: Fit no effect.
+    """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
-    if soil_test.p_value >= GAP_LEVEL:
-        return without_search(soil, soil_test, untestable)
-    progress(1 / STEPS)
+    found = without_search(soil, soil_test, untestable)
+    if only_test or soil_test.p_value >= GAP_LEVEL:
+        return found
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
-    fitted: dict[tuple[str, ...], Explanation] = {(): soil_alone}
     singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-    selected: list[tuple[str, ...]] = [(name,) for name in singles]
-    if first_look:
-        selected = list(dict.fromkeys([*likeliest_sets(starts), *selected]))
-    level = _fit_level(problem, soil, soil_alone, dict.fromkeys(selected, soil_alone), starts)
-    fitted |= {c.names: c for c in level}
+    selected = dict.fromkeys([*sets, *((name,) for name in singles)], soil_alone)
+    level = _fit_level(problem, soil, soil_alone, selected, starts)
     again = _from_soils_of(problem, soil_alone, level)
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
-        soil_alone = fitted[()] = again
-    for effects in range(1, 1 if first_look else MAX_EFFECTS):
-        progress((1 + effects) / STEPS)
-        best = min(fitted.values(), key=lambda c: c.objective)
-        if best.names and _is_complete(problem, best, seed):
-            break
-        lowest = best.objective
-        extensions = _extensions(problem, level, fitted, lowest)
-        level = _fit_level(problem, soil, soil_alone, extensions, starts)
-        fitted |= {c.names: c for c in level}
-        if not level or min(c.objective for c in level) > lowest - MIN_IMPROVEMENT:
-            break
+    fitted = {c.names: c for c in [again, *level]}
+    return _concluded(problem, replace(found, predicted_gain=gains), fitted, seed)
+
+
+def _concluded(
+    problem: FitProblem,
+    first: SearchResult,
+    fitted: Mapping[tuple[str, ...], Explanation],
+    seed: int,
+) -> SearchResult:
+    """The result of a search, from that of its first look and all candidates."""
+    if len(fitted) == len(first.candidates):
+        return first
     candidates = tuple(sorted(fitted.values(), key=lambda c: c.objective))
-    found = posterior(candidates, gains, soil_alone, problem.penalties)
-    accepted = explanations(candidates, for_decisions(candidates, gains, soil_alone))
-    return SearchResult(
-        soil=soil,
-        soil_test=soil_test,
+    gains, alone = first.predicted_gain, fitted[()]
+    accepted = explanations(candidates, for_decisions(candidates, gains, alone))
+    return replace(
+        first,
         accepted=accepted,
         candidates=candidates,
         final_test=_test_residuals(problem, accepted[0], seed),
-        predicted_gain=gains,
-        posterior=found,
-        untestable=untestable,
+        posterior=posterior(candidates, gains, alone, problem.penalties),
     )
 
 
@@ -272,11 +294,15 @@ def off_bounds(x: float) -> float:
     return 0.5 + INWARD * (x - 0.5)
 
 
-def _is_complete(problem: FitProblem, best: Explanation, seed: int) -> bool:
-    """Whether a candidate leaves neither a discrepancy nor anything that the catalogue explains."""
-    if float(best.amplitude.max()) > 0.0:
+def is_complete(problem: FitProblem, best: Explanation, known: SearchResult, seed: int) -> bool:
+    """Whether effects leave neither a discrepancy nor anything that the catalogue explains.
+
+    known: A result with the test of the residuals of its best explanation.
+    """
+    if not best.names or float(best.amplitude.max()) > 0.0:
         return False
-    return _test_residuals(problem, best, seed).p_value > COMPLETE_LEVEL
+    test = known.final_test if best is known.accepted[0] else _test_residuals(problem, best, seed)
+    return test.p_value > COMPLETE_LEVEL
 
 
 def _test_residuals(problem: FitProblem, candidate: Explanation, seed: int) -> ResidualTest:
@@ -287,7 +313,6 @@ def _test_residuals(problem: FitProblem, candidate: Explanation, seed: int) -> R
 def _extensions(
     problem: FitProblem,
     level: Sequence[Explanation],
-    fitted: Mapping[tuple[str, ...], Explanation],
     lowest: float,
 ) -> dict[tuple[str, ...], Explanation]:
     """Sets with one more effect that should increase the evidence, and what they extend."""
@@ -300,73 +325,5 @@ def _extensions(
         promising = sorted(promising, key=lambda n: -gains[n])[:EXTENSIONS]
         for name in promising:
             names = tuple(sorted((*candidate.names, name)))
-            if names not in fitted and names not in extended:
-                extended[names] = candidate
+            extended.setdefault(names, candidate)
     return extended
-
-
-def _degrees_by_runs(problem: FitProblem, signatures: Sequence[Signature], others: int) -> Floats:
-    """Degrees of freedom by which each signature is judged; infinite but for drifts of the soil.
-
-    A drift differs from the scatter of the runs only by its order: a line through them leaves two
-    fewer than there are runs.
-    """
-    left = max(len(problem.readings.runs) - 2, 1)
-    drifts = ["progress" in problem.effects[s.name].about.uses for s in signatures]
-    return np.asarray([left if drift else np.inf for drift in drifts] + [np.inf] * others)
-
-
-@dataclass(frozen=True)
-class ResidualTest:
-    """Score test of a fit's residuals, and the signatures against which they were tested."""
-
-    signatures: tuple[Signature, ...]
-    test: ScoreTest
-
-    @property
-    def p_value(self) -> float:
-        """Family-wise p value of the largest score."""
-        return self.test.family_wise_p
-
-
-def residual_test(
-    problem: FitProblem,
-    fit: Solution,
-    signatures: Sequence[Signature],
-    seed: int,
-    *,
-    within_priors: bool = False,
-) -> ResidualTest:
-    """Test the residuals of a fit against noise, scatter and the declared discrepancy, if any.
-
-    All that the coordinates of the fit can explain is projected out, with second-order terms in
-    the laws of its effects; see `soilml.gap.search.explanation.shape_directions`. What another
-    soil could explain is, with tests of the soil, what these permit.
-
-    within_priors: Do not project out coordinates of the soil that the fit presses against a bound:
-        a soil that the priors exclude explains nothing.
-    """
-    whiten = problem.discrepancy.whiten(problem.declared_amplitude)
-    fit = fit.whitened_by(whiten)
-    smooth = smooth_basis(problem.readings)
-    columns = whiten @ np.column_stack([*[s.column for s in signatures], smooth])
-    signs = np.asarray([s.sign for s in signatures] + [0] * smooth.shape[1], dtype=np.float64)
-    directions = [whiten @ columns for columns in shape_directions(problem, fit)]
-    jacobian = within_bounds(fit) if within_priors else fit.jacobian
-    space = np.column_stack([jacobian, *directions])
-    # tests of the soil are residuals that no effect changes: a change of the soil costs something
-    deviation, rates = fit.soil_tests.deviation(fit.x), fit.soil_tests.rates(fit.x)
-    tests, k = len(deviation), len(fit.x)
-    columns = np.vstack([columns, np.zeros((tests, columns.shape[1]))])
-    space = np.vstack([space, np.hstack([rates, np.zeros((tests, space.shape[1] - k))])])
-    residual = np.append(fit.residual, -deviation)
-    test = score_test(
-        residual,
-        columns=columns,
-        space=space,
-        signs=signs,
-        degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
-        seed=seed,
-        own_degrees=_degrees_by_runs(problem, signatures, smooth.shape[1]),
-    )
-    return ResidualTest(tuple(signatures), test)

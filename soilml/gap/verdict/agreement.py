@@ -21,8 +21,8 @@ from soilml.fitting.readings import Readings
 from soilml.gap.evidence.order_trend import TREND_LEVEL
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.report.results import NoiseAgreement, SoilTrend
-from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.opened_priors import pressed_priors
+from soilml.gap.search.passes import Analysis
 from soilml.gap.search.stepwise import GAP_LEVEL, SearchResult
 from soilml.quantities import column
 from soilml.remarks import Remark

@@ -26,8 +26,8 @@ from soilml.gap.report.results import (
     Suspect,
 )
 from soilml.gap.report.sentences import outliers_in_words
-from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
+from soilml.gap.search.passes import Analysis
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.decision import implausible_sizes

@@ -6,8 +6,8 @@ import numpy as np
 
 from soilml.gap.evidence.covariance import Covariance
 from soilml.gap.evidence.marginal_likelihood import DiscrepancyModel
-from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
+from soilml.gap.search.passes import Analysis
 from soilml.remarks import Remark
 
 #: Factors on the estimated noise and scatter that are tried: published figures are read to about

@@ -15,8 +15,8 @@ from soilml.fitting.readings import Readings
 from soilml.gap.evidence.held_out import INFEASIBLE_SQUARE, Folds, held_out_folds, predict_parts
 from soilml.gap.evidence.problem import FitProblem, StartedFit, covariance_at, fit_many
 from soilml.gap.report.results import BeforeAfter, GapReduction
-from soilml.gap.search.analysis import Analysis
 from soilml.gap.search.explanation import Explanation
+from soilml.gap.search.passes import Analysis
 from soilml.gap.search.stepwise import off_bounds
 from soilml.quantities import column
 from soilml.remarks import Remark

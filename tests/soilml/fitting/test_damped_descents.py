@@ -6,14 +6,21 @@ import numpy as np
 import pytest
 from gap_sets import MODEL, case_of, driven, fit_problem
 
+from soilml.errors import InputError
+from soilml.fitting import damped_descents
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.damped_descents import (
+    CREEPING,
+    MAX_ITERATIONS,
     MOST_LOG_STEP,
     DampedSteps,
-    bounded_step,
+    bounded_steps,
     descend_together,
+    descent,
+    in_step,
 )
-from soilml.fitting.least_squares import LeastSquaresProblem
+from soilml.fitting.least_squares import LeastSquaresProblem, SoilTestTerms, Solution
+from soilml.fitting.predictions import Linearisation
 from soilml.fitting.readings import Readings
 from soilml.numerics.prior import Prior
 from soilml.physics.operating_point import Operating
@@ -124,11 +131,14 @@ def test_a_step_that_meets_a_bound_goes_on_in_the_valley():
     """Along the valley u = v the minimum lies at 5; where u ends at 1, v ends nearby."""
     normal = np.asarray([[1.0, -0.99], [-0.99, 1.0]])
     descent = normal @ np.asarray([5.0, 5.0])
-    free, low = np.ones(2, dtype=np.bool_), np.full(2, -1.0)
-    step = bounded_step(normal, descent, free, low, np.asarray([1.0, 3.0]))
-    assert step == pytest.approx([1.0, 5.0 - 0.99 * 4.0])
-    held = bounded_step(normal, descent, np.asarray([False, True]), low, np.ones(2))
+    free, low = np.asarray([[True, True], [False, True], [True, True]]), np.full((3, 2), -1.0)
+    high = np.asarray([[1.0, 3.0], [1.0, 1.0], [9.0, 9.0]])
+    met, held, within = bounded_steps(
+        *(np.stack([a] * 3) for a in (normal, descent)), free, low, high
+    )
+    assert met == pytest.approx([1.0, 5.0 - 0.99 * 4.0])
     assert held == pytest.approx([0.0, descent[1]])
+    assert within == pytest.approx([5.0, 5.0])
 
 
 def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
@@ -143,3 +153,66 @@ def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
     )
     assert np.array_equal(alone.x, beside.x) and alone.objective == beside.objective
     assert elsewhere.x == pytest.approx(alone.x, abs=2e-3)
+
+
+class Slope:
+    """A problem whose objective falls by the same in each iteration, and promises far more."""
+
+    coordinates, soil_tests = [coordinate(0.0, 1.0)], SoilTestTerms()
+    lower, upper, precision, centre = np.zeros(1), np.full(1, 100.0), np.zeros(1), np.zeros(1)
+
+    def __init__(self, fall):
+        self.fall, self.iterates = fall, 0
+
+    def request(self, x, sinkage=None):
+        return x
+
+    def at(self, x, linearisation):
+        self.iterates += 1
+        none = np.zeros((1, 1))
+        at = Linearisation(x, none[0], none, none[0], none, none[0])
+        objective = 2.0 - self.fall * self.iterates
+        return Solution(self, x, at, np.full(1, 0.3), np.full((1, 1), 3.0), objective)
+
+    def whitened(self, prediction):
+        return np.full((len(prediction), 1), 0.3)
+
+    def objective(self, residual, x):
+        return np.full(len(x), -1e3)
+
+
+@pytest.mark.parametrize("fall, creeps", [(0.03, True), (0.3, False)])
+def test_a_descent_that_creeps_has_converged(fall, creeps):
+    slope = Slope(fall)
+    work, answer = descent(slope, np.full(1, 0.5)), None
+    with pytest.raises(StopIteration) as end:
+        while True:
+            answer = work.send(answer).request
+    assert end.value.value.converged == creeps
+    assert slope.iterates == 1 + (CREEPING if creeps else MAX_ITERATIONS)
+
+
+def test_works_share_calls_and_a_refusal_is_raised_where_it_was_asked(monkeypatch):
+    calls = []
+
+    def answers(asked):
+        calls.append(list(asked))
+        return {i: InputError("no") if q == "refused" else q for i, q in asked.items()}
+
+    def work(*questions, caught=False):
+        found = []
+        for question in questions:
+            try:
+                found.append((yield question))
+            except InputError:
+                if not caught:
+                    raise
+                found.append("caught")
+        return found
+
+    monkeypatch.setattr(damped_descents, "_answers", answers)
+    works = [work("a"), work("b", "refused", "c", caught=True), work("refused", "d"), work()]
+    one, two, three, four = in_step(works)
+    assert (one, two, four) == (["a"], ["b", "caught", "c"], [])
+    assert isinstance(three, InputError)
+    assert calls == [[0, 1, 2], [1], [1]]

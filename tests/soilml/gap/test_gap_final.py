@@ -8,7 +8,7 @@ import pytest
 from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, VarianceComponents
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit, _changed
-from soilml.gap.search import analysis
+from soilml.gap.search import passes
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import (
     Posterior,
@@ -113,4 +113,4 @@ def test_variance_components_have_converged_where_weights_hardly_change(
         components(1.0, 2.0, 2.0, 0.5),
         components(scale, 2.0 + angle, 2.0 + bearing, 0.5 + rho),
     )
-    assert analysis._have_converged(last, new) == converged
+    assert passes._have_converged(last, new) == converged

@@ -207,21 +207,25 @@ def test_a_region_holds_the_readings_of_its_channel_slips_and_loads(clean):
 
 def test_a_refused_fit_starts_again_without_effects_and_is_refused_once_more(clean, monkeypatch):
     coordinates = [*clean.soil, *clean.size_coordinates(("slip-sinkage",))]
-    start = {c.path: 0.25 for c in coordinates}
-    refusals = [InputError("first"), InputError("second")]
+    outcomes = iter(["a fit", InputError("first"), "later", InputError("first"), InputError("no")])
     asked = []
 
-    def descend_together(problems, starts, known=None):
-        asked.append(starts)
-        assert all(p.coordinates is coordinates for p in problems) and len(problems) == len(starts)
-        return ["a fit", refusals[0], refusals[0]] if len(asked) == 1 else ["later", refusals[1]]
+    def descent(problem, start, known=None):
+        yield from ()
+        assert problem.coordinates is coordinates
+        asked.append(start.tolist())
+        outcome = next(outcomes)
+        if isinstance(outcome, InputError):
+            raise outcome
+        return outcome
 
-    monkeypatch.setattr(problem_module, "descend_together", descend_together)
+    monkeypatch.setattr(problem_module, "descent", descent)
+    start = {c.path: 0.25 for c in coordinates}
     request = StartedFit(clean.with_effects(("slip-sinkage",)), coordinates, start)
-    assert fit_many(clean, [request] * 3) == ["a fit", "later", refusals[1]]
-    first, again = asked
-    assert len(first) == 3 and np.all(np.stack(first) == 0.25)
-    assert np.array_equal(again, [[0.25] * len(clean.soil) + [0.0]] * 2)
+    one, two, refused = fit_many(clean, [request] * 3)
+    assert (one, two) == ("a fit", "later") and str(refused) == "no"
+    whole, without = [0.25] * len(coordinates), [0.25] * len(clean.soil) + [0.0]
+    assert asked == [whole, whole, without, whole, without]
 
 
 def test_a_calibrated_sensor_has_the_error_that_is_stated(clean):

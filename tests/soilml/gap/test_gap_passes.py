@@ -14,6 +14,7 @@ from soilml.fitting.readings import Readings
 from soilml.gap import gap
 from soilml.gap.evidence.covariance import VarianceComponents
 from soilml.gap.search import analysis
+from soilml.gap.search import passes as module
 from soilml.gap.search.opened_priors import OpenedPriors
 from soilml.gap.search.stepwise import SearchResult
 from soilml.numerics.prior import Prior
@@ -46,21 +47,25 @@ def passes(monkeypatch):
     def far_from(problem, fit, readings):
         return np.asarray([not given.explained for _ in range(len(readings))])
 
-    def search(problem, soil, seed, starts, progress, first_look):
+    def search(problem, soil, seed, starts, progress, begun=None):
         progress(0.5)
         given.starts.append(sorted(starts))
         names = given.accepted[len(given.starts) - 1]
         explained = SimpleNamespace(names=names, fit=("fit of", names))
         accepted = () if names is None else (explained,)
-        result = analysis._no_result(soil)
+        result = module._no_result(soil)
         signature = SimpleNamespace(column=np.zeros(len(problem.readings)))
         test = replace(result.final_test, signatures=(signature,))
         return replace(result, accepted=accepted, candidates=accepted, final_test=test)
 
-    monkeypatch.setattr(analysis, "_with_estimated_covariance", reestimate)
-    monkeypatch.setattr(analysis, "_stray", stray)
-    monkeypatch.setattr(analysis, "_far_from", far_from)
-    monkeypatch.setattr(analysis, "search", search)
+    for name, value in {
+        "_with_estimated_covariance": reestimate,
+        "_stray": stray,
+        "_far_from": far_from,
+        "first_look": lambda problem, soil, *_, **__: module._no_result(soil),
+        "search": search,
+    }.items():
+        monkeypatch.setattr(module, name, value)
 
     def run(case=CASE, readings=READINGS):
         shares = []
@@ -151,16 +156,16 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
 ):
     given, run = passes
     given.accepted = [None, None]
-    look = replace(analysis._no_result(None), candidates=(SimpleNamespace(names=("a",)),))
     p_value = SimpleNamespace(p_value=0.001 if has_gap else 0.5)
-    look = analysis.Analysis(None, replace(look, soil_test=p_value))
+    look = replace(module._no_result(None), candidates=(SimpleNamespace(names=("a",)),))
+    look = replace(look, soil=fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)]))
+    look = module.Analysis(look.soil.problem, replace(look, soil_test=p_value))
     free = free_soil_parameters(CASE, None)
     opened = OpenedPriors(CASE, tuple(free), Remark("prior-opened", "the priors were opened"))
     for name, value in {
         "open_priors": lambda *_: opened,
-        "_first_with_opened": lambda *_: look,
-        "restated_candidates": lambda *_: {},
-        "restated": lambda *_: [SimpleNamespace(x=np.full(3, 0.5))],
+        "begin": lambda *_, **__: (look, {}),
+        "_rival": lambda found: SimpleNamespace(names=()),
         "explains_better": lambda *_: better,
         "_explained_by_soil": lambda found, _: found,
     }.items():
@@ -171,7 +176,7 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
 
 
 def test_the_declared_noise_is_where_the_analysis_begins():
-    found = analysis._declared_covariance(READINGS)
+    found = module.declared_covariance(READINGS)
     assert np.diag(found.matrix) == pytest.approx(READINGS.std**2)
     assert not (found.matrix - np.diag(np.diag(found.matrix))).any()
     known = found.components
@@ -181,7 +186,7 @@ def test_the_declared_noise_is_where_the_analysis_begins():
 
 
 def test_an_analysis_without_a_search_has_no_gap():
-    found = analysis._no_result(None)
+    found = module._no_result(None)
     assert found.soil_test.p_value >= 0.5 and not found.has_gap
     assert found.soil_alone is None and found.likeliest is None
 
@@ -193,9 +198,9 @@ def test_smoothed_residuals_are_those_of_generalised_least_squares():
     residual = rng.standard_normal(96) * problem.covariance.std
     inverse = np.linalg.inv(problem.covariance.matrix)
     weights = np.linalg.solve(space.T @ inverse @ space, space.T @ inverse @ residual)
-    found = analysis._gls_prediction(problem.covariance, residual, space)
+    found = module._gls_prediction(problem.covariance, residual, space)
     assert found == pytest.approx(space @ weights, rel=1e-6, abs=1e-12)
-    again = analysis._gls_prediction(problem.covariance, residual, np.tile(space, 2))
+    again = module._gls_prediction(problem.covariance, residual, np.tile(space, 2))
     assert again == pytest.approx(found, rel=1e-6, abs=1e-12)  # nearly collinear columns
 
 
@@ -207,14 +212,14 @@ def test_the_covariance_is_estimated_from_what_a_fit_leaves():
     problem = fit_problem(case, table)
     soil = problem.fit_soil([np.full(3, 0.5)])
     small = replace(problem, effects={"slip-sinkage": problem.effects["slip-sinkage"]})
-    stray = analysis._stray(small, soil, ())
+    stray = module._stray(small, soil, ())
     assert np.flatnonzero(stray).tolist() == [
         int(i)
         for i in np.flatnonzero(problem.readings.channel == 0)
         if problem.readings.row[i] == 12
     ]
-    kept = analysis._of_readings(small, ~stray)
-    found = analysis._with_estimated_covariance(kept, kept.fit_soil([soil.x]), ())
+    kept = module.of_readings(small, ~stray)
+    found = module._with_estimated_covariance(kept, kept.fit_soil([soil.x]), ())
     assert len(found.readings) == len(found.covariance.std) == 95
     torque = found.readings.channel == 0
     expected = np.delete(soil.prediction[problem.readings.channel == 0], 12)

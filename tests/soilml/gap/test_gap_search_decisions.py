@@ -185,11 +185,11 @@ def extending(monkeypatch):
     return gains
 
 
-def extensions(level, fitted=(), lowest=0.0):
+def extensions(level, lowest=0.0):
     problem = SimpleNamespace(
         readings=None, signatures_beside=lambda fit: [], discrepancy=None, covariance=None
     )
-    found = stepwise._extensions(problem, level, dict.fromkeys(fitted), lowest)
+    found = stepwise._extensions(problem, level, lowest)
     return {names: base.names for names, base in found.items()}
 
 
@@ -205,12 +205,11 @@ def test_the_best_three_sets_within_15_are_extended_by_the_best_three_effects(ex
     assert set(extensions(far).values()) == {("a",)}
 
 
-def test_only_effects_with_enough_gain_extend_and_no_set_twice(extending):
+def test_only_effects_with_enough_gain_extend_and_each_set_the_better_of_its_parts(extending):
     extending[("m",)] = {"a": -1.9, "b": -2.1, "z": 3.0}
     extending[("z",)] = {"m": 8.0, "y": 7.0}
     sets = [made("m", objective=0.0), made("z", objective=1.0)]
-    # (m, z) extends the better of its parts, and (y, z) was fitted
-    assert extensions(sets, fitted=[("y", "z")]) == {("m", "z"): ("m",), ("a", "m"): ("m",)}
+    assert extensions(sets) == {("m", "z"): ("m",), ("a", "m"): ("m",), ("y", "z"): ("z",)}
 
 
 @pytest.mark.parametrize(
@@ -218,9 +217,15 @@ def test_only_effects_with_enough_gain_extend_and_no_set_twice(extending):
     [((0.0, 0.0), 0.21, True), ((0.0, 0.0), 0.19, False), ((0.0, 0.1), 0.9, False)],
 )
 def test_a_set_is_complete_where_noise_explains_the_rest(monkeypatch, amplitude, p_value, complete):
-    test = SimpleNamespace(p_value=p_value)
+    test, other = SimpleNamespace(p_value=p_value), SimpleNamespace(p_value=1.0 - p_value)
     monkeypatch.setattr(stepwise, "_test_residuals", lambda *_: test)
-    assert stepwise._is_complete(None, made("a", amplitude=amplitude), 0) == complete
+    best, alone = made("a", amplitude=amplitude), made(amplitude=amplitude)
+    known = SimpleNamespace(accepted=(made("b"),), final_test=other)
+    assert stepwise.is_complete(None, best, known, 0) == complete
+    known = SimpleNamespace(accepted=(best,), final_test=test)
+    monkeypatch.setattr(stepwise, "_test_residuals", lambda *_: other)
+    assert stepwise.is_complete(None, best, known, 0) == complete
+    assert not stepwise.is_complete(None, alone, known, 0)  # a gap was found
 
 
 @pytest.fixture
@@ -236,7 +241,7 @@ def searched(monkeypatch):
         size = len(next(iter(sets), ()))
         return [made(*n, objective=seen.objective[size]) for n in sets if size in seen.objective]
 
-    def grown(problem, level, fitted, lowest):
+    def grown(problem, level, lowest):
         return {(*c.names, "abc"[len(c.names)]): c for c in level}
 
     for name, value in {
@@ -247,7 +252,7 @@ def searched(monkeypatch):
         "_from_soils_of": lambda problem, soil_alone, level: seen.again or soil_alone,
         "_fit_level": fit_level,
         "_extensions": grown,
-        "_is_complete": lambda problem, best, seed: best.names == seen.complete,
+        "is_complete": lambda problem, best, known, seed: best.names == seen.complete,
         "_test_residuals": lambda *_: SimpleNamespace(p_value=seen.p_value),
     }.items():
         monkeypatch.setattr(stepwise, name, value)
@@ -293,10 +298,6 @@ def test_the_search_ends_with_a_complete_set_or_one_that_the_model_refuses(searc
     seen.complete, seen.objective = None, {0: 100.0, 1: 50.0}
     run()
     assert len(seen.levels) == 2
-    # the soil alone is never complete: a gap was found
-    seen.complete, seen.objective = (), {0: 10.0, 1: 50.0, 2: 5.0, 3: 3.0}
-    run()
-    assert len(seen.levels) == 3
 
 
 @pytest.mark.parametrize("p_value, gap", [(0.029, True), (0.031, False)])

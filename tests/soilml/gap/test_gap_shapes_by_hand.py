@@ -91,7 +91,7 @@ def test_a_gain_by_an_own_law_is_what_columns_beside_the_fit_explain(dug):
 def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatch):
     """The first has two starts, under discrepancy and under noise; the second has one."""
     problem, found = dug
-    first = replace(found, noise_only=found.fit)
+    first = replace(found, noise_only=replace(found.fit))
     none = np.zeros(1)
     fits = [MarginalFit(SimpleNamespace(), Evidence(v, none, none, none)) for v in (2.0, 3.0, 1.0)]
     asked = []
@@ -108,6 +108,10 @@ def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatc
     asked.clear()
     fits.pop()
     explanation.fit_shapes(problem, [first, found], limit=found.fit.objective)
+    assert len(asked) == 2
+    asked.clear()
+    assert not found.amplitude.any()  # the fit under noise alone is the one beside a discrepancy
+    explanation.fit_shapes(problem, [replace(found, noise_only=found.fit), found])
     assert len(asked) == 2
 
 
