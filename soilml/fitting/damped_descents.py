@@ -31,17 +31,17 @@ MAX_ITERATIONS = 25
 ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
 #: A descent that creeps has converged too: so many iterations have together lowered the objective
 #: by less than the first figure, or by less than this share of its excess.
-CREEPING, CREEPING_ENOUGH, CREEPING_SHARE = 4, 0.15, 2e-3
+CREEPING, CREEPING_ENOUGH, CREEPING_SHARE = 4, 0.15, 5e-4
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several.
 KEPT_PROMISE = 0.5
 #: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
 #: factor after an iteration without improvement, and the bounds.
-FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 1.0, 10.0), 1e2
+FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 0.3, 1.0, 10.0), 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
 #: Multiples of the last step that are tried beside damped ones: along a curved valley these are
 #: short, and each is like the last.
-REPETITIONS = (3.0, 9.0)
+REPETITIONS = (1.5, 3.0, 9.0)
 #: Damping, and curvature of a coordinate that changes nothing, with which a step is defined.
 LEAST_DAMPING, LEAST_SCALE = 1e-9, 1e-9
 #: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective

@@ -16,6 +16,8 @@ from soilml.remarks import Remark
 #: Studentised residual above which a reading is an outlier: chance exceeds it once in 150 000
 #: readings.
 OUTLIER_SIGMA = 4.5
+#: Studentised residual over the largest one, from which both can be outliers at a time.
+LEADING_SHARE = 0.5
 #: Fraction of outliers above which they form a pattern, so that the data cannot be analysed.
 MAX_OUTLIER_FRACTION = 0.1
 #: Readings whose residual variance is below this fraction of their own are determined by the fit;
@@ -39,7 +41,9 @@ def outliers(
     .. math:: t_i = (P r)_i / \sqrt{P_{ii}}, \quad
         P = V^{-1} - V^{-1} X (X^T V^{-1} X)^{-1} X^T V^{-1}
 
-    compared with a robust scale, the median of \|t\|, where that exceeds 1.
+    compared with a robust scale, the median of \|t\|, where that exceeds 1. Of those that exceed
+    it, the farthest and those at least half as far are outliers: a fit that one of them has moved
+    leaves others large too.
 
     residual : array (m,)
     space (m, q): X, all that soil, effects and smooth functions could explain.
@@ -61,7 +65,7 @@ def outliers(
     scale = 1.0
     if defined.any():
         scale = max(1.0, float(np.median(np.abs(t[defined]))) / Z_50)
-    strays = np.abs(t) > OUTLIER_SIGMA * scale
+    strays = np.abs(t) > max(OUTLIER_SIGMA * scale, LEADING_SHARE * float(np.abs(t).max()))
     if replicate_group is None:
         return np.asarray(strays)
     run = np.zeros(len(residual), dtype=np.int64) if run is None else run

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.errors import raised
 from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
@@ -32,7 +33,13 @@ from soilml.gap.evidence.outliers import (
     names_of,
     outliers,
 )
-from soilml.gap.evidence.problem import FitProblem, covariance_at, restated
+from soilml.gap.evidence.problem import (
+    FitProblem,
+    StartedFit,
+    covariance_at,
+    fit_many,
+    restated,
+)
 from soilml.gap.evidence.score_test import ScoreTest
 from soilml.gap.search.explanation import restated_candidates
 from soilml.gap.search.prediction import Predictions
@@ -46,6 +53,8 @@ from soilml.row_status import Status
 MAX_PASSES = 2
 #: Searches at most, each without the readings that strayed from the explanation of the last.
 OUTLIER_ROUNDS = 4
+#: Fits of one explanation at most, to find its outliers before the next search.
+SETTLING_FITS = 5
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
 #: Variance components have converged when noise scales differ by less than this fraction and the
@@ -96,24 +105,24 @@ def without_outliers(
     """
     readings = problem.readings
     excluded = np.zeros(len(readings), dtype=np.bool_)
+    cleared = excluded
     of_all, last = None, None
     if earlier is not None:
         of_all, last = earlier.of_all, earlier.result
         excluded = excluded if earlier.excluded is None else earlier.excluded
     for left in reversed(range(OUTLIER_ROUNDS)):
-        own = of_readings(problem, ~excluded)
-        begun = begun or begin(own, seed, place, last)
+        begun = begun or begin(of_readings(problem, ~excluded), seed, place, last)
         found, fit = _search_in_passes(begun, seed, progress)
         begun = None
         of_all, last = of_all or found, found.result
         if found.error:
             return found
-        again = excluded.copy()
-        if excluded.any():
-            again[excluded] = _far_from(found.problem, fit, readings.subset(excluded))
-        again[~excluded] = _stray(found.problem, fit, found.result.final_test.signatures)
-        count = int(np.count_nonzero(again))
-        if count > MAX_OUTLIER_FRACTION * len(readings):
+        accepted, signatures = last.accepted, last.final_test.signatures
+        amplitude = accepted[0].amplitude if accepted else problem.declared_amplitude
+        again, cleared = _outliers_of(problem, found.problem, fit, signatures, excluded, cleared)
+        if not np.array_equal(again, excluded):
+            again, cleared = _settled(problem, fit, amplitude, again, cleared)
+        if _are_many(again):
             error = many_outliers(names_of(readings, again, place))
             return Analysis(problem, _no_result(found.result.soil), error=error)
         if not left or np.array_equal(again, excluded):
@@ -129,6 +138,83 @@ def of_readings(problem: FitProblem, kept: NDArray[np.bool_]) -> FitProblem:
     """The problem of some of its readings, with their declared noise."""
     readings = problem.readings.subset(kept)
     return replace(problem, readings=readings, covariance=declared_covariance(readings))
+
+
+def _settled(
+    problem: FitProblem,
+    fit: Solution,
+    amplitude: Floats,
+    excluded: NDArray[np.bool_],
+    cleared: NDArray[np.bool_],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The outliers (m,) of one explanation, fitted to the others in turn until they stay the same.
+
+    The first ones hide others; so found, these need no search of their own. See `_outliers_of`.
+
+    amplitude (channels,): Of the remainder, in usual ones.
+    """
+    for _ in range(SETTLING_FITS):
+        if not excluded.any() or _are_many(excluded):
+            break
+        own = of_readings(problem, ~excluded)
+        (fit,) = restated(own, [fit])
+        own = _with_estimated_covariance(own, fit, ())
+        whiten = own.discrepancy.whiten(amplitude)
+        start = StartedFit(fit.case, fit.coordinates, fit.start_values(), whiten, fit.linearisation)
+        fit = raised(fit_many(own, [start])[0])
+        again, cleared = _outliers_of(problem, own, fit, (), excluded, cleared)
+        if np.array_equal(again, excluded):
+            break
+        excluded = again
+    return excluded, cleared
+
+
+def _outliers_of(
+    problem: FitProblem,
+    own: FitProblem,
+    fit: Solution,
+    signatures: Sequence[Signature],
+    excluded: NDArray[np.bool_],
+    cleared: NDArray[np.bool_],
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """The outliers (m,) among all readings, by a fit to those that were not excluded.
+
+    Each excluded reading is judged alone beside these, for outliers hide each other. One that
+    neither strays nor is far is cleared (m,): the fit accounts for it, and it is no outlier from
+    then on.
+
+    own: The problem of the readings that were fitted, with their estimated covariance.
+    """
+    far = np.zeros_like(excluded)
+    if excluded.any():
+        far[excluded] = _far_from(own, fit, problem.readings.subset(excluded))
+        (fit,) = restated(problem, [fit])
+        signatures = problem.signatures_beside(fit)
+    found = _stray_among(problem, fit, signatures, ~excluded) | far
+    for i in np.flatnonzero(excluded & ~far):
+        others = ~excluded
+        others[i] = True
+        found[i] = _stray_among(problem, fit, signatures, others)[i]
+    found &= ~cleared
+    return found, cleared | (excluded & ~found)
+
+
+def _stray_among(
+    problem: FitProblem, fit: Solution, signatures: Sequence[Signature], kept: NDArray[np.bool_]
+) -> NDArray[np.bool_]:
+    """The readings (m,), of those that are kept, that stray from a fit beside the others kept."""
+    if not kept.all():
+        problem = of_readings(problem, kept)
+        (fit,) = restated(problem, [fit])
+        signatures = [replace(s, column=s.column[kept]) for s in signatures]
+    found = np.zeros(len(kept), dtype=np.bool_)
+    found[kept] = _stray(problem, fit, signatures)
+    return found
+
+
+def _are_many(outliers: NDArray[np.bool_]) -> bool:
+    """Whether so many readings are outliers that they form a pattern."""
+    return int(np.count_nonzero(outliers)) > MAX_OUTLIER_FRACTION * len(outliers)
 
 
 #: What a search begins with: the analysis of the soil alone and by single effects, and the
@@ -163,7 +249,9 @@ def begin(
         if status not in (Status.TOO_HEAVY, Status.NOT_CONVERGED):
             text = f"{place(row)}: {status.reason}"
         return Analysis(problem, _no_result(soil), error=Remark("no-equilibrium", text)), {}
-    best = starts[earlier.accepted[0].names].fit if earlier and earlier.accepted else soil
+    best = soil
+    if earlier is not None and earlier.accepted:  # it may be one that outliers have moved
+        best = min(soil, starts[earlier.accepted[0].names].fit, key=lambda fit: fit.objective)
     problem = _with_estimated_covariance(problem, best, ())
     soil = problem.fit_soil([soil.x], soil.linearisation)
     sets = likeliest_sets(starts) if likeliest else ()
@@ -282,7 +370,7 @@ def _stray(
 
 
 def _far_from(problem: FitProblem, fit: Solution, readings: Readings) -> NDArray[np.bool_]:
-    """The readings (m,) that a fit to others does not predict, remainder included."""
+    """The readings (m,) that a fit to others does not predict within a usual remainder."""
     prediction = predict(fit.case, fit.coordinates, fit.x[None, :], readings)[0]
     index = [problem.readings.channels.index(readings.channels[c]) for c in readings.channel]
     usual = problem.discrepancy.process.usual[index]

@@ -40,18 +40,16 @@ def passes(monkeypatch):
         components = replace(problem.covariance.components, noise_scale=np.full(3, scale))
         return replace(problem, covariance=replace(problem.covariance, components=components))
 
-    def stray(problem, fit, signatures):
-        found = given.outliers.pop(0) if given.outliers else []
-        return np.isin(np.arange(len(problem.readings)), found)
-
-    def far_from(problem, fit, readings):
-        return np.asarray([not given.explained for _ in range(len(readings))])
+    def outliers_of(problem, own, fit, signatures, excluded, cleared):
+        found = excluded & (not given.explained)
+        found[np.flatnonzero(~excluded)[given.outliers.pop(0) if given.outliers else []]] = True
+        return found & ~cleared, cleared | (excluded & ~found)
 
     def search(problem, soil, seed, starts, progress, begun=None):
         progress(0.5)
         given.starts.append(sorted(starts))
         names = given.accepted[len(given.starts) - 1]
-        explained = SimpleNamespace(names=names, fit=("fit of", names))
+        explained = SimpleNamespace(names=names, fit=("fit of", names), amplitude=None)
         accepted = () if names is None else (explained,)
         result = module._no_result(soil)
         signature = SimpleNamespace(column=np.zeros(len(problem.readings)))
@@ -60,8 +58,8 @@ def passes(monkeypatch):
 
     for name, value in {
         "_with_estimated_covariance": reestimate,
-        "_stray": stray,
-        "_far_from": far_from,
+        "_outliers_of": outliers_of,
+        "_settled": lambda problem, fit, amplitude, excluded, cleared: (excluded, cleared),
         "first_look": lambda problem, soil, *_, **__: module._no_result(soil),
         "search": search,
     }.items():
@@ -111,9 +109,10 @@ def test_readings_that_stray_from_the_explanation_are_excluded_and_searched_agai
 
 def test_a_reading_that_the_explanation_of_the_others_predicts_is_taken_back(passes):
     given, run = passes
-    given.accepted, given.outliers, given.explained = [None] * 4, [[4], []], True
+    given.accepted, given.outliers, given.explained = [None] * 4, [[4], [], [4]], True
     found, _ = run()
     assert found.outliers == () and len(found.problem.readings) == len(READINGS)
+    assert len(given.starts) == 3  # it strays from the fit to all again, and stays
 
 
 def test_without_a_gap_there_is_one_pass(passes):
@@ -225,6 +224,46 @@ def test_the_covariance_is_estimated_from_what_a_fit_leaves():
     expected = np.delete(soil.prediction[problem.readings.channel == 0], 12)
     assert found.readings.std[torque] == pytest.approx(0.01 * expected, rel=0.2)
     assert np.all(found.covariance.components.noise_scale < 1.3)
+
+
+@pytest.fixture(scope="module")
+def two_outliers():
+    """A problem of 96 readings of which two are wrong, the fit to the others, and which they are.
+
+    A third reading was excluded too, and is right.
+    """
+    case = case_of()
+    table = driven(case, seed=3)
+    table.columns["torque_Nm"][12] *= 1.1
+    table.columns["torque_Nm"][20] *= 1.6
+    problem = fit_problem(case, table)
+    problem = replace(problem, effects={"slip-sinkage": problem.effects["slip-sinkage"]})
+    torque, row = problem.readings.channel == 0, problem.readings.row
+    wrong, excluded = (torque & np.isin(row, rows) for rows in ([12, 20], [12, 20, 27]))
+    kept = module.of_readings(problem, ~excluded)
+    return problem, kept.fit_soil([np.full(3, 0.5)]), wrong, excluded
+
+
+def test_an_excluded_reading_is_judged_alone_and_cleared_for_good_where_it_does_not_stray(
+    two_outliers,
+):
+    problem, fit, wrong, excluded = two_outliers
+    none = np.zeros(96, dtype=np.bool_)
+    kept = module.of_readings(problem, ~excluded)
+    found, cleared = module._outliers_of(problem, kept, fit, (), excluded, none)
+    assert np.array_equal(found, wrong) and np.array_equal(cleared, excluded & ~wrong)
+    again, _ = module._outliers_of(problem, kept, fit, (), wrong, cleared | wrong)
+    assert not again.any()
+
+
+def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
+    problem, fit, wrong, excluded = two_outliers
+    none, largest = np.zeros(96, dtype=np.bool_), wrong & (problem.readings.row == 20)
+    all_of_them = problem.fit_soil([np.full(3, 0.5)])
+    found, cleared = module._settled(problem, all_of_them, np.zeros(3), largest, none)
+    assert np.array_equal(found, wrong) and not cleared.any()
+    found, cleared = module._settled(problem, fit, np.zeros(3), excluded, none)
+    assert np.array_equal(found, wrong) and np.array_equal(cleared, excluded & ~wrong)
 
 
 def test_a_fit_states_precision_and_covariance_of_its_parameters():
