@@ -31,6 +31,7 @@ from soilml.config.simulator import (
 )
 from soilml.config.wheeled_rover import DriveErrors, WheeledRover, take_drive, take_rover
 from soilml.errors import InputError
+from soilml.io.table import Table
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, located, with_values
@@ -161,6 +162,12 @@ class Case:
         paths = self.paths_of_gear(name)
         prior = {paths[path]: prior for path, prior in self.prior.items() if path in paths}
         return replace(case, prior=prior)
+
+    def without_remainder_of(self, table: Table) -> Case:
+        """Without a remainder that was learned from rows of a table, which would count twice."""
+        if self.remainder is None or not self.remainder.learned_from(table):
+            return self
+        return replace(self, remainder=None)
 
     def without_suspected(self) -> Case:
         """The case without its suspected effects, and without the remainder beside them."""

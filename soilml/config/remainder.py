@@ -22,6 +22,7 @@ from soilml.numerics.smooth_functions import SmoothFunctions
 from soilml.numerics.smooth_process import process_columns, squared_exponential
 from soilml.physics.contact import Force
 from soilml.quantities import CHANNELS, column
+from soilml.remarks import Remark
 
 FORMAT = 1  # Version of the table [remainder]
 #: Most points of one part, and most columns of its factors: a file stays readable, and no analysis
@@ -175,6 +176,14 @@ class RemainderPart:
     @property
     def _corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
         return (self.slip[0], self.load[0]), (self.slip[1], self.load[1])
+
+
+#: Where `Case.without_remainder_of` leaves one out.
+SAME_ROWS = Remark(
+    "same-rows",
+    "[remainder] was learned from rows of this table, which would count twice: it is left out. "
+    "The intervals of the analysis that learned it are in its gap.json (soil_after)",
+)
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.config.remainder import SAME_ROWS
 from soilml.errors import FitError, InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
@@ -44,11 +45,6 @@ CLOSED_FORM = ("linear", "newton")
 #: Most rows of one fit by a closed form, whose equations are all held at a time. Other methods
 #: condense near replicates, and take any table.
 MOST_ROWS = 100_000
-SAME_ROWS = Remark(
-    "same-rows",
-    "[remainder] was learned from rows of this table, which would count twice: it is left out. "
-    "The intervals of the analysis that learned it are in its gap.json (soil_after)",
-)
 
 
 @solvable("the identification")
@@ -124,8 +120,7 @@ def identify(
             f"{table.source}: {len(table)} rows in one fit; the {method} method takes at most "
             f"{MOST_ROWS}: take nonlinear, or fit each run by itself"
         )
-    same = case.remainder is not None and case.remainder.learned_from(table)
-    case = replace(case, remainder=None) if same else case
+    learned, case = case.remainder, case.without_remainder_of(table)
     readings, selected = usable_readings(case, table), select_free(case, free)
     if method not in CLOSED_FORM and len(readings.row_slip) > condensing.MOST_ROWS:
         readings = condensing.condensed(case, readings, selected)
@@ -133,7 +128,7 @@ def identify(
     if method not in CLOSED_FORM and fit.low is None:
         fit = _within_priors(fit, selected)
     remarks = [
-        *([SAME_ROWS] if same else []),
+        *([SAME_ROWS] if case.remainder is not learned else []),
         *_method_limits(fit, readings, free),
         *_about_discrepancy(case, fit, readings),
         *_about_soil_tests(case, fit),

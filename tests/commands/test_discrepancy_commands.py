@@ -10,6 +10,7 @@ from conftest import MODEL, RECIPE
 
 from soilml import Operating, read_case
 from soilml.cli import main
+from soilml.io.read_table import read_table
 
 DISCREPANCY = '[discrepancy]\ntorque_Nm = "3 %"\ndrawbar_pull_N = 1.5\n'
 ANY_WHEEL = str(Path(__file__).parents[2] / "exported" / "any_wheel.onnx")
@@ -128,6 +129,21 @@ def test_an_estimate_has_the_mean_and_the_error_of_a_remainder(folder, capsys):
         size = float(after[f"{key}_std"])
         assert size > 1.05 * float(before[f"{key}_std"])
         assert abs(float(after[key]) - float(before[key])) < size
+
+
+def test_an_estimate_leaves_out_a_remainder_that_its_own_rows_taught(folder, capsys):
+    (folder / "learned.toml").write_text(MODEL + REMAINDER)
+    own = read_case("learned.toml").remainder.of_rows(read_table("runs.csv")).rows
+    marked = REMAINDER.replace("format = 1\n", f"format = 1\nrows = {list(own)}\n")
+    (folder / "own.toml").write_text(MODEL + marked)
+    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
+    plain, left_out = (spoken(capsys, *command, name) for name in ("plain.toml", "own.toml"))
+    assert "would count twice" in left_out.err and "its mean is taken" not in left_out.err
+    assert table(left_out) == table(plain)
+    others = Path("runs.csv").read_text().replace("a,0.1", "a,0.12").replace("a,0.3", "a,0.32")
+    Path("others.csv").write_text(others.replace("a,0.5", "a,0.52"))
+    said = spoken(capsys, *command[:1], ANY_WHEEL, "others.csv", *command[3:], "own.toml").err
+    assert "its mean is taken" in said and "would count twice" not in said
 
 
 def test_generate_says_what_of_a_remainder_is_in_the_rows(folder, capsys):

@@ -126,6 +126,7 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
+    from soilml.config.remainder import SAME_ROWS
     from soilml.identification.model_error_inputs import with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.read_table import FILLED, RUNS
@@ -142,17 +143,20 @@ def run(args: argparse.Namespace) -> int:
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
     needed = tuple(key for key in RUNS if key in ("run", *read.values()))
     filled = [key for key in FILLED if key in needed]
-    table = case = None
+    table, case, own = None, None, []
     if args.runs is not None:
         table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     if args.case is not None:
         case = read_case_of_rows(args, args.case, table)
+        if table is not None:
+            learned, case = case.remainder, case.without_remainder_of(table)
+            own = [SAME_ROWS] if case.remainder is not learned else []
     if args.exact_model:
         estimators = [with_exact_model(estimator) for estimator in estimators]
     estimators, remarks = estimators_for_case(
         estimators, case, args.case, pooled=args.by is not None
     )
-    remarks = [*map(presentation.description, estimators), *remarks]
+    remarks = [*map(presentation.description, estimators), *remarks, *own]
     if table is None:
         show("\n".join(texts(remarks)))
         return 0
