@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.errors import raised
+from soilml.errors import InputError
 from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
@@ -161,7 +161,10 @@ def _settled(
         own = _with_estimated_covariance(own, fit, ())
         whiten = own.discrepancy.whiten(amplitude)
         start = StartedFit(fit.case, fit.coordinates, fit.start_values(), whiten, fit.linearisation)
-        fit = raised(fit_many(own, [start])[0])
+        (found,) = fit_many(own, [start])
+        if isinstance(found, InputError):
+            break
+        fit = found
         again, cleared = _outliers_of(problem, own, fit, (), excluded, cleared)
         if np.array_equal(again, excluded):
             break
