@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias, TypeVar
@@ -30,8 +31,8 @@ MAX_ITERATIONS = 25
 #: the data); and where the best of several steps lowers it by less than `ENOUGH` or `STEP_SHARE`.
 ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
 #: A descent that creeps has converged too: so many iterations have together lowered the objective
-#: by less than the first figure, or by less than this share of its excess.
-CREEPING, CREEPING_ENOUGH, CREEPING_SHARE = 4, 0.15, 5e-4
+#: by less than the second figure, or by less than `SHARE`.
+CREEPING, CREEPING_ENOUGH = 4, 0.15
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several.
 KEPT_PROMISE = 0.5
@@ -321,17 +322,17 @@ def descent(
         known = yield ModelQuestion(problem.request(x[None, :]), linearise=True)
     last = problem.at(x, known)
     damping, converged, trusted = FIRST_DAMPING, False, True
-    passed: list[float] = []  # the objectives that iterations began with
+    passed: deque[float] = deque(maxlen=CREEPING)  # objectives that the last iterations began with
     for _ in range(MAX_ITERATIONS):
-        passed.append(last.objective)
         excess = last.objective - len(last.residual)
         promised = steps.promised(last.x, last.residual, last.jacobian)
-        creeps = passed[-1 - CREEPING :][0] - last.objective < max(
-            CREEPING_ENOUGH, CREEPING_SHARE * excess
+        creeps = len(passed) == CREEPING and passed[0] - last.objective < max(
+            CREEPING_ENOUGH, SHARE * excess
         )
-        converged = promised < max(ENOUGH, SHARE * excess) or (len(passed) > CREEPING and creeps)
+        converged = creeps or promised < max(ENOUGH, SHARE * excess)
         if converged:
             break
+        passed.append(last.objective)
         if trusted:
             factor = np.asarray([damping * DAMPING_FACTORS[0]])
             points = last.x[None, :], last.residual[None, :]

@@ -46,7 +46,7 @@ def readings_with_model_error(
         return dict(readings)
     takes_noise = estimator.sets is not None and (together or estimator.sets.sets_only)
     noise = estimator.sets.noise if estimator.sets is not None and takes_noise else None
-    learned = case.remainder if _trained_with(estimator) is None else None
+    learned = case.remainder if trained_remainder(estimator) is None else None
     return with_model_error(case.discrepancy, learned, readings, noise, together=together)
 
 
@@ -120,7 +120,7 @@ def model_error_remarks(estimator: Estimator, case: Case, *, pooled: bool) -> li
         remarks.append(Remark("discrepancy-included", text, tuple(declared), "note"))
     if not learned:
         return remarks
-    trained = _trained_with(estimator)
+    trained = trained_remainder(estimator)
     text = f"[remainder] of {', '.join(learned)}"
     if trained == case.remainder:
         text = f"the file was trained with the {text}"
@@ -135,7 +135,7 @@ def model_error_remarks(estimator: Estimator, case: Case, *, pooled: bool) -> li
     return [*remarks, Remark("remainder-included", text, tuple(learned), "note")]
 
 
-def _trained_with(estimator: Estimator) -> Remainder | None:
+def trained_remainder(estimator: Estimator) -> Remainder | None:
     """The remainder in the recipe of a file."""
     own = recipe_case(estimator.metadata["recipe"], str(estimator.path))
     return None if own is None else own.remainder

@@ -10,6 +10,7 @@ from conftest import MODEL, RECIPE
 
 from soilml import Operating, read_case
 from soilml.cli import main
+from soilml.identification import model_error_inputs
 from soilml.io.read_table import read_table
 
 DISCREPANCY = '[discrepancy]\ntorque_Nm = "3 %"\ndrawbar_pull_N = 1.5\n'
@@ -131,7 +132,7 @@ def test_an_estimate_has_the_mean_and_the_error_of_a_remainder(folder, capsys):
         assert abs(float(after[key]) - float(before[key])) < size
 
 
-def test_an_estimate_leaves_out_a_remainder_that_its_own_rows_taught(folder, capsys):
+def test_an_estimate_leaves_out_a_remainder_that_its_own_rows_taught(folder, capsys, monkeypatch):
     (folder / "learned.toml").write_text(MODEL + REMAINDER)
     own = read_case("learned.toml").remainder.of_rows(read_table("runs.csv")).rows
     marked = REMAINDER.replace("format = 1\n", f"format = 1\nrows = {list(own)}\n")
@@ -144,6 +145,11 @@ def test_an_estimate_leaves_out_a_remainder_that_its_own_rows_taught(folder, cap
     Path("others.csv").write_text(others.replace("a,0.5", "a,0.52"))
     said = spoken(capsys, *command[:1], ANY_WHEEL, "others.csv", *command[3:], "own.toml").err
     assert "its mean is taken" in said and "would count twice" not in said
+    # a file that was trained with it contains it, whatever the rows
+    learned = read_case("own.toml").remainder
+    monkeypatch.setattr(model_error_inputs, "trained_remainder", lambda _: learned)
+    said = spoken(capsys, *command, "own.toml").err
+    assert "the file was trained with the [remainder]" in said and "count twice" not in said
 
 
 def test_generate_says_what_of_a_remainder_is_in_the_rows(folder, capsys):

@@ -127,7 +127,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
-    from soilml.identification.model_error_inputs import with_exact_model
+    from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.read_table import FILLED, RUNS
     from soilml.onboard import presentation, table_estimates
@@ -148,7 +148,7 @@ def run(args: argparse.Namespace) -> int:
         table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
     if args.case is not None:
         case = read_case_of_rows(args, args.case, table)
-        if table is not None:
+        if table is not None and not any(map(trained_remainder, estimators)):
             learned, case = case.remainder, case.without_remainder_of(table)
             own = [SAME_ROWS] if case.remainder is not learned else []
     if args.exact_model:

@@ -299,7 +299,7 @@ def fit_marginal(
     """
     best = [lowest]
     found = in_step([_marginal(problem, *request, best) for request in requests])
-    return [None if isinstance(fit, InputError) else fit for fit in found]
+    return [raised(fit) for fit in found]
 
 
 def _marginal(

@@ -148,6 +148,32 @@ def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
 
 
 @pytest.mark.parametrize(
+    "rival, complete, only_test",
+    [(("a",), True, True), (("a",), False, False), (("a", "b"), True, False)],
+)
+def test_no_effect_is_fitted_with_opened_priors_where_one_alone_explains_all(
+    passes, monkeypatch, rival, complete, only_test
+):
+    given, run = passes
+    given.accepted, asked = [None], []
+    soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
+    gap_test = SimpleNamespace(p_value=0.001)
+    look = replace(module._no_result(soil), soil_test=gap_test)
+    opened = OpenedPriors(CASE, tuple(free_soil_parameters(CASE, None)), Remark("prior-opened", ""))
+
+    def begin(*_, only_test, likeliest):
+        asked.append(only_test)
+        return module.Analysis(soil.problem, look), {}
+
+    monkeypatch.setattr(analysis, "open_priors", lambda *_: opened)
+    monkeypatch.setattr(analysis, "begin", begin)
+    monkeypatch.setattr(analysis, "_rival", lambda found: SimpleNamespace(names=rival))
+    monkeypatch.setattr(analysis, "is_complete", lambda *_: complete)
+    run()
+    assert asked == [only_test]
+
+
+@pytest.mark.parametrize(
     "has_gap, better, searches", [(True, False, 1), (True, True, 2), (False, False, 2)]
 )
 def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_they_count(
@@ -260,6 +286,8 @@ def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
     problem, fit, wrong, excluded = two_outliers
     none, largest = np.zeros(96, dtype=np.bool_), wrong & (problem.readings.row == 20)
     all_of_them = problem.fit_soil([np.full(3, 0.5)])
+    # a lesser one strays too, but less than half as far
+    assert np.array_equal(module._stray(problem, all_of_them, ()), largest)
     found, cleared = module._settled(problem, all_of_them, np.zeros(3), largest, none)
     assert np.array_equal(found, wrong) and not cleared.any()
     found, cleared = module._settled(problem, fit, np.zeros(3), excluded, none)
