@@ -295,6 +295,8 @@ def _build_report(
     replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     if smooth_gap:
         own, written = with_fitted_lengths(problem, written)
+        if not (written.evidence.amplitude.any() or any(c.effect for c in written.fit.coordinates)):
+            written = replace(written, fit=result.soil)
         learned = learned_remainder(own, written)
         left = discrepancy_amplitudes(problem, written)
         intervals = with_uncertain_discrepancy(problem, written)

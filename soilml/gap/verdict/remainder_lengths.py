@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from soilml.arrays import Floats
+from soilml.arrays import Floats, Integers
 from soilml.config.measurement_noise import LOG_LOAD_LENGTH, SLIP_LENGTH
 from soilml.errors import InputError
 from soilml.fitting.covariance import USUAL
@@ -58,7 +58,7 @@ def with_fitted_lengths(
     a size that is fitted too: what changes fast with slip or load is no noise, and the variance
     components of a search take it for noise or for scatter between runs. The process of a channel
     whose discrepancy the case declares stays as it is. A process that predicts readings of its
-    channel no better than none does, each from the others, is left out: see `_predicts`. Soil and
+    channel no better than none does, each from the others, is left out: see `_gains`. Soil and
     effects, which were fitted beside it, are then fitted again, and else stay as they are.
 
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.8.
@@ -79,12 +79,23 @@ def with_fitted_lengths(
             USUAL, slip_length=process.slip_length, log_load_length=process.log_load_length
         )
     case = replace(problem.case, discrepancy=discrepancy)
-    evidence = replace(marginal.evidence, amplitude=amplitude)
     problem = replace(problem, case=case, covariance=covariance)
-    fit = marginal.fit
-    if np.any((amplitude == 0.0) & (marginal.evidence.amplitude > 0.0)):
-        fit = _fitted_again(problem, fit, amplitude)
+    fit, fitted = marginal.fit, marginal.evidence.amplitude
+    while True:
+        predicts = _predicts(problem, fit, amplitude)
+        for i in found:
+            amplitude[i] *= predicts[i]
+        if not np.any((amplitude == 0.0) & (fitted > 0.0)):
+            break
+        fit, fitted = _fitted_again(problem, fit, amplitude), amplitude.copy()
+    evidence = replace(marginal.evidence, amplitude=amplitude)
     return problem, replace(marginal, fit=fit, evidence=evidence)
+
+
+def _some_of(problem: FitProblem, channel: int) -> Integers:
+    """Numbers of the readings of a channel, evenly spread, `MOST_READINGS` at most."""
+    own = np.flatnonzero(problem.readings.channel == channel)
+    return own[:: -(-len(own) // MOST_READINGS)]
 
 
 def _fitted_again(problem: FitProblem, fit: Solution, amplitude: Floats) -> Solution:
@@ -119,13 +130,12 @@ def _likeliest(
     for i, name in enumerate(readings.channels):
         if usual[i] == 0.0 or column(name) in problem.case.discrepancy:
             continue
-        own = np.flatnonzero(readings.channel == i)
-        own = own[:: -(-len(own) // MOST_READINGS)]
+        own = _some_of(problem, i)
         known = covariance.matrix[np.ix_(own, own)]
         factor = np.linalg.cholesky(known)
         root = np.linalg.inv(factor)
         same_gear = gear[own][:, None] == gear[own]
-        likeliest = _of_channel(
+        found[i] = _of_channel(
             root @ residual[own],
             usual[i] * root,
             readings.slip[own],
@@ -135,39 +145,55 @@ def _likeliest(
             2.0 * float(np.log(np.diag(factor)).sum()),
             0.0 if marginal.evidence.amplitude[i] > 0.0 else LEAST_GAIN,
         )
-        z = slip_load_points(
-            readings.slip[own], readings.load[own], likeliest.slip_length, likeliest.log_load_length
-        )
-        process = np.where(same_gear, squared_exponential(z, z), 0.0)
-        process *= (likeliest.amplitude * usual[i]) ** 2
-        if not _predicts(residual[own], known * likeliest.noise**2, process):
-            likeliest = replace(likeliest, amplitude=0.0)
-        found[i] = likeliest
     return found
 
 
-def _predicts(residual: Floats, noise: Floats, process: Floats) -> bool:
-    r"""Whether a process predicts each residual (m,) from the others better than none does.
+def _predicts(problem: FitProblem, fit: Solution, amplitude: Floats) -> list[bool]:
+    """Whether the process of each channel predicts its residuals better than none does.
 
-    .. math:: e_i = [V^{-1} r]_i / [V^{-1}]_{ii}
+    Both of the gains of `_gains` exceed their standard errors.
 
-    is the error of the prediction of residual i under the covariance V of all. The sum of its
-    squares, over the variances of the noise, has to fall by more than the standard error of that
-    sum. What changes with a quantity that is neither slip nor load, such as the pass, can be
-    likelier as a process of slip than as noise, and still predicts nothing.
-
-    noise, process (m, m): Covariances of noise and scatter, and of the process.
-
-    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.12;
-    Vehtari, Gelman and Gabry, Statistics and Computing 27, 2017, eq. 24.
+    References: Vehtari, Gelman and Gabry, Statistics and Computing 27, 2017, eq. 24.
     """
-    squares = []
+    readings, process = problem.readings, problem.discrepancy.process
+    channels = range(len(readings.channels))
+    own = np.sort(np.concatenate([_some_of(problem, i) for i in channels]))
+    columns = (process.columns * amplitude[process.channel])[own]
+    noise, residual = (
+        problem.covariance.matrix[np.ix_(own, own)],
+        readings.measured - fit.prediction,
+    )
+    gains = _gains(residual[own], noise, columns @ columns.T) / problem.covariance.std[own] ** 2
+    of_channels = [gains[:, readings.channel[own] == i] for i in channels]
+    least = [np.sqrt(g.shape[1] * g.var(axis=1)) for g in of_channels]
+    return [bool((g.sum(axis=1) > e).all()) for g, e in zip(of_channels, least, strict=True)]
+
+
+def _gains(residual: Floats, noise: Floats, process: Floats) -> Floats:
+    r"""By how much processes K predict the square of each residual better, in two ways, (2, m).
+
+    .. math::
+        e_i = [V^{-1} r]_i / [V^{-1}]_{ii}, \quad
+        d_i = [K V^{-1} r]_i - [K V^{-1}]_{ii} e_i
+
+    are, from all other residuals r under their covariance V, the error of the prediction of
+    residual i, and what the processes alone predict there. The gains are what e_i^2 and
+    (r_i - d_i)^2 are below those without processes. What changes with a quantity that is neither
+    slip nor load, such as the pass, can be likelier as a process of slip than as noise, and still
+    predicts nothing. And scatter between runs, which a model does not have, can be the same in all
+    runs where it cancels a process.
+
+    noise, process (m, m): Covariances of noise and scatter, and of the processes.
+
+    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.12.
+    """
+    errors = []
     for covariance in (noise, noise + process):
         inverse = np.linalg.inv(covariance)
-        error = inverse @ residual / np.diag(inverse)
-        squares.append(error**2 / np.diag(noise))
-    gain = squares[0] - squares[1]
-    return bool(gain.sum() > np.sqrt(len(gain) * np.var(gain)))
+        weights = inverse @ residual
+        errors.append(weights / np.diag(inverse))
+    means = process @ weights - np.einsum("ij,ji->i", process, inverse) * errors[1]
+    return np.stack([errors[0] ** 2 - errors[1] ** 2, residual**2 - (residual - means) ** 2])
 
 
 def _of_channel(

@@ -104,14 +104,32 @@ def test_what_changes_with_the_pass_is_no_remainder_of_slip(monkeypatch):
     fits = [fit.whitened_by(known) for fit in (again.fit, away)]
     best, earlier = (fit.problem.objective(fit.residual, fit.x) for fit in fits)
     assert best < earlier - 1.0
-    monkeypatch.setattr(remainder_lengths, "_predicts", lambda *_: True)
+    monkeypatch.setattr(remainder_lengths, "_predicts", lambda *_: [True] * 3)
     assert with_fitted_lengths(*given)[1].evidence.amplitude[0] > 0.0
 
 
 def test_a_process_counts_where_each_residual_follows_from_the_others():
     z = np.arange(8.0)[:, None]
     process, noise = squared_exponential(z / 3.0, z / 3.0), 0.01 * np.eye(8)
-    assert remainder_lengths._predicts(np.sin(z[:, 0] / 3.0), noise, process)
+    smooth = np.sin((1.0 + z[:, 0]) / 3.0)
+    gains = remainder_lengths._gains(smooth, noise, process)
+    assert (gains > 0.0).all()
+    for i in range(8):
+        others = np.arange(8) != i
+        known = (noise + process)[np.ix_(others, others)]
+        mean = process[i, others] @ np.linalg.solve(known, smooth[others])
+        np.testing.assert_allclose(gains[:, i], smooth[i] ** 2 - (smooth[i] - mean) ** 2)
     alternating = np.where(z[:, 0] % 2.0, 1.0, -1.0)
-    assert not remainder_lengths._predicts(alternating, noise, process)
-    assert not remainder_lengths._predicts(alternating, noise, 0.0 * process)
+    assert (remainder_lengths._gains(alternating, noise, process).sum(axis=1) < 0.0).all()
+    assert not remainder_lengths._gains(alternating, noise, 0.0 * process).any()
+
+
+def test_a_process_counts_by_what_it_predicts_without_the_scatter_between_runs():
+    """Four runs of two channels: scatter moves both, but only the first is off, in all runs."""
+    run, of_first = np.repeat(np.arange(4), 8), np.tile([True] * 4 + [False] * 4, 4)
+    scatter = 9.0 * (run[:, None] == run)
+    process = 9.0 * (~of_first[:, None] & ~of_first)
+    noise = scatter + 0.01 * np.eye(len(run))
+    beside, alone = remainder_lengths._gains(np.where(of_first, 3.0, 0.0), noise, process)
+    assert beside[~of_first].sum() > 0.0  # the process cancels the scatter
+    assert alone[~of_first].sum() < -10.0  # and is wrong without it
