@@ -51,25 +51,27 @@ def test_the_soil_alone_explains_unless_it_is_improbable(rivals, chance, alone):
     assert [c.names for c in kept] == ([()] if alone else [c.names for c in sets])
 
 
-def test_probabilities_are_those_of_half_the_differences_of_the_evidence():
-    """Tempering one half: odds of exp(-difference / 4)."""
+def test_probabilities_are_those_of_tempered_differences_of_the_evidence():
+    """Tempering T: odds of exp(-T difference / 2), with a smaller T for decisions."""
     none = made(objective=10.0)
     sets, predicted = [none, made("a", objective=2.0)], {"a": 99.0, "b": 4.0, "c": np.nan}
-    found = posterior(sets, predicted, none, dict.fromkeys("abc", 0.0))
-    assert found == for_decisions(sets, predicted, none)
-    assert set(found.log_weights) == {(), ("a",), ("b",)}
-    assert sum(np.exp(v) for v in found.log_weights.values()) == pytest.approx(1.0)
-    assert found.log_weights["a",] - found.log_weights[()] == pytest.approx(2.0)
-    assert found.log_weights["b",] - found.log_weights[()] == pytest.approx(1.0)
-    assert found.effects() == ["a", "b"]
+    for found, half in (
+        (posterior(sets, predicted, none, dict.fromkeys("abc", 0.0)), 0.3),
+        (for_decisions(sets, predicted, none), 0.25),
+    ):
+        assert set(found.log_weights) == {(), ("a",), ("b",)}
+        assert sum(np.exp(v) for v in found.log_weights.values()) == pytest.approx(1.0)
+        assert found.log_weights["a",] - found.log_weights[()] == pytest.approx(half * 8.0)
+        assert found.log_weights["b",] - found.log_weights[()] == pytest.approx(half * 4.0)
+        assert found.effects() == ["a", "b"]
 
 
 def test_prior_odds_are_not_tempered():
     """An objective of 2 is evidence of -4 and prior odds of 1 to e^3."""
     none = made(objective=10.0)
     found = posterior([none, made("a", objective=2.0)], {"b": 4.0}, none, {"a": 6.0, "b": 8.0})
-    assert found.log_weights["a",] - found.log_weights[()] == pytest.approx(3.5 - 3.0)
-    assert found.log_weights["b",] - found.log_weights[()] == pytest.approx(3.0 - 4.0)
+    assert found.log_weights["a",] - found.log_weights[()] == pytest.approx(0.3 * 14.0 - 3.0)
+    assert found.log_weights["b",] - found.log_weights[()] == pytest.approx(0.3 * 12.0 - 4.0)
 
 
 @pytest.mark.parametrize(

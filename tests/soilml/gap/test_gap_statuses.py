@@ -245,7 +245,7 @@ def test_an_effect_on_one_channel_is_not_named_by_another_law_alone(law, monkeyp
 
 
 def test_a_name_has_a_probability_of_nine_tenths():
-    for chance, expected in ((0.96, "named"), (0.93, "suspected")):
+    for chance, expected in ((0.94, "named"), (0.92, "suspected")):
         weights = {("dig",): np.log(chance), ("plough",): np.log(1.0 - chance)}
         made = decide(PROBLEM, searched(NONE, DIG, weights=weights), (), ())
         assert made.status == expected and made.shown is DIG
