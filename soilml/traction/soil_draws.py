@@ -42,6 +42,13 @@ from soilml.remarks import Remark
 from soilml.report.numbers import format_probability
 from soilml.traction.draws import SoilDraws
 
+#: Where the soil of rows is drawn without a remainder that was learned from them.
+DRAWN_WITHOUT = Remark(
+    "same-rows",
+    "[remainder] was learned from rows of this table, which would count twice: the soil is drawn "
+    "without it, and the bands contain it",
+    severity="note",
+)
 #: Number of draws: the probability below a 5 % quantile of as many has a standard error of 1.1 %.
 DRAWS = 400
 
@@ -183,17 +190,22 @@ def measured_soil(
 ) -> MeasuredSoil:
     """The soil of the rows of a table; raises as `pull_report` does.
 
-    With `exact_model`, model and sensors are exactly as the case has them.
+    With `exact_model`, model and sensors are exactly as the case has them. Else a remainder that
+    was learned from these rows is left out, as by `identify`; predictions contain it.
     """
     if estimator is not None:
         check_wheel_size(case, table)
         return estimated_soil(estimator, case, table.rows(table.answered))
+    learned = case.remainder
+    if not exact_model:
+        case = case.without_remainder_of(table)
     unknown = select_free(case, free)
     readings = usable_readings(case, table)
     readings = condensed(case, readings, unknown)
     samples = soil_samples(case, readings, unknown, exact_model)
     draws = _soil_draws(unknown, samples.sample.u[samples.equally_weighted(DRAWS)])
-    warnings = list(readings.notes)
+    twice = case.remainder is not learned
+    warnings = [*([DRAWN_WITHOUT] if twice else []), *readings.notes]
     if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
@@ -203,8 +215,9 @@ def measured_soil(
             warnings.append(beyond_all_explanations(samples.noise_scale, consequence))
         else:
             warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
-    if isinstance(samples, AveragedSamples) and not any(e.exact for e in samples.explanations):
-        first = samples.explanations[0]
+    known = [] if twice or not isinstance(samples, AveragedSamples) else samples.explanations
+    if known and not any(e.exact for e in known):
+        first = known[0]
         likeliest = str(first) if first.effect else "errors of sensors and model"
         text = (
             f"the rows speak against the model as in its file, and first for {likeliest} "
