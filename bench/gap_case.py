@@ -29,9 +29,16 @@ SOLUTIONS = 4000
 ORDER = "progress"
 #: The other methods are run on one set in so many.
 EVERY = 8
-#: Causes of another law than the catalogue's that an effect names rightly: both the layer and the
-#: firm base are firmer ground at a depth below loose soil, where the pressure rises faster.
-SAME_CAUSE = {"stiff-layer": ["firm-base"]}
+#: Causes of another law than the catalogue's that effects name rightly. Both the layer and the firm
+#: base are firmer ground at a depth below loose soil, where the pressure rises faster. A soil that
+#: changes has the drifts of what changes.
+SAME_CAUSE = {
+    "stiff-layer": ["firm-base"],
+    "trend/friction": ["friction-drift"],
+    "trend/bearing": ["bearing-drift"],
+    "trend/drying": ["bearing-drift", "cohesion-drift"],
+    "trend/both": ["bearing-drift", "friction-drift"],
+}
 
 
 def judged(job: tuple[int, Plan]) -> dict[str, Any]:
@@ -43,7 +50,7 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
     record: dict[str, Any] = asdict(plan) | {
         "truth": truth,
         "catalogued": bool(truth) and {n.partition("@")[0] for n in truth} <= set(EFFECTS),
-        "relatives": _relatives(plan.tier, truth),
+        "relatives": _relatives(plan.tier, plan.cause, truth),
         "rows": len(table),
         "signal": 0.0,
         "snr": 0.0,
@@ -63,12 +70,10 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
     return record
 
 
-def _relatives(tier: str, truth: tuple[str, ...]) -> list[str]:
-    """Effects that are right too: of the law's family, of a soil that changes, or `SAME_CAUSE`."""
-    if tier == "C":
-        return [n for cause in truth for n in SAME_CAUSE.get(cause, ())]
-    if tier == "T":
-        return [n for n, e in EFFECTS.items() if ORDER in getattr(e.about, "uses", ())]
+def _relatives(tier: str, cause: str, truth: tuple[str, ...]) -> list[str]:
+    """Effects that are right too: of the law's family, or `SAME_CAUSE`."""
+    if tier in ("C", "T"):
+        return SAME_CAUSE.get(cause, [])
     families = {getattr(EFFECTS[n].about, "family", "") for n in truth if n in EFFECTS} - {""}
     if tier != "L" or not families:
         return []

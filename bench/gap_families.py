@@ -83,7 +83,7 @@ def text(sets: Sequence[Judged]) -> str:
         return ""
     return (
         "## Other laws, and soils that change\n\nThe likeliest explanation is the law or another "
-        "of its family, or a soil that changes.\n\n"
+        "of its family, or a drift of what changes in the soil.\n\n"
         + table(
             ("hidden", "sets", "first, SNR >= 3", "first, signature of 6 sigma", "falsely unique"),
             rows,

@@ -100,8 +100,9 @@ def test_a_law_of_the_same_family_is_right_and_any_other_is_false():
 
 
 def test_a_firm_base_is_a_right_name_of_a_stiff_layer():
-    relatives = gap_case._relatives("C", ("stiff-layer",))
-    assert relatives == ["firm-base"] and gap_case._relatives("C", ("crust",)) == []
+    relatives = gap_case._relatives("C", "stiff-layer", ("stiff-layer",))
+    assert relatives == ["firm-base"] and gap_case._relatives("C", "crust", ("crust",)) == []
+    assert gap_case._relatives("T", "trend/friction", ("trend",)) == ["friction-drift"]
     layer = record(tier="C", truth=("stiff-layer",), catalogued=False, relatives=relatives)
     sets = [layer | {"cause_set": [(name,)]} for name in ("firm-base", "slope")]
     found = list(gap_families.figures(sets))
@@ -194,7 +195,7 @@ def test_a_page_names_the_command_that_made_its_records(monkeypatch):
         return gap._command(gap._arguments())
 
     assert (
-        said("--every", "4", "--enlarge", "25", "--write", "--keep", "a.json") == "`make bench-gap`"
+        said("--every", "2", "--enlarge", "60", "--write", "--keep", "a.json") == "`make bench-gap`"
     )
     other = said("--every", "30", "--tier", "L", "--seed", "1", "2")
     assert other == "`python bench/gap.py --every 30 --seed 1 2 --tier L --write`"

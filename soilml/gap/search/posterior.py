@@ -90,9 +90,9 @@ class Posterior:
     def ranked(self) -> list[tuple[Names, float]]:
         """Sets of effects with the natural logarithm of their odds, the likeliest first.
 
-        A set that contains a listed one is not listed, unless the others of its effects are more
-        likely than not where that one is present: then it is listed in its place. Of a set with
-        effects that are each more likely than not, these are listed.
+        A set that contains a listed one is not listed, unless it is of usual size and the others of
+        its effects are more likely than not where that one is present: then it is listed in its
+        place. Of a set with effects that are each more likely than not, these are listed.
 
         References: Barbieri and Berger, Optimal predictive model selection, Annals of Statistics
         32, 2004: of single models, that of these effects predicts best under usual conditions.
@@ -101,7 +101,8 @@ class Posterior:
         odds = {names: self.log_odds(*names) for names in listed}
         for names in sorted(listed, key=lambda n: (-len(n), n)):
             parts = [n for n in odds if set(n) < set(names)]
-            if parts and min(self._given(names, part) for part in parts) > 0.5:
+            usual = names not in self.oversized
+            if usual and parts and min(self._given(names, part) for part in parts) > 0.5:
                 odds = {n: value for n, value in odds.items() if n not in parts}
             elif parts:
                 del odds[names]

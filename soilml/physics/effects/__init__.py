@@ -33,6 +33,7 @@ from soilml.physics.effects.rate_dependence import Rate as Rate
 from soilml.physics.effects.multipass import Multipass as Multipass
 from soilml.physics.effects.bearing_drift import BearingDrift as BearingDrift
 from soilml.physics.effects.cohesion_drift import CohesionDrift as CohesionDrift
+from soilml.physics.effects.friction_drift import FrictionDrift as FrictionDrift
 from soilml.physics.effects.lateral_slip import LateralSlip as LateralSlip
 from soilml.physics.effects.slope import Slope as Slope
 from soilml.physics.effects.load_transfer import LoadTransfer as LoadTransfer

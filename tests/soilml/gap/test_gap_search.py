@@ -91,11 +91,11 @@ def test_an_explanation_by_another_law_counts_in_part():
     assert first == sorted(first, key=lambda names: -found.probability(*names))
 
 
-def ranked(weights):
+def ranked(weights, **sets):
     """Suspects with their odds, of sets of effects joined by a plus sign, with these weights."""
     total = sum(weights.values())
     logs = {tuple(n.split("+")) if n else (): np.log(w / total) for n, w in weights.items()}
-    return {"+".join(names): np.exp(odds) for names, odds in Posterior(logs).ranked()}
+    return {"+".join(names): np.exp(odds) for names, odds in Posterior(logs, **sets).ranked()}
 
 
 def test_partners_that_are_less_likely_than_not_count_towards_their_suspect():
@@ -116,6 +116,11 @@ def test_rivals_none_of_which_is_likelier_than_not_are_listed_each():
     found = ranked({"a+b": 0.3, "c": 0.4, "a": 0.1, "": 0.2})
     assert list(found) == ["c", "a+b"]  # where "a" is present, so is "b": 0.3 of 0.4
     assert found["c"] > found["a+b"] == pytest.approx(0.3 / 0.7)
+
+
+def test_a_pair_of_implausible_size_does_not_take_the_place_of_its_part():
+    weights = {"a+b": 0.3, "c": 0.4, "a": 0.1, "": 0.2}
+    assert list(ranked(weights, oversized=frozenset({("a", "b")}))) == ["c", "a"]
 
 
 def test_the_true_law_needs_no_shape(named):

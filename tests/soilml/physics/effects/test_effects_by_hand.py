@@ -396,6 +396,8 @@ def test_the_soil_of_a_campaign_drifts_from_its_first_row_on():
         same(found, WHEEL(replace(SAND, **firm), AT))
         cohesive = replace(SAND, cohesion=SAND.cohesion + 600.0 * share)
         same((WHEEL + EFFECTS["cohesion-drift"](gain=600.0))(SAND, at), WHEEL(cohesive, AT))
+        dense = replace(SAND, friction_angle=SAND.friction_angle + 0.05 * share)
+        same((WHEEL + EFFECTS["friction-drift"](gain=0.05))(SAND, at), WHEEL(dense, AT))
     dry = (WHEEL + EFFECTS["cohesion-drift"](gain=-1e4))(SAND, AT)
     same(dry, WHEEL(replace(SAND, cohesion=0.0), AT))
 
