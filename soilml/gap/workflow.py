@@ -91,7 +91,7 @@ from soilml.gap.verdict.remainder import (
     residual_trend,
     with_uncertain_discrepancy,
 )
-from soilml.gap.verdict.remainder_lengths import with_fitted_lengths
+from soilml.gap.verdict.returned_model import returned_model
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
@@ -282,7 +282,6 @@ def _build_report(
     shown = decision.shown.best if decision.shown else before
     suspected = predictive_suspect(decision, predictive_gains(analysis.predictions))
     explained = shown if decision.claimed else beside
-    written = shown if suspected else explained  # what model.toml contains
     plain = plain_fit(problem, result.soil, decision.shown) if decision.shown else result.soil
     figures, beside_remainder = gap_reductions(analysis, decision.shown, plain, seed)
     if held_out is not None and len(held_out):
@@ -294,15 +293,15 @@ def _build_report(
     beside_remainder, _ = without_grown(beside_remainder, addition)
     replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     if smooth_gap:
-        own, written = with_fitted_lengths(problem, written)
-        if not (written.evidence.amplitude.any() or any(c.effect for c in written.fit.coordinates)):
-            written = replace(written, fit=result.soil)
+        options = (shown, beside) if suspected else (explained,)
+        own, written = returned_model(problem, result.soil, options, bool(decision.claimed))
+        suspected = suspected if any(c.effect for c in written.fit.coordinates) else ()
         learned = learned_remainder(own, written)
         left = discrepancy_amplitudes(problem, written)
         intervals = with_uncertain_discrepancy(problem, written)
         spread = among_candidates(intervals, result.candidates, result.posterior)
     else:
-        left, learned = None, None
+        left, learned, written = None, None, explained
         intervals = with_uncertain_discrepancy(problem, written)
         spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
     marked = tuple(n for n in suspected if n not in effect_names(case))  # what the case had stays

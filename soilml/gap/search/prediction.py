@@ -21,6 +21,9 @@ from soilml.gap.search.stepwise import SearchResult
 #: Explanations that are scored together, the likeliest first, and how often the next ones are
 #: scored where none of them predicts better than the soil alone.
 SCORED, ROUNDS = 4, 2
+#: Explanations that are scored first: those that may be stated. Larger sets that contain them can
+#: be likelier.
+FIRST_ACCEPTED = 2
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,8 @@ def predict_with(problem: FitProblem, result: SearchResult, seed: int) -> Predic
     parts = held_out_folds(problem.readings, seed)
     if result.soil_alone is None or not parts:
         return {}
-    waiting = [c for c in result.candidates if c.names]
+    listed = [*result.accepted[:FIRST_ACCEPTED], *result.candidates]
+    waiting = list({c.names: c for c in listed if c.names}.values())
     found: dict[Names, Mapping[str, HeldOutPrediction]] = {}
     asked = [result.soil_alone]
     for _ in range(ROUNDS):

@@ -1,6 +1,7 @@
 """An effect counts if it predicts rows kept back; priors that are pressed against are opened."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from soilml.gap.evidence.held_out import HeldOutPrediction
 from soilml.gap.evidence.outliers import ends_of_monotone_series
 from soilml.gap.evidence.score_test import score_test
 from soilml.gap.report.results import GapReduction
+from soilml.gap.search import prediction
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.reductions import grown_channels, without_grown
@@ -91,6 +93,24 @@ def test_a_gain_below_zero_within_its_error_is_neither_better_nor_worse():
 
 
 @pytest.mark.slow
+def test_what_may_be_stated_is_scored_though_larger_sets_are_likelier(monkeypatch):
+    def explained(*names):
+        return SimpleNamespace(names=names, fit=None, amplitude=None)
+
+    larger = [explained("dig", f"other{i}") for i in range(9)]
+    single, alone = explained("dig"), explained()
+    own = HeldOutPrediction(np.zeros(1), np.zeros(1))
+    monkeypatch.setattr(prediction, "held_out_folds", lambda *_: {"part": None})
+    monkeypatch.setattr(prediction, "predict_parts", lambda _, m, __: [{"part": own}] * len(m))
+    problem = SimpleNamespace(readings=None)
+    result = SimpleNamespace(
+        soil_alone=alone, accepted=(single,), candidates=(*larger, alone, single)
+    )
+    scored = list(prediction.predict_with(problem, result, 0))
+    assert scored[:3] == [(), ("dig",), ("dig", "other0")]
+    assert len(scored) == 1 + prediction.SCORED * prediction.ROUNDS
+
+
 def test_what_predicts_no_better_within_sampling_error_is_suspected_and_not_named(monkeypatch):
     case = case_of()
     table = driven(case, [DIGGING(n1=0.4)], seed=2)
