@@ -246,7 +246,7 @@ STATUSES = {
     "class": "several explanations account for the gap; these runs cannot distinguish them",
     "form-open": "one effect accounts for the gap, with a law that differs from the catalogue's",
     "suspected": "ranked suspects: no cause can be named",
-    "unknown": "there is a gap, and no effect of the catalogue explains it",
+    "unknown": "there is a gap that no effect explains better than a smooth error",
     "undecided": "measurements disagree with each other more than their noise allows",
     "not-testable": "there is a gap, but these runs cannot identify its cause",
     "bad-data": "the data cannot be analysed",

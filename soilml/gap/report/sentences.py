@@ -33,6 +33,7 @@ LISTED_SUSPECTS = 3  # Suspects that a line lists
 #: Logarithm of odds below which they are called even, and the largest odds that are stated.
 EVEN_ODDS, MOST_ODDS = 0.1, 10_000
 UNLIKELY_SUSPECT = 0.1  # Probability of the first suspect below which the headline doubts it
+HARDLY = 0.95  # Share of a gap that is left, above which it hardly shrinks
 NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
 
 #: Reasons in a few words, by their codes; the report lists them in full.
@@ -89,7 +90,7 @@ def headline(report: GapReport) -> str:
             return f"There is a gap, but these runs cannot identify its cause: {why}."
         case "unknown":
             faults = [r for r in report.reasons if r.code == "implausible-fault"]
-            which = ", and no effect of the catalogue explains it"
+            which = " that no effect explains better than a smooth error"
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
             pattern = format_p_value(report.p_gap).replace("\N{NO-BREAK SPACE}", " ")
@@ -103,12 +104,22 @@ def headline(report: GapReport) -> str:
     names = " + ".join(e.name for e in report.effects)
     sure = _sure(report)
     if report.status == "class":
-        rest = f", the likeliest of {len(report.cause_set)} explanations{sure}"
-        return f"The cause may be {names}{rest}{_shrinks(report)}."
+        return _one_of_several(report, names, sure)
     if report.status == "partly-named":
         return f"{names} explains a part of the gap{sure}{_shrinks(report)}."
     law = ", by another law than the catalogue's" if report.status == "form-open" else ""
     return f"{names} explains the gap{law}{sure}{_shrinks(report)}."
+
+
+def _one_of_several(report: GapReport, names: str, sure: str) -> str:
+    """The first of a class, with what is likelier still and may act beside any of them."""
+    count, end = len(report.cause_set), _shrinks(report)
+    if min((e.probability for e in report.effects), default=1.0) < UNLIKELY_SUSPECT:
+        return f"No effect is likely; the first of {count} explanations is {names}{sure}{end}."
+    parts = {name for own in report.cause_set for name in own}
+    beside = [s for s in report.suspects[:1] if not parts & set(s.effects)]
+    also = "".join(f", maybe beside {' + '.join(s.effects)} ({_number(s)})" for s in beside)
+    return f"The cause may be {names}, the likeliest of {count} explanations{sure}{also}{end}."
 
 
 def _first(report: GapReport) -> str:
@@ -135,7 +146,11 @@ def needed_sizes(suspect: Suspect) -> str:
 
 def _probability(suspect: Suspect) -> str:
     size = ", implausibly large" if suspect.times_usual else ""
-    return f"probability {format_probability(suspect.probability)}{size}"
+    return f"probability {_number(suspect)}{size}"
+
+
+def _number(suspect: Suspect) -> str:
+    return format_probability(suspect.probability)
 
 
 def _faults(report: GapReport) -> str:
@@ -185,7 +200,8 @@ def _shrinks(report: GapReport) -> str:
     before, after = report.gap["train"].before, report.gap["train"].after
     if not report.gap["train"].shrinks:
         return f"; the gap stays at {format_residual(before)}"
-    return f"; the gap shrinks {format_residual(before)} -> {format_residual(after)}"
+    hardly = "hardly " if after > HARDLY * before else ""
+    return f"; the gap {hardly}shrinks {format_residual(before)} -> {format_residual(after)}"
 
 
 def _short(reasons: Sequence[Remark]) -> str:

@@ -39,6 +39,8 @@ from soilml.report.numbers import format_quantity
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 LISTED_SUSPECTS = 8  # Suspects that are listed
+#: Share of the probability of effects from which a stated set with others takes their place.
+SAME_SUSPECT = 0.9
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
 
 
@@ -124,7 +126,14 @@ def suspects(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Suspect
     def as_claimed(names: tuple[str, ...]) -> tuple[str, ...]:
         return next((own for own in stated if set(own) <= set(names)), names)
 
+    def is_part(names: tuple[str, ...]) -> bool:
+        """Whether a stated set contains these effects, which hardly occur without the others."""
+        least = SAME_SUSPECT * posterior.probability(*names)
+        larger = [own for own in stated if set(names) < set(own)]
+        return any(posterior.probability(*own) > least for own in larger)
+
     listed = dict.fromkeys([*stated, *(as_claimed(names) for names, _ in posterior.ranked())])
+    listed = dict.fromkeys(names for names in listed if not is_part(names))
     ranked = sorted(((n, posterior.log_odds(*n)) for n in listed), key=lambda item: -item[1])
     ranked = posterior.from_first(ranked, {c.names: c.penalty for c in analysis.result.candidates})
     rest = [own for own in ranked[1:] if posterior.favours(own[0], problem.penalty(own[0]))]

@@ -139,6 +139,17 @@ def test_a_pair_that_contains_a_named_effect_is_listed_as_that_effect():
     assert found[0].log_odds > found[1].log_odds
 
 
+def test_a_part_of_a_stated_pair_is_listed_only_if_it_occurs_without_the_rest():
+    pairs = [made("a", "b"), made("a", "c")]
+    for alone, listed in ((1e-6, False), (0.1, True)):
+        weights = {("a", "b"): 0.5, ("a", "c"): 0.4, ("a",): 1e-6, ("b",): 1e-6, ("c",): alone}
+        logs = {names: float(np.log(weight)) for names, weight in weights.items()}
+        given = analysed(*map(made, "abc"), *pairs, weights=logs | {(): -30.0})
+        found = [s.effects for s in suspects(given, pairs)]
+        assert {("a", "b"), ("a", "c")} <= set(found)
+        assert (("c",) in found) == listed and ("b",) not in found
+
+
 def notes(given):
     fit = SimpleNamespace(coordinates=[], x=np.zeros(0))
     return texts(analysis_notes(given, fit, [fit], [remark("run a and run b")]))

@@ -86,7 +86,7 @@ def test_without_a_cause_the_first_reason_is_stated():
     assert said("undecided", reasons=reasons).endswith("disagree: there is one load only.")
     assert said("not-testable", reasons=reasons).endswith("its cause: there is one load only.")
     unknown = said("unknown", reasons=reasons, best_unclaimed=("a", "b"), discrepancy=LEFT)
-    assert "no effect of the catalogue explains it (mean squared residual 8.80" in unknown
+    assert "no effect explains better than a smooth error (mean squared residual 8.80" in unknown
     found = lines("unknown", reasons=reasons, discrepancy=LEFT)
     assert found["why"] == "Why no cause is named: there is one load only; runs differ."
     assert found["left"] == REMAINDER
@@ -188,6 +188,23 @@ def test_explanations_by_what_is_claimed():
     )
     assert lines("class", **alone)["suspects"].endswith("first: dig, or plough + rate.")
     assert lines("named", ["dig"], **parts)["tried"] == "The model has dig at another size."
+    weak = alone | {"effects": (effect("dig", 0.08),)}
+    assert said("class", **weak) == (
+        "No effect is likely; the first of 2 explanations is dig (probability 0.08); the gap "
+        "shrinks 8.80 -> 1.10."
+    )
+    slight = {"train": GapReduction(8.8, 8.5, {}, 96, "all rows fitted")}
+    assert said("named", **parts, gap=slight).endswith("; the gap hardly shrinks 8.80 -> 8.50.")
+
+
+def test_what_is_likelier_than_each_of_a_class_is_named_beside_it():
+    alone = {"effects": (effect("dig"),), "cause_set": (("dig",), ("plough", "rate"))}
+    for name, also in (("drift", ", maybe beside drift (0.93)"), ("rate", "")):
+        suspects = (Suspect((name,), 2.6, 0.93), Suspect(("dig",), 2.3, 0.912))
+        assert said("class", **alone, suspects=suspects) == (
+            f"The cause may be dig, the likeliest of 2 explanations (probability 0.91){also}; the "
+            "gap shrinks 8.80 -> 1.10."
+        )
 
 
 def concluded(status, obstacles=(), fixed=(), **parts):
