@@ -25,14 +25,6 @@ T = TypeVar("T")
 
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 25
-#: A descent has converged where the linearised model promises to lower the objective by less than
-#: `ENOUGH` (far below the thresholds on differences of the objective, which start at 9) or by less
-#: than the fraction `SHARE` of its excess over the number of readings (while the model is far from
-#: the data); and where the best of several steps lowers it by less than `ENOUGH` or `STEP_SHARE`.
-ENOUGH, SHARE, STEP_SHARE = 0.01, 5e-4, 2e-3
-#: A descent that creeps has converged too: so many iterations have together lowered the objective
-#: by less than the second figure, or by less than `SHARE`.
-CREEPING, CREEPING_ENOUGH = 4, 0.15
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
 #: alone, and else by a choice of several.
 KEPT_PROMISE = 0.5
@@ -52,12 +44,34 @@ MOST_LOG_STEP = 2.0  # Largest increase of the logarithm of such a parameter in 
 
 
 @dataclass(frozen=True)
+class Tolerance:
+    """Where a descent has converged, in decreases of its objective.
+
+    The linearised model promises less than `enough`, or less than the fraction `share` of the
+    excess over the number of readings (while the model is far from the data); the best of several
+    steps gives less than `enough` or `step_share`; or `iterations`, which creep, have together
+    given less than `creeping` or `share`.
+    """
+
+    enough: float
+    share: float
+    step_share: float
+    iterations: int
+    creeping: float
+
+
+#: For estimates: far below the thresholds on differences of the objective, which start at 9.
+FINE = Tolerance(enough=0.01, share=5e-4, step_share=2e-3, iterations=4, creeping=0.15)
+#: For fits that are compared first, of which those near the best go on to the fine one.
+COARSE = Tolerance(enough=0.5, share=0.01, step_share=0.01, iterations=3, creeping=1.0)
+
+
+@dataclass(frozen=True)
 class DampedSteps:
     """Steps in the coordinates of a fit: their bounds, priors and curvature.
 
     lower, upper (p,): Bounds, at which steps end.
-    precision, centre (p,): Precision of the normal density of each coordinate, 0 without one, and
-        its middle.
+    precision, centre (p,): Precision of each coordinate's normal density, or 0, and its middle.
     offset (p,): What is added to a coordinate to obtain a multiple of the parameter, where the
         parameter moves by ratios; infinite where it moves by differences.
     tests: Tests of the soil, which stand beside the residuals.
@@ -233,10 +247,9 @@ def descend_together(
 ) -> list[Solution | InputError]:
     """Bounded Levenberg-Marquardt descents, in step, so that each call of the model serves all.
 
-    Each starts at coordinates (p,), which are clipped to the bounds. The descents are independent;
-    the result of each is that of a descent alone, within the tolerance of the search for
-    equilibrium. Where the model refuses the coordinates of a trial, its `InputError` takes the
-    place of the solution.
+    Each starts at coordinates (p,), clipped to the bounds. The descents are independent; the result
+    of each is that of a descent alone, within the tolerance of the search for equilibrium. Where
+    the model refuses the coordinates of a trial, its `InputError` takes the place of the solution.
 
     known: Linearisations of the problems that may be at their starts; one that is spares the first
         call of the model.
@@ -296,16 +309,19 @@ def _answers(asked: Mapping[int, ModelQuestion]) -> dict[int, Floats | Linearisa
 
 
 def descent(
-    problem: LeastSquaresProblem, start: Floats, known: Linearisation | None = None
+    problem: LeastSquaresProblem,
+    start: Floats,
+    known: Linearisation | None = None,
+    tolerance: Tolerance = FINE,
 ) -> Asking[Solution]:
     """One descent; see `descend_together`.
 
     As long as the linearised model keeps its promise, each iteration is one step, at the end of
     which the model is linearised again. Else several dampings and `REPETITIONS` of the last step
     are tried first, each followed by a step with the same Jacobian, which leads back to the floor
-    of a curved valley. Trials start at the
-    sinkage that the last iterate predicts. An iterate is solved by the full search; it is no
-    improvement where that finds an equilibrium before the one of the trial.
+    of a curved valley. Trials start at the sinkage that the last iterate predicts. An iterate
+    is solved by the full search; it is no improvement where that finds an equilibrium before the
+    one of the trial.
     """
     steps = DampedSteps.of(problem)
 
@@ -322,14 +338,14 @@ def descent(
         known = yield ModelQuestion(problem.request(x[None, :]), linearise=True)
     last = problem.at(x, known)
     damping, converged, trusted = FIRST_DAMPING, False, True
-    passed: deque[float] = deque(maxlen=CREEPING)  # objectives that the last iterations began with
+    passed: deque[float] = deque(maxlen=tolerance.iterations)  # objectives before iterations
     for _ in range(MAX_ITERATIONS):
         excess = last.objective - len(last.residual)
         promised = steps.promised(last.x, last.residual, last.jacobian)
-        creeps = len(passed) == CREEPING and passed[0] - last.objective < max(
-            CREEPING_ENOUGH, SHARE * excess
-        )
-        converged = creeps or promised < max(ENOUGH, SHARE * excess)
+        share = tolerance.share * excess
+        slow = max(tolerance.creeping, share)
+        creeps = len(passed) == passed.maxlen and passed[0] - last.objective < slow
+        converged = creeps or promised < max(tolerance.enough, share)
         if converged:
             break
         passed.append(last.objective)
@@ -371,7 +387,7 @@ def descent(
         repeated = _repeated(steps, last.x, new.x)
         last, damping = new, max(float(dampings[best % len(dampings)]), MIN_DAMPING)
         trusted = improvement > KEPT_PROMISE * promised
-        converged = improvement < max(ENOUGH, STEP_SHARE * excess)
+        converged = improvement < max(tolerance.enough, tolerance.step_share * excess)
         if converged:
             break
     return replace(last, converged=converged)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeAlias
 
 import numpy as np
 
@@ -14,7 +15,15 @@ from soilml.errors import InputError, raised
 from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import Coordinate, shape_coordinates, size_coordinate
 from soilml.fitting.covariance import Whitening, discrepancy_process
-from soilml.fitting.damped_descents import Asking, descend_together, descent, in_step
+from soilml.fitting.damped_descents import (
+    COARSE,
+    FINE,
+    Asking,
+    Tolerance,
+    descend_together,
+    descent,
+    in_step,
+)
 from soilml.fitting.effect_signatures import Signature, current_size, effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation, linearise_many
@@ -188,16 +197,16 @@ def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution |
     return in_step([_fit(problem, fit) for fit in fits])
 
 
-def _fit(problem: FitProblem, fit: StartedFit) -> Asking[Solution]:
+def _fit(problem: FitProblem, fit: StartedFit, tolerance: Tolerance = FINE) -> Asking[Solution]:
     """One fit; see `fit_many`."""
     whiten = problem.covariance.whiten if fit.whiten is None else fit.whiten
     own = LeastSquaresProblem(fit.case, fit.coordinates, problem.readings, whiten)
+    first = problem.first_coordinates(own.coordinates, fit.start)
     try:
-        return (
-            yield from descent(own, problem.first_coordinates(own.coordinates, fit.start), fit.near)
-        )
+        return (yield from descent(own, first, fit.near, tolerance))
     except InputError:
-        return (yield from descent(own, _without_effects(own.coordinates, fit.start)))
+        first = _without_effects(own.coordinates, fit.start)
+        return (yield from descent(own, first, tolerance=tolerance))
 
 
 def restated(problem: FitProblem, fits: Sequence[Solution]) -> list[Solution]:
@@ -265,15 +274,21 @@ def exclude_each_other(effect: type[Effect], other: type[Effect]) -> bool:
     return base == other_base or (bool(family) and other.about.family == family)
 
 
-#: Fits at most under successive estimates of the discrepancy; the estimate of the amplitudes hardly
-#: changes after the second.
-MAX_ROUNDS = 3
+#: Fits at most: coarse or fine, under successive estimates of the discrepancy; the estimate of the
+#: amplitudes hardly changes after the second.
+MAX_ROUNDS = 4
 #: Change of an amplitude, in usual ones and relative to itself, below which a fit is final: the
 #: weights of the readings then hardly change.
 AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
 #: Evidence, in -2 ln p above the best, beyond which a fit is not repeated: repetition lowers it by
 #: 35 at most, by less than 10 for most fits.
 HOPELESS = 40.0
+#: The same below which a fit goes on to a fine tolerance: what is within reach of the best in a
+#: search is, with the prior odds that evidence is without.
+NEAR = 20.0
+#: Of several starts of one set of coordinates: what a fit must have below the best of the others to
+#: go on to a fine tolerance, and above it to be repeated no more.
+BETTER, WORSE = 0.1, 10.0
 
 
 @dataclass(frozen=True)
@@ -295,37 +310,52 @@ def fit_marginal(
 
     Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
     are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
-    above the lowest so far, and `lowest`, that of an earlier fit. All share the calls of the model.
+    above the lowest so far, and `lowest`, that of an earlier fit. The fits are coarse first; those
+    near the lowest go on to a fine tolerance, of several starts of one set of coordinates the best.
+    All share the calls of the model.
     """
-    best = [lowest]
-    found = in_step([_marginal(problem, *request, best) for request in requests])
-    return [raised(fit) for fit in found]
+    values: ValuesSoFar = {((), -1): lowest}
+    works = [_marginal(problem, *own, number, values) for number, own in enumerate(requests)]
+    return [raised(fit) for fit in in_step(works)]
+
+
+#: Evidence of fits by the paths of their coordinates and their number.
+ValuesSoFar: TypeAlias = dict[tuple[tuple[str, ...], int], float]
 
 
 def _marginal(
-    problem: FitProblem, start: StartedFit, amplitude: Floats, best: list[float]
+    problem: FitProblem, start: StartedFit, amplitude: Floats, number: int, values: ValuesSoFar
 ) -> Asking[MarginalFit | None]:
     """One fit with its evidence; see `fit_marginal`.
 
-    best: The lowest evidence of all fits so far, which this one may lower.
+    number: That of the fit among all.
+    values: The evidence of all fits so far, to which this one adds.
     """
     found: MarginalFit | None = None
+    paths, tolerance = tuple(c.path for c in start.coordinates), COARSE
     for _ in range(MAX_ROUNDS):
         whiten = problem.discrepancy.whiten(amplitude)
         try:
-            fit = yield from _fit(problem, replace(start, whiten=whiten))
+            fit = yield from _fit(problem, replace(start, whiten=whiten), tolerance)
         except InputError:
             break
         evidence = problem.discrepancy.evidence(fit, amplitude)
-        if not np.isfinite(evidence.value):  # some row has no equilibrium at the optimum
+        value = evidence.value
+        if not np.isfinite(value):  # some row has no equilibrium at the optimum
             break
         found = MarginalFit(fit, evidence, found.first if found else fit)
-        best[0] = min(best[0], evidence.value)
-        hopeless = evidence.value >= best[0] + HOPELESS
-        if hopeless or not _changed(amplitude, evidence.amplitude):
+        values[paths, number] = value
+        best = min(values.values())
+        others = [x for (own, i), x in values.items() if own == paths and i != number]
+        other = min(others, default=float("inf"))
+        near = value < best + NEAR and value < other - BETTER
+        hopeless = value >= best + HOPELESS or value >= other + WORSE
+        changed = _changed(amplitude, evidence.amplitude)
+        if hopeless or not (changed or (near and tolerance is COARSE)):
             break
         start = replace(start, start=fit.start_values(), near=fit.linearisation)
-        amplitude = evidence.amplitude
+        tolerance = FINE if near else COARSE
+        amplitude = evidence.amplitude if changed else amplitude
     return found
 
 

@@ -1,5 +1,6 @@
 """Steps of a bounded fit: parameters that move by ratios, bounds, and curved valleys."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,8 @@ from soilml.errors import InputError
 from soilml.fitting import damped_descents
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.damped_descents import (
-    CREEPING,
+    COARSE,
+    FINE,
     MAX_ITERATIONS,
     MOST_LOG_STEP,
     DampedSteps,
@@ -181,15 +183,30 @@ class Slope:
         return np.full(len(x), -1e3)
 
 
-@pytest.mark.parametrize("fall, creeps", [(0.03, True), (0.3, False)])
-def test_a_descent_that_creeps_has_converged(fall, creeps):
+#: As the coarse one, for descents that creep.
+CREEPING = replace(FINE, iterations=COARSE.iterations, creeping=COARSE.creeping)
+
+
+@pytest.mark.parametrize(
+    "fall, tolerance, creeps",
+    [(0.03, FINE, True), (0.3, FINE, False), (0.3, CREEPING, True), (0.6, CREEPING, False)],
+)
+def test_a_descent_that_creeps_has_converged(fall, tolerance, creeps):
     slope = Slope(fall)
-    work, answer = descent(slope, np.full(1, 0.5)), None
+    work, answer = descent(slope, np.full(1, 0.5), tolerance=tolerance), None
     with pytest.raises(StopIteration) as end:
         while True:
             answer = work.send(answer).request
     assert end.value.value.converged == creeps
-    assert slope.iterates == 1 + (CREEPING if creeps else MAX_ITERATIONS)
+    assert slope.iterates == 1 + (tolerance.iterations if creeps else MAX_ITERATIONS)
+
+
+def test_a_coarse_descent_ends_where_little_is_promised():
+    slope = Slope(0.3)  # its linearised model promises less than the coarse tolerance
+    work = descent(slope, np.full(1, 0.5), tolerance=COARSE)
+    with pytest.raises(StopIteration) as end:
+        work.send(work.send(None).request)
+    assert end.value.value.converged and slope.iterates == 1
 
 
 def test_works_share_calls_and_a_refusal_is_raised_where_it_was_asked(monkeypatch):

@@ -8,6 +8,7 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.damped_descents import FINE
 from soilml.gap.evidence import problem as problem_module
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
 from soilml.gap.evidence.marginal_likelihood import (
@@ -26,6 +27,7 @@ class Started:
     """A fit to be made, known by its name."""
 
     name: str
+    coordinates: tuple = ()
     start: dict = field(default_factory=dict)
     whiten: object = None
     near: object = None
@@ -33,19 +35,23 @@ class Started:
 
 @pytest.fixture
 def fitting(monkeypatch):
-    """Fits give, each time, the next value and amplitude that are listed under their name."""
+    """Fits give, each time, the next value and amplitude that are listed under their name.
+
+    The last ones stay.
+    """
     listed, asked = {}, []
 
-    def fit(problem, started):
+    def fit(problem, started, tolerance):
         yield from ()
-        asked.append((started.name, started.start, started.whiten))
+        asked.append((started.name, started.start, started.whiten, tolerance is FINE))
         if isinstance(listed[started.name], InputError):
             raise listed[started.name]
         start = {"from": started.name, "fit": len(asked)}
         return SimpleNamespace(name=started.name, start_values=lambda: start, linearisation=None)
 
     def evidence(fit, amplitude):
-        value, found = listed[fit.name].pop(0)
+        own = listed[fit.name]
+        value, found = own.pop(0) if len(own) > 1 else own[0]
         return Evidence(value, np.asarray([found]), np.zeros(0), np.asarray([found]))
 
     monkeypatch.setattr(problem_module, "_fit", fit)
@@ -54,45 +60,78 @@ def fitting(monkeypatch):
 
 
 def names(asked):
-    return [name for name, _, _ in asked]
+    return [name for name, *_ in asked]
+
+
+def started(name, path=None):
+    """A fit of a coordinate of its own, or of one that others have too."""
+    return Started(name, (SimpleNamespace(path=path or name),))
 
 
 def test_a_fit_is_repeated_from_its_optimum_until_its_amplitude_stays(fitting):
     problem, listed, asked = fitting
     listed |= {"steady": [(5.0, 0.2)], "moves": [(9.0, 1.0), (7.0, 2.5), (6.5, 2.4)]}
-    requests = [(Started(name), np.zeros(1)) for name in listed]
+    requests = [(started(name), np.zeros(1)) for name in listed]
     steady, moves = fit_marginal(problem, requests)
-    assert names(asked) == ["steady", "moves", "moves", "moves"]
-    assert [whiten for _, _, whiten in asked[1:]] == [0.0, 1.0, 2.5]
-    assert asked[3][1] == {"from": "moves", "fit": 3}
+    assert names(asked) == ["steady", "steady", "moves", "moves", "moves"]
+    assert [whiten for _, _, whiten, _ in asked] == [0.0, 0.0, 0.0, 1.0, 2.5]
+    assert asked[4][1] == {"from": "moves", "fit": 4}
     assert (steady.evidence.value, moves.evidence.value) == (5.0, 6.5)
-    assert steady.first is steady.fit  # the fit under the amplitudes that were started with
     assert moves.first.start_values() and moves.first is not moves.fit
 
 
-def test_a_fit_is_made_three_times_at_most(fitting):
+def test_a_fit_is_made_four_times_at_most(fitting):
     problem, listed, asked = fitting
-    listed["restless"] = [(9.0, 1.0), (8.0, 3.0), (7.0, 9.0), (6.0, 25.0)]
-    (found,) = fit_marginal(problem, [(Started("restless"), np.zeros(1))])
-    assert len(asked) == 3 and found.evidence.value == 7.0
+    listed["restless"] = [(9.0, 1.0), (8.0, 3.0), (7.0, 9.0), (6.0, 25.0), (5.0, 90.0)]
+    (found,) = fit_marginal(problem, [(started("restless"), np.zeros(1))])
+    assert len(asked) == 4 and found.evidence.value == 6.0
 
 
 @pytest.mark.parametrize("above, again", [(39.9, True), (40.1, False)])
 def test_a_fit_far_above_the_best_is_not_repeated(fitting, above, again):
     problem, listed, asked = fitting
-    listed |= {"best": [(5.0, 0.0)], "poor": [(5.0 + above, 1.0), (5.0, 1.0)]}
-    fit_marginal(problem, [(Started(name), np.zeros(1)) for name in listed])
-    assert names(asked)[2:] == (["poor"] if again else [])
+    listed |= {"best": [(5.0, 0.0)], "poor": [(5.0 + above, 1.0)]}
+    fit_marginal(problem, [(started(name), np.zeros(1)) for name in listed])
+    assert names(asked)[2:] == ["poor"] * (1 + again)
     asked.clear()
-    listed["poor"] = [(5.0 + above, 1.0), (5.0, 1.0)]
-    fit_marginal(problem, [(Started("poor"), np.zeros(1))], lowest=5.0)
+    fit_marginal(problem, [(started("poor"), np.zeros(1))], lowest=5.0)
     assert len(asked) == 1 + again
+
+
+def test_fits_near_the_best_go_on_to_a_fine_tolerance(fitting):
+    problem, listed, asked = fitting
+    listed |= {"best": [(5.0, 0.0)], "near": [(24.9, 0.0)], "far": [(25.1, 0.0)]}
+    listed |= {"becomes-near": [(25.1, 1.0), (6.0, 1.0)]}
+    fit_marginal(problem, [(started(name), np.zeros(1)) for name in listed])
+    fine = {name: [fine for own, *_, fine in asked if own == name] for name in listed}
+    assert fine == {
+        "best": [False, True],
+        "near": [False, True],
+        "far": [False],
+        "becomes-near": [False, False, True],
+    }
+
+
+@pytest.mark.parametrize("above, rounds", [(-0.2, 2), (0.0, 1)])
+def test_of_several_starts_of_one_set_the_best_is_made_fine(fitting, above, rounds):
+    problem, listed, asked = fitting
+    listed |= {"one": [(5.0, 0.0)], "other": [(5.0 + above, 0.0)]}
+    fit_marginal(problem, [(started(name, "same"), np.zeros(1)) for name in listed])
+    assert names(asked) == ["one", "one", *["other"] * rounds]
+
+
+@pytest.mark.parametrize("above, rounds", [(9.9, 2), (10.1, 1)])
+def test_a_start_that_is_worse_than_another_of_its_set_is_not_repeated(fitting, above, rounds):
+    problem, listed, asked = fitting
+    listed |= {"one": [(5.0, 0.0)], "other": [(5.0 + above, 1.0)]}
+    fit_marginal(problem, [(started(name, "same"), np.zeros(1)) for name in listed])
+    assert names(asked) == ["one", "one", *["other"] * rounds]
 
 
 def test_fits_that_the_model_refuses_or_that_have_no_equilibrium_are_none(fitting):
     problem, listed, _ = fitting
     listed |= {"refused": InputError("no"), "unsolved": [(np.nan, 1.0)], "good": [(1.0, 0.0)]}
-    found = fit_marginal(problem, [(Started(name), np.zeros(1)) for name in listed])
+    found = fit_marginal(problem, [(started(name), np.zeros(1)) for name in listed])
     assert found[0] is None and found[1] is None and found[2].evidence.value == 1.0
 
 
