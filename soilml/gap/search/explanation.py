@@ -129,10 +129,14 @@ def _better(first: MarginalFit | None, second: MarginalFit | None) -> MarginalFi
 
 
 def fit_shapes(
-    problem: FitProblem, candidates: Sequence[Explanation], limit: float = np.inf
+    problem: FitProblem,
+    candidates: Sequence[Explanation],
+    starts: Mapping[tuple[str, ...], Explanation] | None = None,
+    limit: float = np.inf,
 ) -> list[Explanation]:
     """The candidates with the shape coefficients of their effects estimated as well.
 
+    starts: Candidates of an earlier search, whose free laws are starts of these.
     limit: Objective from which fits under noise alone are no further starts.
     """
     started, index = [], []
@@ -144,9 +148,13 @@ def fit_shapes(
         same = alone is candidate.catalogue_law.fit and not candidate.amplitude.any()
         if alone is not None and alone.objective < limit and not same:
             first.append((alone, no_discrepancy))
+        earlier = (starts or {}).get(candidate.names)
+        if earlier is not None and earlier.free_law is not None:
+            first = [(earlier.free_law.fit, earlier.free_law.evidence.amplitude)]
         for fit, amplitude in first if shapes else []:
-            coordinates = [*fit.coordinates, *shapes]
-            started.append((StartedFit(fit.case, coordinates, fit.start_values()), amplitude))
+            own = candidate.catalogue_law.fit
+            coordinates = [*own.coordinates, *shapes]
+            started.append((StartedFit(own.case, coordinates, fit.start_values()), amplitude))
             index.append(i)
     free: dict[int, MarginalFit | None] = {}
     lowest = min((c.best.evidence.value for c in candidates), default=np.inf)
@@ -162,10 +170,12 @@ def fit_shapes(
 def restated_candidates(
     problem: FitProblem, candidates: Sequence[Explanation]
 ) -> dict[tuple[str, ...], Explanation]:
-    """Candidates of an earlier problem by their effects, with fits as `restated` has them."""
+    """Candidates of an earlier problem by their effects, with fits as `restated` has them.
+
+    Without those under noise alone, which are starts in the first search only.
+    """
     fits = [c.catalogue_law.fit for c in candidates]
     fits += [c.free_law.fit for c in candidates if c.free_law is not None]
-    fits += [c.noise_only for c in candidates if c.noise_only is not None]
     new = dict(zip(map(id, fits), restated(problem, fits), strict=True))
 
     def again(law: MarginalFit | None) -> MarginalFit | None:
@@ -176,7 +186,7 @@ def restated_candidates(
             c,
             catalogue_law=replace(c.catalogue_law, fit=new[id(c.catalogue_law.fit)]),
             free_law=again(c.free_law),
-            noise_only=c.noise_only and new[id(c.noise_only)],
+            noise_only=None,
         )
         for c in candidates
     }

@@ -45,8 +45,9 @@ STEPS = 1 + MAX_EFFECTS  # Steps of a search: the test for a gap, and the sets o
 #: Upper bound of the improvement by free shapes, in linearised gains; the full fit can exceed the
 #: linearised gain because the size changes with the shape.
 SHAPE_GAIN_FACTOR = 3.0
-#: Decrease of the sum of squares under noise alone from which the free law of an effect is tried.
-NOTABLE_GAIN = 20.0
+#: Decrease of the sum of squares under noise alone from which the free law of an effect is tried,
+#: and multiple of the least that an effect leaves, up to which it is.
+NOTABLE_GAIN, NOTABLE_RATIO = 20.0, 2.0
 #: Distance from the middle of the priors at which a second fit starts, relative to the optimum of
 #: the soil alone.
 INWARD = 0.8
@@ -235,7 +236,8 @@ def _from_soils_of(
         (StartedFit(problem.case, problem.soil, c.fit.start_values()), c.amplitude)
         for c in sorted(level, key=lambda c: c.objective)[:SOILS_AGAIN]
     ]
-    found = [Explanation((), m) for m in fit_marginal(problem, started) if m is not None]
+    fits = fit_marginal(problem, started, soil_alone.best.evidence.value)
+    found = [Explanation((), m) for m in fits if m is not None]
     best = min([soil_alone, *found], key=lambda c: c.objective)
     return best if best.objective < soil_alone.objective - SAME_OPTIMUM else soil_alone
 
@@ -249,7 +251,8 @@ def _fit_level(
 ) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    Beside a large discrepancy, single effects are fitted under noise alone first.
+    Beside a large discrepancy, single effects that no earlier search has fitted start under noise
+    alone too.
     """
     hidden = float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY
     single = all(not base.names for base in sets.values())
@@ -258,11 +261,8 @@ def _fit_level(
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, soil_alone.amplitude)
         noise_start = None
-        if hidden and single:
-            alone = base.noise_only
+        if hidden and single and names not in starts:
             noise_start = {path: off_bounds(x) for path, x in soil.start_values().items()}
-            if alone is not None:
-                noise_start = alone.start_values()
         fit = base.catalogue_law.fit
         requests.append(
             CandidateRequest(
@@ -273,15 +273,19 @@ def _fit_level(
     if not fitted:
         return []
     lowest = min(soil_alone.objective, *(c.objective for c in fitted))
-    notable = soil.objective - NOTABLE_GAIN
+    least = min(
+        (c.noise_only.objective for c in fitted if c.noise_only is not None), default=np.inf
+    )
+    notable = min(soil.objective - NOTABLE_GAIN, NOTABLE_RATIO * least)
     promising = [
         c
         for c in fitted
         if c.objective - SHAPE_GAIN_FACTOR * predicted_shape_gain(problem, c) < lowest
         or c.objective < lowest + WITHIN_REACH
         or (c.noise_only is not None and c.noise_only.objective < notable)
+        or (c.names in starts and starts[c.names].shape_supported)
     ]
-    shaped = {c.names: c for c in fit_shapes(problem, promising, notable)}
+    shaped = {c.names: c for c in fit_shapes(problem, promising, starts, notable)}
     return [shaped.get(c.names, c) for c in fitted]
 
 

@@ -9,7 +9,7 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import size_coordinate
-from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.damped_descents import FINE, levenberg_marquardt
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.predictions import linearise, predict
@@ -210,9 +210,9 @@ def test_a_refused_fit_starts_again_without_effects_and_is_refused_once_more(cle
     outcomes = iter(["a fit", InputError("first"), "later", InputError("first"), InputError("no")])
     asked = []
 
-    def descent(problem, start, known=None):
+    def descent(problem, start, known=None, tolerance=None):
         yield from ()
-        assert problem.coordinates is coordinates
+        assert problem.coordinates is coordinates and tolerance is FINE
         asked.append(start.tolist())
         outcome = next(outcomes)
         if isinstance(outcome, InputError):

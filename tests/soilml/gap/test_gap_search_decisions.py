@@ -108,8 +108,8 @@ def fitting(monkeypatch):
         seen.requests = requests
         return [seen.results[r.names] for r in requests if r.names in seen.results]
 
-    def fit_shapes(problem, candidates, limit):
-        seen.limit = limit
+    def fit_shapes(problem, candidates, starts, limit):
+        seen.starts, seen.limit = starts, limit
         seen.shaped = [c.names for c in candidates]
         return [replace(c, noise_only="shaped") for c in candidates]
 
@@ -129,14 +129,29 @@ def test_shapes_are_fitted_where_they_could_bring_a_set_to_the_best(fitting):
     none = made(objective=20.0)
     values = {"best": 0.0, "near": 14.9, "far": 15.1, "promises": 59.0, "too-little": 61.0}
     fitting.results = {(n,): made(n, objective=v) for n, v in values.items()}
+    fitting.promise = {("promises",): 20.0, ("too-little",): 20.0}
     fitting.results["by-noise",] = made("by-noise", objective=70.0, noise_only=fit_of(79.0))
     fitting.results["not-by-noise",] = made("not-by-noise", objective=70.0, noise_only=fit_of(81.0))
-    fitting.promise = {("promises",): 20.0, ("too-little",): 20.0}
-    found = level(none, dict.fromkeys(fitting.results, none))
-    assert fitting.shaped == [("best",), ("near",), ("promises",), ("by-noise",)]
-    assert fitting.limit == 80.0
+    shaped_before = made("shaped-before", objective=70.0)
+    fitting.results["shaped-before",] = shaped_before
+    free_law = MarginalFit(shaped_before.fit, replace(shaped_before.best.evidence, value=69.0))
+    earlier = {("shaped-before",): replace(shaped_before, free_law=free_law), ("far",): none}
+    found = level(none, dict.fromkeys(fitting.results, none), earlier)
+    named = ["best", "near", "promises", "by-noise", "shaped-before"]
+    assert fitting.shaped == [(name,) for name in named]
+    assert fitting.limit == 80.0 and fitting.starts is earlier
     assert [c.names for c in found] == list(fitting.results)  # in their order, shaped or not
     assert [c.names for c in found if c.noise_only == "shaped"] == fitting.shaped
+
+
+def test_shapes_start_under_noise_up_to_twice_what_the_best_effect_leaves(fitting):
+    left = {"best": 30.0, "twice": 59.0, "more": 61.0}
+    fitting.results = {
+        (n,): made(n, objective=20.0 * i, noise_only=fit_of(x))
+        for i, (n, x) in enumerate(left.items())
+    }
+    level(made(objective=0.0), dict.fromkeys(fitting.results, made()))
+    assert fitting.shaped == [("best",), ("twice",)] and fitting.limit == 60.0
 
 
 def test_the_soil_alone_is_one_of_those_that_shapes_must_reach(fitting):
@@ -165,11 +180,10 @@ def test_a_set_starts_from_what_it_extends_or_from_an_earlier_search(fitting):
 def test_single_effects_beside_a_large_discrepancy_are_fitted_under_noise_first(fitting, largest):
     none = made(amplitude=(0.0, largest))
     soil = fit_of(0.0, {"cohesion": 1.0, "shear_modulus": 0.25})
-    earlier = made("b", noise_only=fit_of(x={"cohesion": 0.7}))
-    level(none, {("a",): none, ("b",): none}, {("b",): earlier}, soil)
+    level(none, {("a",): none, ("b",): none}, {("b",): made("b")}, soil)
     # nearer to the middle of the priors, since the soil alone is often at a bound
     inward = {"cohesion": pytest.approx(0.9), "shear_modulus": pytest.approx(0.3)}
-    expected = [inward, {"cohesion": 0.7}] if largest >= 2.5 else [None, None]
+    expected = [inward if largest >= 2.5 else None, None]  # the second starts where it was found
     assert [r.noise_start for r in fitting.requests] == expected
     level(none, {("a", "b"): made("a", amplitude=(0.0, largest))}, {}, soil)
     assert [r.noise_start for r in fitting.requests] == [None]
@@ -331,7 +345,8 @@ def test_a_better_optimum_of_the_soil_alone_takes_its_place(searched):
 def test_the_soil_alone_starts_from_the_soils_of_the_two_best_explanations(monkeypatch):
     started = []
 
-    def fit_marginal(problem, fits):
+    def fit_marginal(problem, fits, lowest):
+        assert lowest == 50.0
         started.append(fits)
         return [made(objective=value).catalogue_law for value in objectives]
 

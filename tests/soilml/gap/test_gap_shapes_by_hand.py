@@ -115,6 +115,27 @@ def test_each_candidate_keeps_the_better_of_its_fits_with_shapes(dug, monkeypatc
     assert len(asked) == 2
 
 
+def test_shapes_start_from_the_free_law_of_an_earlier_search(dug, monkeypatch):
+    problem, found = dug
+    (before,) = explanation.fit_shapes(problem, [found])
+    asked = []
+
+    def fitted(problem, started, lowest):
+        asked.extend(started)
+        return [None] * len(started)
+
+    monkeypatch.setattr(explanation, "fit_marginal", fitted)
+    again = replace(found, noise_only=replace(found.fit))
+    explanation.fit_shapes(problem, [again], {found.names: before})
+    ((start, amplitude),) = asked
+    assert start.start == before.free_law.fit.start_values()
+    assert amplitude is before.free_law.evidence.amplitude
+    assert [c.path for c in start.coordinates] == [c.path for c in before.free_law.fit.coordinates]
+    asked.clear()
+    explanation.fit_shapes(problem, [again], {found.names: found})  # it had no free law
+    assert len(asked) == 2
+
+
 def test_a_candidate_keeps_its_fit_under_noise_alone(dug):
     problem, found = dug
     none = np.zeros(len(problem.readings.channels))
