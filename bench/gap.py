@@ -35,7 +35,7 @@ from soilml.processes import process_map
 SEEDS = (10, 11)
 #: Of each so many plans, `make bench-gap` takes one. Each group of `gap_enlarged` has at least so
 #: many sets with a cause that can be named, as far as there are any.
-USUAL_EVERY, USUAL_LEAST = 2, 60
+USUAL_EVERY, USUAL_LEAST = 3, 60
 #: Records are kept after so many sets, so that a run that is ended leaves those it has.
 KEEP_EVERY = 5
 

@@ -195,7 +195,7 @@ def test_a_page_names_the_command_that_made_its_records(monkeypatch):
         return gap._command(gap._arguments())
 
     assert (
-        said("--every", "2", "--enlarge", "60", "--write", "--keep", "a.json") == "`make bench-gap`"
+        said("--every", "3", "--enlarge", "60", "--write", "--keep", "a.json") == "`make bench-gap`"
     )
     other = said("--every", "30", "--tier", "L", "--seed", "1", "2")
     assert other == "`python bench/gap.py --every 30 --seed 1 2 --tier L --write`"

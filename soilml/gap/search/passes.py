@@ -42,6 +42,7 @@ from soilml.gap.evidence.problem import (
 )
 from soilml.gap.evidence.score_test import ScoreTest
 from soilml.gap.search.explanation import restated_candidates
+from soilml.gap.search.likelier_scatter import with_likelier_scatter
 from soilml.gap.search.prediction import Predictions
 from soilml.gap.search.residual_test import ResidualTest
 from soilml.gap.search.screening import Starts, likeliest_sets
@@ -281,6 +282,10 @@ def _search_in_passes(
         soil = problem.fit_soil([result.soil.x], result.soil.linearisation)
         starts = {c.names: c for c in result.candidates}
         result = search(problem, soil, seed, starts, _in_pass(number, progress))
+    if (scattered := with_likelier_scatter(problem, result)) is not None:
+        problem, starts = scattered, {c.names: c for c in result.candidates}
+        soil = problem.fit_soil([result.soil.x], result.soil.linearisation)
+        result = search(problem, soil, seed, starts)
     return Analysis(problem, result), result.accepted[0].fit if result.accepted else result.soil
 
 
