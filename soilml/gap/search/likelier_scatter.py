@@ -28,13 +28,20 @@ COMPARED = 3
 
 
 def with_likelier_scatter(problem: FitProblem, result: SearchResult) -> FitProblem | None:
-    """The problem with a larger scatter, where the evidence is better with it.
+    r"""The problem with a larger scatter, where the evidence is better with it.
+
+    .. math:: -2 \ln p(y, \sigma) = \min_M [-2 \ln p(y \mid M, \sigma)] - 2 \ln p(\sigma)
+
+    over the explanations M that are compared, with the determinant of the covariance of noise and
+    scatter sigma, which fits under one covariance share.
 
     Scatter is estimated from what soil, effects and their signatures leave. Where the signatures
     that differ from run to run are hardly fewer than the runs, nothing is left: none is found, and
     such an effect takes what scatter did. The evidence of the soil alone and of the likeliest
     explanations tells, where one of them has such an effect. None where the estimated scatter is as
     good.
+
+    References: MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992, section 2.
     """
     alone, first = result.soil_alone, (result.likeliest, *result.accepted[:1])
     names = {name for c in first if c is not None for name in c.names}
