@@ -114,12 +114,17 @@ def headline(report: GapReport) -> str:
 def _one_of_several(report: GapReport, names: str, sure: str) -> str:
     """The first of a class, with what is likelier still and may act beside any of them."""
     count, end = len(report.cause_set), _shrinks(report)
-    if min((e.probability for e in report.effects), default=1.0) < UNLIKELY_SUSPECT:
+    chance = min((e.probability for e in report.effects), default=1.0)
+    if chance < UNLIKELY_SUSPECT:
         return f"No effect is likely; the first of {count} explanations is {names}{sure}{end}."
+    begin = f"The cause may be {names}, the likeliest of {count} explanations{sure}"
+    first = report.suspects[0] if report.suspects else None
     parts = {name for own in report.cause_set for name in own}
-    beside = [s for s in report.suspects[:1] if not parts & set(s.effects)]
-    also = "".join(f", maybe beside {' + '.join(s.effects)} ({_number(s)})" for s in beside)
-    return f"The cause may be {names}, the likeliest of {count} explanations{sure}{also}{end}."
+    if first and first.probability > chance and not parts & set(first.effects):
+        longer = f"{begin}, maybe beside {' + '.join(first.effects)} ({_number(first)}){end}."
+        if len(longer.split()) <= HEADLINE_WORDS:
+            return longer
+    return f"{begin}{end}."
 
 
 def _first(report: GapReport) -> str:

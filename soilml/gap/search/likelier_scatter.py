@@ -44,9 +44,11 @@ def with_likelier_scatter(problem: FitProblem, result: SearchResult) -> FitProbl
     References: MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992, section 2.
     """
     alone, first = result.soil_alone, (result.likeliest, *result.accepted[:1])
+    if alone is None:
+        return None
     names = {name for c in first if c is not None for name in c.names}
     cards = [problem.effects[name].about for name in names]
-    if alone is None or not any(card.needs or card.uses for card in cards):
+    if not any(card.needs or card.uses for card in cards):
         return None
     known = problem.covariance.components
     columns = run_effect_columns(result.soil.fitted(), problem.readings)
