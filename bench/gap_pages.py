@@ -201,10 +201,8 @@ def _reliability(sets: Sequence[Judged]) -> str:
         f"## Reliability of stated probabilities\n\n![reliability](../{Path(PICTURE).name})\n\n"
         f"{len(stated)} statements, one for each effect that a set could test. A statement is true "
         "if the effect was hidden in that set. A bin of 50 statements deviates by more than 0.05 "
-        "by chance alone, so that the gate is for wide bins, and for all together. Exact "
-        "probabilities hardly ever deviate as much in all wide bins: the benchmark hides some "
-        "effects more often than the prior expects, and thousands of small probabilities show "
-        "it. The prior expects one cause that the model "
+        "by chance alone: its figure has no gate. Two figures judge all wide bins together. The "
+        "prior expects one cause that the model "
         "lacks, and none in 37 % of sets; fewer sets here lack a cause of the catalogue. The last "
         "column weights them to that share.\n\n"
         + table(("stated, mean", "hidden", "difference", "at the mix that is expected"), rows)

@@ -130,9 +130,12 @@ def _probabilities(sets: Sequence[Judged]) -> Iterator[Figure]:
     text = f"{gap_reliability.largest(mixed):.3f}" if mixed else "-"
     yield Figure("stated probabilities, the same at the mix that the prior expects", text)
     share_of_exact = gap_reliability.chance_of_as_much(stated, true)
+    there = bool(np.isfinite(share_of_exact))
     yield Figure(
         "stated probabilities, share of exact ones that deviate as much in all wide bins",
-        f"{share_of_exact:.3f}" if np.isfinite(share_of_exact) else "-",
+        f"{share_of_exact:.3f}" if there else "-",
+        ">= 0.05",
+        share_of_exact >= 0.05 if there else None,
     )
     found, (low, high), (usual, seldom) = gap_reliability.calibration_error(sets)
     there = bool(np.isfinite(found))

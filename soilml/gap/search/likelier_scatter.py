@@ -21,7 +21,8 @@ from soilml.gap.search.stepwise import SearchResult
 SIZES = (0.0, 1.0, 2.0, 4.0)
 #: Scatter of soils that are prepared alike, in these units: the mean of its prior.
 USUAL_SIZE = 1.0
-#: Decrease of -2 ln of the evidence from which a larger scatter replaces the estimated one.
+#: Decrease of -2 ln of the evidence from which a larger scatter replaces the estimated one:
+#: odds of 7 to 1.
 LIKELIER = 4.0
 #: Explanations, the likeliest first, that are compared beside the soil alone.
 COMPARED = 3

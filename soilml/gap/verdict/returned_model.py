@@ -26,7 +26,6 @@ def returned_model(
     soil: The soil alone, fitted under noise and scatter.
     stated: Whether the first one is stated as the cause: then it is taken.
     """
-    own, written = problem, options[-1]
     for option in options:
         own, written = with_fitted_lengths(problem, option)
         if stated:
