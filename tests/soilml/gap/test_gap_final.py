@@ -11,6 +11,7 @@ from soilml.gap.evidence.problem import MarginalFit, _changed
 from soilml.gap.search import passes
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import (
+    LOG_UNTRIED,
     Posterior,
     explanations,
     for_decisions,
@@ -52,17 +53,21 @@ def test_the_soil_alone_explains_unless_it_is_improbable(rivals, chance, alone):
 
 
 def test_probabilities_are_those_of_tempered_differences_of_the_evidence():
-    """Tempering T: odds of exp(-T difference / 2), with a smaller T for decisions."""
+    """Tempering T: odds of exp(-T difference / 2), with a smaller T for decisions.
+
+    Stated odds of all sets of effects contain those of sets that were not tried, a factor of e - 1.
+    """
     none = made(objective=10.0)
     sets, predicted = [none, made("a", objective=2.0)], {"a": 99.0, "b": 4.0, "c": np.nan}
-    for found, half in (
-        (posterior(sets, predicted, none, dict.fromkeys("abc", 0.0)), 0.3),
-        (for_decisions(sets, predicted, none), 0.25),
+    for found, half, untried in (
+        (posterior(sets, predicted, none, dict.fromkeys("abc", 0.0)), 0.3, np.log(np.e - 1.0)),
+        (for_decisions(sets, predicted, none), 0.25, 0.0),
     ):
         assert set(found.log_weights) == {(), ("a",), ("b",)}
         assert sum(np.exp(v) for v in found.log_weights.values()) == pytest.approx(1.0)
-        assert found.log_weights["a",] - found.log_weights[()] == pytest.approx(half * 8.0)
-        assert found.log_weights["b",] - found.log_weights[()] == pytest.approx(half * 4.0)
+        odds = {names: own - found.log_weights[()] for names, own in found.log_weights.items()}
+        assert odds["a",] == pytest.approx(half * 8.0 + untried)
+        assert odds["b",] == pytest.approx(half * 4.0 + untried)
         assert found.effects() == ["a", "b"]
 
 
@@ -70,8 +75,23 @@ def test_prior_odds_are_not_tempered():
     """An objective of 2 is evidence of -4 and prior odds of 1 to e^3."""
     none = made(objective=10.0)
     found = posterior([none, made("a", objective=2.0)], {"b": 4.0}, none, {"a": 6.0, "b": 8.0})
-    assert found.log_weights["a",] - found.log_weights[()] == pytest.approx(0.3 * 14.0 - 3.0)
-    assert found.log_weights["b",] - found.log_weights[()] == pytest.approx(0.3 * 12.0 - 4.0)
+    odds = {
+        names: own - found.log_weights[()] - LOG_UNTRIED for names, own in found.log_weights.items()
+    }
+    assert odds["a",] == pytest.approx(0.3 * 14.0 - 3.0)
+    assert odds["b",] == pytest.approx(0.3 * 12.0 - 4.0)
+
+
+def test_rows_that_say_nothing_leave_the_prior_probabilities():
+    """Of ten effects: no cause exp(-1), each of them a tenth of the rest, but for other causes."""
+    effects = [f"effect-{i}" for i in range(10)]
+    penalties = dict.fromkeys(effects, 2.0 * np.log(10.0))
+    none = made(objective=10.0)
+    found = posterior([none], {n: -penalties[n] for n in effects}, none, penalties)
+    assert found.weight(()) == pytest.approx(np.exp(-1.0))
+    share, before = (1.0 - np.exp(-1.0)) / 10.0, 1.0 / 11.0
+    for name in effects:
+        assert found.probability(name) == pytest.approx(0.97 * share + 0.03 * before)
 
 
 @pytest.mark.parametrize(
