@@ -14,6 +14,7 @@ import math
 import os
 import sys
 import tomllib
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 from benchmarks_file import TITLES, machine, page_file, source_state
 from measured_sets import PRIORS, SETS, MeasuredSet, model_text, table_text
+from slips_kept_back import Errors, errors, table, verdict
 
 from soilml.cli import main
 from soilml.cli.progress import progress_bar
@@ -32,6 +34,7 @@ from soilml.processes import process_map
 HERE = Path(__file__).parent
 OUT = Path("demo/gap/real")
 PAGE = page_file("gap-measured")
+KEPT_BACK = "init"  # The priors with which slips are kept back
 SUSPECTED = "suspected"  # The status of a report that ranks suspects and states no cause
 UNDECIDED = "undecided"
 #: Held-out parts, the first of which a report has is shown.
@@ -52,18 +55,28 @@ def run(arguments: list[str] | None = None) -> None:
             save_text(_folder(one, priors) / "runs.csv", table_text(one, data))
             save_text(_folder(one, priors) / "model.toml", model_text(one, priors))
     jobs = [str(_folder(one, priors)) for one in sets for priors in PRIORS]
-    with process_map(analyse, jobs, args.jobs) as results, progress_bar("sets", len(jobs)) as done:
-        reports = []
-        for count, report in enumerate(results, 1):
-            reports.append(report)
-            done(count)
+    reports = _of_all(analyse, jobs, args.jobs, "sets")
+    jobs_kept = [str(_folder(one, KEPT_BACK)) for one in sets]
+    kept = _of_all(kept_back, jobs_kept, args.jobs, "sets, slips kept back")
     found: Found = {}
     for job, report in zip(jobs, reports, strict=True):
         found.setdefault(Path(job).parent.name, {})[Path(job).name] = report
-    text = page(sets, found)
+    text = page(sets, found, {s.name: own for s, own in zip(sets, kept, strict=True)})
     print(text)
     if args.write:
         save_text(PAGE, text)
+
+
+def _of_all(
+    work: Callable[[str], dict[str, Any]], jobs: list[str], workers: int | None, label: str
+) -> list[dict[str, Any]]:
+    """The results of all jobs, in their order."""
+    with process_map(work, jobs, workers) as results, progress_bar(label, len(jobs)) as done:
+        found = []
+        for count, result in enumerate(results, 1):
+            found.append(result)
+            done(count)
+    return found
 
 
 def _arguments(arguments: list[str] | None) -> argparse.Namespace:
@@ -86,11 +99,9 @@ def analyse(folder: str) -> dict[str, Any]:
     A report that the same state of the package made of the same files is not made again.
     """
     place = Path(folder)
-    state = _state(place)
     kept, mark = place / "report" / "gap.json", place / "state"
-    if kept.is_file() and mark.is_file() and mark.read_text() == state:
-        return dict(json.loads(kept.read_text()))
-    mark.unlink(missing_ok=True)
+    if (known := _known(kept, mark)) is not None:
+        return known
     words = [
         "gap",
         str(place / "model.toml"),
@@ -102,11 +113,31 @@ def analyse(folder: str) -> dict[str, Any]:
         with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
             code = main(words)
         if code == 0:
-            save_text(mark, state)
+            save_text(mark, _state(place))
             return dict(json.loads(kept.read_text()))
         return {"status": f"exit status {code}"}
     except Exception as error:  # a crash is a finding of the page, not its end
         return {"status": f"crash: {type(error).__name__}"}
+
+
+def kept_back(folder: str) -> Errors:
+    """The errors of predicted slips that were kept back, of the runs in a folder; see `analyse`."""
+    place = Path(folder)
+    kept, mark = place / "kept_back.json", place / "kept_back.state"
+    if (known := _known(kept, mark)) is not None:
+        return known
+    found = errors(folder)
+    save_text(kept, json.dumps(found))
+    save_text(mark, _state(place))
+    return found
+
+
+def _known(kept: Path, mark: Path) -> dict[str, Any] | None:
+    """What the same state of the package wrote before; else None, and its mark is gone."""
+    if kept.is_file() and mark.is_file() and mark.read_text() == _state(mark.parent):
+        return dict(json.loads(kept.read_text()))
+    mark.unlink(missing_ok=True)
+    return None
 
 
 def _state(place: Path) -> str:
@@ -127,8 +158,11 @@ def first_of(report: dict[str, Any]) -> str:
     return ""
 
 
-def page(sets: list[MeasuredSet], found: Found) -> str:
-    """The page: tables as measured, text from its template."""
+def page(sets: list[MeasuredSet], found: Found, kept: dict[str, Errors]) -> str:
+    """The page: tables as measured, text from its template.
+
+    kept: Errors of slips that were kept back, by set.
+    """
     import jinja2
 
     template = jinja2.Environment(autoescape=False, keep_trailing_newline=True).from_string(
@@ -151,6 +185,8 @@ def page(sets: list[MeasuredSet], found: Found) -> str:
         sets=[{"name": s.name, "title": s.title, "table": _set_table(found[s.name])} for s in sets],
         beliefs=tomllib.loads((HERE / "beliefs.toml").read_text()),
         summary=_table(["set", *PRIORS, "survives"], rows),
+        kept_back=_table(*table({s.name: s.title for s in sets}, kept)),
+        kept_back_verdict=verdict(list(kept.values())),
         count=f"The first explanation is the same with all three in {agree} of {len(rows)} sets; "
         f"in {open_} others, none is likelier than not with any of them.",
     )

@@ -87,13 +87,13 @@ class Posterior:
         return float(np.clip(present - absent, -MOST_LOG_ODDS, MOST_LOG_ODDS))
 
     def favours(self, names: Names, penalty: float) -> bool:
-        """Whether the data raise the odds of a set of effects against the soil alone.
+        """Whether the data raise the odds of a set of effects: alone, or with others beside it.
 
         penalty: -2 ln of its prior odds. A set that leaves the evidence as it is raises nothing.
         """
-        logs = self.log_weights
-        before = LOG_UNTRIED - 0.5 * penalty
-        return logs.get(names, -np.inf) - logs.get((), -np.inf) > RAISED + before
+        logs, least = self.log_weights, RAISED + LOG_UNTRIED - 0.5 * penalty
+        alone = logs.get(names, -np.inf) - logs.get((), -np.inf)
+        return max(alone, self.log_odds(*names)) > least
 
     def is_stated(self, names: Names) -> bool:
         """Whether the probability of a set of effects is more than a bound."""

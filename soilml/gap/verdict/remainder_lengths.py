@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,8 +20,9 @@ from soilml.numerics.smooth_process import slip_load_points, squared_exponential
 from soilml.quantities import column
 
 #: Factors on the usual correlation lengths that are tried, in slip and in the logarithm of load.
-FACTORS = np.asarray([0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5])
-USUAL_FACTOR = 4  # Index of the usual lengths
+FACTORS = (0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5)
+#: Factor on the usual correlation length in slip of a remainder that is the same at all slips.
+STEADY_FACTOR = 20.0
 #: Standard deviation of the logarithm of a length about that of the usual one.
 LENGTH_STD = 1.0
 #: Amplitudes that are tried, in usual ones.
@@ -71,16 +73,13 @@ def with_fitted_lengths(
         noise = np.ones(len(problem.readings.channels))
         noise[list(alone)] = [p.noise for p in alone.values()]
         found, covariance = alone, _declared(problem, noise)
-    amplitude = marginal.evidence.amplitude.copy()
-    discrepancy = dict(problem.case.discrepancy)
-    for i, process in found.items():
-        amplitude[i] = process.amplitude
-        discrepancy[column(problem.readings.channels[i])] = replace(
-            USUAL, slip_length=process.slip_length, log_load_length=process.log_load_length
-        )
-    case = replace(problem.case, discrepancy=discrepancy)
-    problem = replace(problem, case=case, covariance=covariance)
+    before = replace(problem, covariance=covariance)
+    problem, amplitude = _with_processes(before, found, marginal.evidence.amplitude)
     fit, fitted = marginal.fit, marginal.evidence.amplitude
+    predicts = _predicts(problem, fit, amplitude)
+    if doubtful := [i for i in found if amplitude[i] > 0.0 and not predicts[i]]:
+        steady = _likeliest(before, marginal, covariance, NOISE_FACTORS[:1], steady=True)
+        problem, amplitude = _with_processes(problem, {i: steady[i] for i in doubtful}, amplitude)
     while True:
         predicts = _predicts(problem, fit, amplitude)
         for i in found:
@@ -90,6 +89,19 @@ def with_fitted_lengths(
         fit, fitted = _fitted_again(problem, fit, amplitude), amplitude.copy()
     evidence = replace(marginal.evidence, amplitude=amplitude)
     return problem, replace(marginal, fit=fit, evidence=evidence)
+
+
+def _with_processes(
+    problem: FitProblem, processes: Mapping[int, _Likeliest], amplitude: Floats
+) -> tuple[FitProblem, Floats]:
+    """The problem with the lengths of processes, by channel, and all amplitudes (channels,)."""
+    amplitude, discrepancy = amplitude.copy(), dict(problem.case.discrepancy)
+    for i, process in processes.items():
+        amplitude[i] = process.amplitude
+        discrepancy[column(problem.readings.channels[i])] = replace(
+            USUAL, slip_length=process.slip_length, log_load_length=process.log_load_length
+        )
+    return replace(problem, case=replace(problem.case, discrepancy=discrepancy)), amplitude
 
 
 def _some_of(problem: FitProblem, channel: int) -> Integers:
@@ -120,9 +132,17 @@ def _declared(problem: FitProblem, noise: Floats) -> Covariance:
 
 
 def _likeliest(
-    problem: FitProblem, marginal: MarginalFit, covariance: Covariance, noise: Floats
+    problem: FitProblem,
+    marginal: MarginalFit,
+    covariance: Covariance,
+    noise: Floats,
+    *,
+    steady: bool = False,
 ) -> dict[int, _Likeliest]:
-    """The likeliest process of each channel without a declared discrepancy, by its number."""
+    """The likeliest process of each channel without a declared discrepancy, by its number.
+
+    steady: Of those that hardly change with slip.
+    """
     readings, usual = problem.readings, problem.discrepancy.process.usual
     residual = readings.measured - marginal.fit.prediction
     gear = gear_numbers(readings.at)[readings.row]
@@ -144,6 +164,7 @@ def _likeliest(
             noise,
             2.0 * float(np.log(np.diag(factor)).sum()),
             0.0 if marginal.evidence.amplitude[i] > 0.0 else LEAST_GAIN,
+            steady=steady,
         )
     return found
 
@@ -205,8 +226,12 @@ def _of_channel(
     noise: Floats,
     log_determinant: float,
     needed: float,
+    *,
+    steady: bool,
 ) -> _Likeliest:
     """The likeliest process of one channel, with the usual lengths where these are as good.
+
+    Or the likeliest one that is steady in slip, with the usual length in load.
 
     white (m,): Residuals, whitened by their noise. root (m, m): What whitens it, times the usual
     amplitude. log_determinant: Logarithm of the determinant of the noise. needed: Decrease of
@@ -214,8 +239,8 @@ def _of_channel(
     """
     square = noise[:, None, None] ** 2
 
-    def at(i: int, k: int) -> _Likeliest:
-        lengths = float(SLIP_LENGTH * FACTORS[i]), float(LOG_LOAD_LENGTH * FACTORS[k])
+    def at(of_slip: float, of_load: float) -> _Likeliest:
+        lengths = float(SLIP_LENGTH * of_slip), float(LOG_LOAD_LENGTH * of_load)
         z = slip_load_points(slip, load, *lengths)
         size, vector = np.linalg.eigh(
             root @ np.where(same_gear, squared_exponential(z, z), 0.0) @ root.T
@@ -224,16 +249,18 @@ def _of_channel(
         values = (np.log(scale) + (vector.T @ white) ** 2 / scale).sum(axis=2)
         values += needed * (SIZES > 0.0)
         n, a = np.unravel_index(int(np.argmin(values)), values.shape)
-        prior = float(np.sum((np.log([FACTORS[i], FACTORS[k]]) / LENGTH_STD) ** 2))
+        prior = float(np.sum((np.log([of_slip, of_load]) / LENGTH_STD) ** 2))
         value = float(values[n, a]) + log_determinant + prior
         return _Likeliest(value, *lengths, float(SIZES[a]), float(noise[n]))
 
-    middle = best = USUAL_FACTOR, USUAL_FACTOR
+    if steady:
+        return at(STEADY_FACTOR, 1.0)
+    middle = best = 1.0, 1.0
     known = {middle: at(*middle)}
     for _ in range(SWEEPS):
         for axis in range(2):
-            for k in range(len(FACTORS)):
-                pair = (k, best[1]) if axis == 0 else (best[0], k)
+            for factor in FACTORS:
+                pair = (factor, best[1]) if axis == 0 else (best[0], factor)
                 if pair not in known:
                     known[pair] = at(*pair)
             best = min(known, key=lambda pair: known[pair].value)

@@ -133,3 +133,29 @@ def test_a_process_counts_by_what_it_predicts_without_the_scatter_between_runs()
     beside, alone = remainder_lengths._gains(np.where(of_first, 3.0, 0.0), noise, process)
     assert beside[~of_first].sum() > 0.0  # the process cancels the scatter
     assert alone[~of_first].sum() < -10.0  # and is wrong without it
+
+
+def few(off):
+    """Four rows at one load, whose torque is so many standard deviations off a fit."""
+    table = driven(case_of(), loads=(80.0,), slips=4)
+    problem = fit_problem(case_of(), table)
+    soil = problem.fit_soil([np.full(len(problem.soil), 0.5)])
+    readings = problem.readings
+    measured = soil.prediction.copy()
+    measured[readings.channel == 0] += np.asarray(off) * readings.std[readings.channel == 0]
+    problem = replace(problem, readings=replace(readings, measured=measured))
+    evidence = replace(problem.discrepancy.evidence(soil), amplitude=np.zeros(3))
+    return problem, MarginalFit(soil, evidence)
+
+
+def test_few_rows_that_are_all_off_to_one_side_have_a_remainder_that_is_the_same_at_all_slips():
+    """An end of four readings does not follow from the others by a process of the usual length."""
+    off = np.asarray([5.5, 12.9, 13.2, 27.2])
+    problem, marginal = with_fitted_lengths(*few(off))
+    assert lengths(problem)[0] == remainder_lengths.STEADY_FACTOR * SLIP_LENGTH
+    readings, std = problem.readings, problem.readings.std[problem.readings.channel == 0]
+    slip = readings.slip[readings.channel == 0]
+    mean, _ = learned_remainder(problem, marginal).mean_and_std("torque", slip, 80.0)
+    assert np.abs(off - mean / std).max() < 0.6 * off.max()
+    assert (np.abs(off - mean / std) < np.abs(off)).sum() >= 3
+    assert not with_fitted_lengths(*few([8.0, -9.0, 7.0, -8.0]))[1].evidence.amplitude.any()
