@@ -238,7 +238,10 @@ def analysis_notes(
     notes += dict.fromkeys(n for fit in listed for n in size_notes(fit.coordinates, fit.x.tolist()))
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
-            text = f"the noise of {column(name)} is {scale:.2g} times as large as declared"
+            text = (
+                f"about the likeliest explanation, the noise of {column(name)} is {scale:.2g} times "
+                "as large as declared"
+            )
             notes.append(Remark("noise-scaled", text, (column(name),)))
     notes += overstated_noise_notes(readings)
     notes += [replace(r, text=f"replicate rows disagree: {r}") for r in replicates]
@@ -260,14 +263,18 @@ def analysis_notes(
 
 
 def _bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
+    """Notes on what model.toml has at the end of a prior, with the effects that it contains."""
     notes = []
+    effects = dict.fromkeys(c.effect for c in coordinates if c.effect)
+    of_model = f"model.toml ({' + '.join(effects) or 'the soil alone'})"
     for c, value in zip(coordinates, x, strict=True):
-        if not c.effect:
-            if min(value, 1.0 - value) < AT_BOUND:
-                text = f"{c.path} is at a bound of its prior: soilml identify has its interval"
-                notes.append(Remark("at-bound", text, (c.path,)))
-        elif value > c.upper - AT_BOUND * (c.upper - c.lower):
-            notes.append(Remark("at-bound", f"{c.path} is at its upper bound", (c.path,)))
+        end = ""
+        if not c.effect and min(value, 1.0 - value) < AT_BOUND:
+            end = "a bound of its prior: soilml identify has its interval"
+        elif c.effect and value > c.upper - AT_BOUND * (c.upper - c.lower):
+            end = "its upper bound"
+        if end:
+            notes.append(Remark("at-bound", f"{c.path} in {of_model} is at {end}", (c.path,)))
     return notes
 
 

@@ -168,7 +168,7 @@ def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
     )
     assert several == [
         "7 readings are outliers and were excluded: o0, o1, o2, o3, o4, o5",
-        "the noise of sinkage_m is 1.3 times as large as declared",
+        "about the likeliest explanation, the noise of sinkage_m is 1.3 times as large as declared",
         "replicate rows disagree: run a and run b",
         "the noise of neighbouring samples of a run is correlated (0.5), which reduces their "
         "weight",
@@ -197,11 +197,15 @@ def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
 def test_estimates_at_a_bound():
     soil = Coordinate("cohesion", "Pa", Prior(0.0, 1000.0))
     size = Coordinate("slip-sinkage.n1", "1", Prior(0.0, 1.0), upper=4.0)
-    at = [f"{soil.path} is at a bound of its prior: soilml identify has its interval"]
+    end = "is at a bound of its prior: soilml identify has its interval"
+    at = [f"{soil.path} in model.toml (the soil alone) {end}"]
     assert texts(_bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
     assert _bound_notes([soil, soil], [0.0011, 0.9989]) == []
     assert texts(_bound_notes([size, size], [3.9961, 0.0])) == [
-        f"{size.path} is at its upper bound"
+        f"{size.path} in model.toml (slip-sinkage) is at its upper bound"
+    ]
+    assert texts(_bound_notes([size, soil], [0.5, 0.0])) == [
+        f"{soil.path} in model.toml (slip-sinkage) {end}"
     ]
     assert _bound_notes([size], [3.9959]) == []
 
