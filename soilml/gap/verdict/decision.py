@@ -33,6 +33,9 @@ SUSPECT_MARGIN = 4.0
 #: the catalogue lacks (by default 8 % of a range), and the decrease of the objective from which a
 #: cause is stated all the same: tempered odds of 1100 to 1.
 LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
+#: The same for a name: 5 % of a range, and tempered odds of 270 000 to 1. Where all laws of a soil
+#: are others, one of them is imitated best by some effect, and a part of the gap stays.
+LARGE_BESIDE_NAME, NAME_GAIN = 2.5, 50.0
 #: Probability, causes outside the catalogue included, from which a single explanation is named; a
 #: smaller one lists it first among the suspects. That of right names lies near `IN_CATALOGUE`.
 NAMED_PROBABILITY = 0.9
@@ -52,6 +55,9 @@ OTHER_LAW = (
     "one that the catalogue lacks"
 )
 NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
+LEFT_BESIDE = (
+    "beside {}, an error of the {} is left that is large for its evidence: all laws may be others"
+)
 #: Why nothing is said where the soil alone is rejected without an alternative.
 NOTHING_IS_BETTER = Remark(
     "nothing-is-better", "the soil alone is rejected, and no effect or smooth discrepancy is better"
@@ -118,7 +124,7 @@ def decide(
         text = OTHER_LAW.format(" + ".join(best.names))
         shown = _first_suspect(result) or best
         return Decision("suspected", (), shown, Remark("other-law", text, best.names))
-    if left := _large_remainder(problem, result, best):
+    if left := _large_remainder(problem, result, best, LARGE_REMAINDER, DECISIVE_GAIN):
         shown = _first_suspect(result) or best
         text = NOT_CATALOGUED.format(" + ".join(best.names), left.replace("_", " "))
         if shown is not best:
@@ -130,6 +136,10 @@ def decide(
         return Decision("class", listed, listed[0])
     if len(accepted) > 1 or result.posterior.probability(*best.names) < NAMED_PROBABILITY:
         return Decision("suspected", (), _first_suspect(result) or best, NOT_DECISIVE)
+    if left := _large_remainder(problem, result, best, LARGE_BESIDE_NAME, NAME_GAIN):
+        text = LEFT_BESIDE.format(" + ".join(best.names), left.replace("_", " "))
+        remark = Remark("not-catalogued", text, (*best.names, column(left)))
+        return Decision("suspected", (), _first_suspect(result) or best, remark)
     if not result.adequate:
         return Decision("partly-named", accepted, best)
     if best.shape_supported and law_matters(problem, best):
@@ -137,13 +147,15 @@ def decide(
     return Decision("named", accepted, best)
 
 
-def _large_remainder(problem: FitProblem, result: SearchResult, best: Explanation) -> str:
+def _large_remainder(
+    problem: FitProblem, result: SearchResult, best: Explanation, large: float, decisive: float
+) -> str:
     """The channel with a large remainder beside an explanation of little evidence, or empty."""
     soil_alone, worst = result.soil_alone, int(np.argmax(best.amplitude))
-    if soil_alone is None or soil_alone.objective >= best.objective + DECISIVE_GAIN:
+    if soil_alone is None or soil_alone.objective >= best.objective + decisive:
         return ""
     name = problem.readings.channels[worst]
-    return name if best.amplitude[worst] >= LARGE_REMAINDER else ""
+    return name if best.amplitude[worst] >= large else ""
 
 
 def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool:

@@ -216,8 +216,9 @@ def test_beside_a_large_remainder_a_cause_of_little_evidence_is_suspected():
         return decision.status, decision.reason and decision.reason.about
 
     assert status(20.0, 4.0) == ("suspected", ("a", "drawbar_pull_N"))
-    assert status(20.0, 2.5) == ("partly-named", None)
-    assert status(30.0, 4.0) == ("partly-named", None)
+    assert status(40.0, 2.5) == ("suspected", ("a", "drawbar_pull_N"))
+    assert status(40.0, 1.6) == ("partly-named", None)
+    assert status(60.0, 4.0) == ("partly-named", None)
 
 
 def test_a_suspect_predicts_where_rows_kept_back_are_likelier_with_it():

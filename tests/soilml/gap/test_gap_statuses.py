@@ -23,8 +23,10 @@ from soilml.gap.search.stepwise import SearchResult
 from soilml.gap.verdict import decision
 from soilml.gap.verdict.decision import (
     DECISIVE_GAIN,
+    LARGE_BESIDE_NAME,
     LARGE_REMAINDER,
     MAX_SIZE_DEVIATION,
+    NAME_GAIN,
     SUSPECT_MARGIN,
     cause_set,
     decide,
@@ -197,13 +199,21 @@ def test_a_large_remainder_beside_little_evidence_is_suspected():
 
     for amplitude, gain, expected in (
         (LARGE_REMAINDER, DECISIVE_GAIN - 0.1, "suspected"),
-        (LARGE_REMAINDER - 0.01, DECISIVE_GAIN - 0.1, "named"),
-        (LARGE_REMAINDER, DECISIVE_GAIN, "named"),
+        (LARGE_BESIDE_NAME, NAME_GAIN - 0.1, "suspected"),
+        (LARGE_BESIDE_NAME - 0.01, NAME_GAIN - 0.1, "named"),
+        (LARGE_BESIDE_NAME, NAME_GAIN, "named"),
     ):
         made = found(amplitude, gain)
         assert made.status == expected
         assert (made.reason is not None) == (expected == "suspected")
         assert made.reason is None or made.reason.about == ("dig", "drawbar_pull_N")
+
+
+def test_a_class_may_leave_more_than_a_name():
+    sets = [candidate(n, 20.0, amplitude=(LARGE_BESIDE_NAME, 0.1)) for n in ("dig", "plough")]
+    none = candidate("", 20.0 + DECISIVE_GAIN, amplitude=(5.0, 5.0))
+    assert decide(PROBLEM, searched(none, *sets, accepted=2), (), ()).status == "class"
+    assert decide(PROBLEM, searched(none, sets[0]), (), ()).status == "suspected"
 
 
 def test_beside_a_large_remainder_the_first_suspect_is_shown_and_why_not_the_best():
