@@ -31,10 +31,12 @@ def gap_files(
     entry = {"report": summary(report, model_name, runs_name).as_json(origin)}
     comments = [report.sentence]
     if names := report.model.suspected:
-        comments += [
-            f"{' + '.join(names)} is suspected, not named: beside a remainder, "
-            "it predicts rows kept back better."
-        ]
+        why = (
+            "the likeliest of several explanations that these runs cannot distinguish"
+            if report.status == "class"
+            else "suspected, not named: beside a remainder, it predicts rows kept back better"
+        )
+        comments += [f"{' + '.join(names)} is {why}."]
     return {
         "report.html": page(report, model_name, runs_name, origin),
         "gap.json": json_text(report.as_json() | entry),

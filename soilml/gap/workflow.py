@@ -10,6 +10,7 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.config.measurement_noise import checked_sensors
+from soilml.config.remainder import SAME_ROWS
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
@@ -71,10 +72,7 @@ from soilml.gap.verdict.estimates import (
     soil_estimates,
     updated_case,
 )
-from soilml.gap.verdict.learned_remainder import (
-    learned_remainder,
-    without_learned_discrepancy,
-)
+from soilml.gap.verdict.learned_remainder import learned_remainder, without_learned_discrepancy
 from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
@@ -187,6 +185,8 @@ def gap(
     case = without_learned_discrepancy(case).without_suspected()
     known_costs = check_costs(costs or {})
     table, copies = without_copies(as_table(table))
+    known, case = case.remainder, case.without_remainder_of(table)
+    copies += () if case.remainder is known else (SAME_ROWS,)
     table = with_rover_columns(case, with_order_columns(case, table, FROM_ORDER))
     check_wheel_size(case, table)
     _check_size(table)
@@ -276,7 +276,6 @@ def _build_report(
     if result.has_gap and not (smooth_gap or conflicts):
         conflicts = [NOTHING_IS_BETTER]
     decision = decide(problem, result, obstacles, conflicts)
-
     excluded = _changed_by_outliers(analysis, decision, obstacles)
     before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
     shown = decision.shown.best if decision.shown else before
@@ -304,7 +303,8 @@ def _build_report(
         left, learned, written = None, None, explained
         intervals = with_uncertain_discrepancy(problem, written)
         spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
-    marked = tuple(n for n in suspected if n not in effect_names(case))  # what the case had stays
+    unsure = cause_set(decision, result)[0] if decision.status == "class" else suspected
+    marked = tuple(n for n in unsure if n not in effect_names(case))  # what the case had stays
     listed = suspects(analysis, decision.claimed) if smooth_gap else []
     sizes = result.posterior.oversized & {s.effects for s in listed}
     doubted = [c.fit for c in result.candidates if c.names in sizes]

@@ -239,8 +239,8 @@ def analysis_notes(
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
             text = (
-                f"about the likeliest explanation, the noise of {column(name)} is {scale:.2g} times "
-                "as large as declared"
+                f"about the likeliest explanation, the noise of {column(name)} is {scale:.2g} "
+                "times as large as declared"
             )
             notes.append(Remark("noise-scaled", text, (column(name),)))
     notes += overstated_noise_notes(readings)
