@@ -15,27 +15,34 @@ from soilml.io.table import Table
 
 #: Tiers whose causes are effects of the catalogue.
 CATALOGUED_TIERS = ("A", "B", "S", "M")
-LARGE, ONE_LOAD = "discrepancy 4%", "one load"
+SMALL, LARGE, ONE_LOAD = "discrepancy 1%", "discrepancy 4%", "one load"
+#: Groups of causes that can be named, by the size of the discrepancy.
+OF_DISCREPANCY = {SMALL: 0.01, LARGE: 0.04}
 #: Plans of each group that is enlarged. All its sets with a cause that can be named are alike to
 #: the figures that use it, and no other figure counts those that were added.
 GROUPS: Mapping[str, Callable[[Plan], bool]] = {
-    LARGE: lambda p: (
-        p.discrepancy == 0.04 and p.tier in CATALOGUED_TIERS and p.design not in SUSPECT_DESIGNS
-    ),
+    **{
+        group: lambda p, level=level: (
+            p.discrepancy == level
+            and p.tier in CATALOGUED_TIERS
+            and p.design not in SUSPECT_DESIGNS
+        )
+        for group, level in OF_DISCREPANCY.items()
+    },
     ONE_LOAD: lambda p: (
         p.tier in CATALOGUED_TIERS and p.design in SUSPECT_DESIGNS and p.design not in LATER_DESIGNS
     ),
     FEW_ROWS: lambda p: p.tier in CATALOGUED_TIERS and p.design == FEW_ROWS,
 }
-#: Draws of the plans of few rows beside the first one, by numbers from that of the seed times 100:
-#: one draw has six or seven with a cause that can be named.
+#: Draws of the plans of few rows and of one load beside the first one, by numbers from that of the
+#: seed times 100: one draw of few rows has six or seven with a cause that can be named.
 FURTHER_DRAWS = (1, 2)
 
 
 def further_plans(seeds: Sequence[int]) -> list[Plan]:
-    """The plans of few rows of the further draws of these seeds."""
+    """The plans of few rows and of one load of the further draws of these seeds."""
     drawn = [p for s in seeds for i in FURTHER_DRAWS for p in benchmark_plans(100 * s + i)]
-    return [p for p in drawn if p.design == FEW_ROWS]
+    return [p for p in drawn if GROUPS[FEW_ROWS](p) or GROUPS[ONE_LOAD](p)]
 
 
 def added(
@@ -71,6 +78,6 @@ def separating_snr(plan: Plan) -> float:
     return separation(read_model(drawn.model), Table(dict(drawn.columns)), drawn.truth).snr
 
 
-def sampled(sets: Sequence[Judged], group: str = "") -> list[Judged]:
-    """The sets of the sample, and those that were added to one group."""
-    return [s for s in sets if s.get("added_to", "") in ("", group)]
+def sampled(sets: Sequence[Judged], *groups: str) -> list[Judged]:
+    """The sets of the sample, and those that were added to some groups."""
+    return [s for s in sets if s.get("added_to", "") in ("", *groups)]

@@ -58,9 +58,9 @@ SAME_CAUSE = (
 #: What the sets are that were added to the sample.
 ENLARGED = (
     " The sample has few sets with a cause that can be named at one load, from few rows, or beside "
-    "a discrepancy of 4 %. {more} more plans, of the same seeds and for few rows of further ones, "
-    "were drawn at random, with an SNR of 3 or more before any analysis. They count in the gates "
-    "of these three groups at SNR >= 3 alone."
+    "a discrepancy of 1 or 4 %. {more} more plans, of the same seeds, and at one load or for few "
+    "rows of further ones, were drawn at random, with an SNR of 3 or more before any analysis. They "
+    "count in the gates of these four groups at SNR >= 3 alone."
 )
 PICTURE = "docs/gap_reliability.png"
 

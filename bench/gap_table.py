@@ -44,7 +44,7 @@ def figures(sets: Sequence[Judged]) -> list[Figure]:
     every, sets = sets, gap_enlarged.sampled(sets)
     usual = [s for s in sets if not own_figures(s)]
     return [
-        *_naming(usual, gap_enlarged.sampled(every, gap_enlarged.LARGE)),
+        *_naming(usual, gap_enlarged.sampled(every, *gap_enlarged.OF_DISCREPANCY)),
         *_false_names(usual),
         *_silence(usual),
         *_suspects(usual, gap_enlarged.sampled(every, gap_enlarged.ONE_LOAD)),
@@ -63,7 +63,7 @@ def named_designs(sets: Sequence[Judged]) -> list[Judged]:
 
 
 def _naming(sets: Sequence[Judged], enlarged: Sequence[Judged]) -> Iterator[Figure]:
-    """Of the sample, and of the sample with what was added at the largest discrepancy."""
+    """Of the sample, and of the sample with what was added at some sizes of discrepancy."""
     own = [s for s in named_designs(enlarged) if nameable(s)]
     for level, goal in ((0.0, ">= 0.95"), (0.01, ">= 0.93"), (0.02, ">= 0.90"), (0.04, ">= 0.85")):
         part = [s for s in own if s["discrepancy"] == level]
