@@ -25,19 +25,20 @@ class Clogging(SlipLoadScaling):
     clean rim, as a rig reckons it, and z the sinkage of the layer. References: Ding et al., J.
     Terramechanics 48(1), 2011, the radius r + lambda h of shearing around lugs, here with lambda =
     1 and in all of the contact; definition of slip. That the layer turns with the wheel and is as
-    strong as the soil is ours. Lugs of which `grousers` has the shear already count once more
+    strong as the soil is ours. Lugs on a wheel whose slip is that of the rim look much the same:
+    `grousers` with rim_slip = 1. Lugs of which `grousers` has the shear already count once more
     beside it: give it the part of h that clogs beyond theirs. Not for soil that falls off again
     within a turn.
     """
 
     name: ClassVar[str] = "clogging"
     about: ClassVar[EffectCard] = EffectCard(
-        text="soil clings to the rim or fills the room between lugs: a larger wheel",
+        text="a larger wheel: soil on the rim or between lugs, or lugs, with the slip of the rim",
         source="Ding et al. 2011, J. Terramechanics 48(1), radius of shearing",
         kind="wheel",
         reference={"layer": 0.003},
         signs={"torque": +1, "drawbar_pull": +1},
-        isolate="the same runs with the wheel brushed clean before each",
+        isolate="measure the lugs; the same runs with the wheel brushed clean before each",
     )
     load_rises: ClassVar[bool] = True
     gear_types: ClassVar[tuple[type, ...]] = (RigidWheel,)
