@@ -184,6 +184,11 @@ class Solution:
         return self.problem.coordinates
 
     @property
+    def effects(self) -> list[str]:
+        """The effects whose parameters were fitted, each once."""
+        return list(dict.fromkeys(c.effect for c in self.coordinates if c.effect))
+
+    @property
     def measured(self) -> Floats:
         """The measured values, (m,)."""
         return self.problem.readings.measured

@@ -264,9 +264,8 @@ def _build_report(
 ) -> GapReport:
     """Decide the status, then compute the entries of the report."""
     problem, result = analysis.problem, analysis.result
-    obstacles = checks.naming_obstacles
-    if analysis.opened is not None:
-        obstacles = (analysis.opened, *obstacles)
+    opened = () if analysis.opened is None else (analysis.opened,)
+    obstacles = (*opened, *checks.naming_obstacles)
     smooth_gap = result.has_gap and not is_left_open(result)
     trends = order_trends(problem, result.soil, seed)
     drift, conflicts = trend_remarks(trends), []
@@ -293,8 +292,9 @@ def _build_report(
     replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
     if smooth_gap:
         options = (shown, beside) if suspected else (explained,)
-        own, written = returned_model(problem, result.soil, options, bool(decision.claimed))
-        suspected = suspected if any(c.effect for c in written.fit.coordinates) else ()
+        taken = bool(decision.claimed and not suspected)
+        own, written = returned_model(problem, result.soil, options, taken)
+        suspected = suspected if set(suspected) <= {*written.fit.effects} else ()
         learned = learned_remainder(own, written)
         left = discrepancy_amplitudes(problem, written)
         intervals = with_uncertain_discrepancy(problem, written)
@@ -303,8 +303,7 @@ def _build_report(
         left, learned, written = None, None, explained
         intervals = with_uncertain_discrepancy(problem, written)
         spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
-    unsure = cause_set(decision, result)[0] if decision.status == "class" else suspected
-    marked = tuple(n for n in unsure if n not in effect_names(case))  # what the case had stays
+    marked = tuple(n for n in suspected if n not in effect_names(case))  # what the case had stays
     listed = suspects(analysis, decision.claimed) if smooth_gap else []
     sizes = result.posterior.oversized & {s.effects for s in listed}
     doubted = [c.fit for c in result.candidates if c.names in sizes]
@@ -325,7 +324,7 @@ def _build_report(
         notes=(
             *excluded,
             *checks.notes,
-            *prediction_notes(suspected, analysis, not_reduced),
+            *prediction_notes(() if decision.claimed else suspected, analysis, not_reduced),
             *analysis_notes(analysis, written.fit, [shown.fit, *doubted], replicates),
             *grown_channels(figures, addition),
             *(drift if smooth_gap else ()),
@@ -341,6 +340,8 @@ def _build_report(
     )
     if decision.claimed:
         claimed = decision.claimed
+        if not set(claimed[0].names) <= {*intervals.effects}:  # of a class, and not returned
+            intervals = with_uncertain_discrepancy(problem, shown)
         similarity = signature_similarity(problem, claimed[0].fit, claimed[0].amplitude)
         report = replace(
             report,

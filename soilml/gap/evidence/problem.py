@@ -93,7 +93,7 @@ class FitProblem:
         An effect that all gears share and the same effect of one gear exclude each other, and so do
         two forms of one law.
         """
-        fitted = [self.effects[name] for name in {c.effect for c in fit.coordinates if c.effect}]
+        fitted = [self.effects[name] for name in fit.effects]
         return {
             name: effect
             for name, effect in self.effects.items()

@@ -302,8 +302,11 @@ def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...]
 def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]) -> Names:
     """The effects of the first suspect where it predicts rows kept back better than the soil alone.
 
-    What is wrong with a model and what predicts best are two questions: this one is no name.
+    Or of the likeliest of a class. What is wrong with a model and what predicts best are two
+    questions: this one is no name.
     """
+    if decision.status == "class":
+        return decision.claimed[0].names
     if decision.status != "suspected" or decision.shown is None:
         return ()
     gain = gains.get(decision.shown.names)

@@ -177,7 +177,7 @@ def updated_case(
             name: replace(declared, share=0.0, constant=significant(std))
             for name, std in discrepancy.items()
         }
-    bias = unestimated_bias(fit.case.bias, {c.effect for c in fit.coordinates})
+    bias = unestimated_bias(fit.case.bias, set(fit.effects))
     return replace(
         case,
         prior=prior,

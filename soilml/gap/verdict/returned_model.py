@@ -30,7 +30,7 @@ def returned_model(
         own, written = with_fitted_lengths(problem, option)
         if stated:
             return own, written
-        if not (written.evidence.amplitude.any() or any(c.effect for c in written.fit.coordinates)):
+        if not (written.evidence.amplitude.any() or written.fit.effects):
             break
         predicted = written.fit.prediction + posterior_discrepancy(own, written)
         if _distance(problem, predicted) <= _distance(problem, soil.prediction):

@@ -27,7 +27,7 @@ def no_lengths(monkeypatch):
 
 
 def option(off, amplitude=0.0, effect=""):
-    fit = SimpleNamespace(prediction=MEASURED + off, coordinates=[SimpleNamespace(effect=effect)])
+    fit = SimpleNamespace(prediction=MEASURED + off, effects=[effect] if effect else [])
     size = np.asarray([amplitude])
     return MarginalFit(fit, Evidence(0.0, size, np.zeros(1), np.asarray([0.7])))
 
