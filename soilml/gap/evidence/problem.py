@@ -187,14 +187,16 @@ class StartedFit:
     near: Linearisation | None = None
 
 
-def fit_many(problem: FitProblem, fits: Sequence[StartedFit]) -> list[Solution | InputError]:
+def fit_many(
+    problem: FitProblem, fits: Sequence[StartedFit], tolerance: Tolerance = FINE
+) -> list[Solution | InputError]:
     """Fits that share each call of the model; their results are those of single fits.
 
     Coordinates without a start begin at the case's value or small. Where the model refuses a trial
     from there, the fit starts again with all effects at zero; where it refuses again, its
     `InputError` takes the place of the fit.
     """
-    return in_step([_fit(problem, fit) for fit in fits])
+    return in_step([_fit(problem, fit, tolerance) for fit in fits])
 
 
 def _fit(problem: FitProblem, fit: StartedFit, tolerance: Tolerance = FINE) -> Asking[Solution]:

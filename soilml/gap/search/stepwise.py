@@ -87,6 +87,11 @@ class SearchResult:
         return self.final_test.p_value >= LACK_OF_FIT_LEVEL
 
     @property
+    def best(self) -> Solution:
+        """The fit of the best explanation; of the soil alone without a search."""
+        return self.accepted[0].fit if self.accepted else self.soil
+
+    @property
     def soil_alone(self) -> Explanation | None:
         """The soil alone beside a smooth discrepancy; None where no gap was searched."""
         return next((c for c in self.candidates if not c.names), None)
@@ -166,24 +171,27 @@ def first_look(
     starts: Starts,
     sets: Sequence[tuple[str, ...]] = (),
     *,
-    only_test: bool = False,
+    singles: bool = True,
 ) -> SearchResult:
     """The test for a gap, and where there is one the explanations by single effects.
 
-    sets: Larger sets that are fitted too.
-    only_test: Fit no effect.
+    sets: Other sets that are fitted.
+    singles: Fit the single effects that are likely; else these sets alone, and the soil alone from
+        its own start.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
     found = without_search(soil, soil_test, untestable)
-    if only_test or soil_test.p_value >= GAP_LEVEL:
+    if soil_test.p_value >= GAP_LEVEL or not (sets or singles):
         return found
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
-    singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-    selected = dict.fromkeys([*sets, *((name,) for name in singles)], soil_alone)
+    likely: Sequence[str] = ()
+    if singles:
+        likely = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+    selected = dict.fromkeys([*sets, *((name,) for name in likely)], soil_alone)
     level = _fit_level(problem, soil, soil_alone, selected, starts)
-    again = _from_soils_of(problem, soil_alone, level)
+    again = _from_soils_of(problem, soil_alone, level) if singles else soil_alone
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
     fitted = {c.names: c for c in [again, *level]}

@@ -9,6 +9,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.fitting.covariance import noise_of_operation
+from soilml.fitting.damped_descents import COARSE
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
@@ -63,8 +64,12 @@ def plain_fit(problem: FitProblem, soil: Solution, shown: Explanation) -> Soluti
         alone | absent,
         {path: off_bounds(x) for path, x in alone.items()},
     ]
-    found = fit_many(problem, [StartedFit(fit.case, fit.coordinates, start) for start in starts])
-    solved = [one for one in found if not isinstance(one, InputError)]
+    own = [StartedFit(fit.case, fit.coordinates, start) for start in starts]
+    solved = [x for x in fit_many(problem, own, COARSE) if not isinstance(x, InputError)]
+    if solved:
+        best = min(solved, key=lambda one: one.objective)
+        start = replace(own[0], start=best.start_values(), near=best.linearisation)
+        solved += [x for x in fit_many(problem, [start]) if not isinstance(x, InputError)]
     return min([*solved, soil], key=lambda one: _objective_at(problem, one))
 
 

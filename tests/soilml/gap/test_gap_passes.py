@@ -15,6 +15,7 @@ from soilml.gap import gap
 from soilml.gap.evidence.covariance import VarianceComponents
 from soilml.gap.search import analysis
 from soilml.gap.search import passes as module
+from soilml.gap.search import without_outliers as rounds
 from soilml.gap.search.opened_priors import OpenedPriors
 from soilml.gap.search.stepwise import SearchResult
 from soilml.numerics.prior import Prior
@@ -28,9 +29,13 @@ READINGS = fit_problem(CASE, driven(CASE)).readings
 
 @pytest.fixture
 def passes(monkeypatch):
-    """Passes whose outliers, components and accepted fits are listed; what they were given."""
+    """Passes whose components and accepted fits are listed; what they were given.
+
+    Outliers are listed by the number of readings that are excluded; the explanation that accounts
+    for them leaves none.
+    """
     given = SimpleNamespace(
-        outliers=[], components=[], accepted=[], seen=[], starts=[], explained=False
+        outliers={}, components=[], accepted=[], seen=[], starts=[], explained=False, accounts=None
     )
 
     def reestimate(problem, fit, signatures):
@@ -42,28 +47,33 @@ def passes(monkeypatch):
 
     def outliers_of(problem, own, fit, signatures, excluded, cleared):
         found = excluded & (not given.explained)
-        found[np.flatnonzero(~excluded)[given.outliers.pop(0) if given.outliers else []]] = True
+        if fit != ("fit of", given.accounts):
+            found[np.flatnonzero(~excluded)[given.outliers.get(int(excluded.sum()), [])]] = True
         return found & ~cleared, cleared | (excluded & ~found)
 
-    def search(problem, soil, seed, starts, progress, begun=None):
+    def search(problem, soil, seed, starts, progress=lambda _: None, begun=None):
         progress(0.5)
         given.starts.append(sorted(starts))
         names = given.accepted[len(given.starts) - 1]
         explained = SimpleNamespace(names=names, fit=("fit of", names), amplitude=None)
         accepted = () if names is None else (explained,)
-        result = module._no_result(soil)
+        result = module.no_result(soil)
         signature = SimpleNamespace(column=np.zeros(len(problem.readings)))
         test = replace(result.final_test, signatures=(signature,))
         return replace(result, accepted=accepted, candidates=accepted, final_test=test)
 
-    for name, value in {
-        "_with_estimated_covariance": reestimate,
-        "_outliers_of": outliers_of,
-        "_settled": lambda problem, fit, amplitude, excluded, cleared: (excluded, cleared),
-        "first_look": lambda problem, soil, *_, **__: module._no_result(soil),
-        "search": search,
-    }.items():
-        monkeypatch.setattr(module, name, value)
+    def settled(problem, result, excluded, cleared):
+        return excluded, cleared, result.best
+
+    def first_look(problem, soil, *_, **__):
+        return module.no_result(soil)
+
+    monkeypatch.setattr(module, "with_estimated_covariance", reestimate)
+    monkeypatch.setattr(module, "first_look", first_look)
+    monkeypatch.setattr(module, "search", search)
+    monkeypatch.setattr(rounds, "search", search)
+    monkeypatch.setattr(rounds, "_outliers_of", outliers_of)
+    monkeypatch.setattr(rounds, "_settled", settled)
 
     def run(case=CASE, readings=READINGS):
         shares = []
@@ -99,7 +109,7 @@ def test_no_second_search_where_the_covariance_has_converged(passes):
 def test_readings_that_stray_from_the_explanation_are_excluded_and_searched_again(passes):
     given, run = passes
     given.accepted = [None, None, None]
-    given.outliers = [[4], [6], []]
+    given.outliers = {0: [4], 1: [6]}
     found, _ = run()
     where = [(READINGS.channels[READINGS.channel[i]], READINGS.row[i]) for i in (4, 7)]
     assert found.outliers == tuple(f"{column(name)} at row {row}" for name, row in where)
@@ -107,9 +117,18 @@ def test_readings_that_stray_from_the_explanation_are_excluded_and_searched_agai
     assert found.of_all is not None and len(found.of_all.problem.readings) == len(READINGS)
 
 
+def test_readings_that_stray_from_single_effects_are_searched_with_larger_sets_first(passes):
+    given, run = passes
+    given.outliers, given.accounts = {0: [4]}, ("a", "b")
+    given.accepted = [("a", "b"), ("a", "b")]
+    found, _ = run()
+    assert found.outliers == () and found.of_all is None
+    assert len(given.starts) == 2  # with the covariance of the first look, and to the end
+
+
 def test_a_reading_that_the_explanation_of_the_others_predicts_is_taken_back(passes):
     given, run = passes
-    given.accepted, given.outliers, given.explained = [None] * 4, [[4], [], [4]], True
+    given.accepted, given.outliers, given.explained = [None] * 4, {0: [4]}, True
     found, _ = run()
     assert found.outliers == () and len(found.problem.readings) == len(READINGS)
     assert len(given.starts) == 3  # it strays from the fit to all again, and stays
@@ -127,7 +146,7 @@ def test_more_than_a_tenth_of_outliers_is_bad_data(passes, count, too_many):
     given, run = passes
     given.accepted = [None, None]
     assert len(READINGS) == 96
-    given.outliers = [list(range(count))]
+    given.outliers = {0: list(range(count))}
     found, _ = run()
     names = [f"torque_Nm at row {row}" for row in range(3)]
     said = f"{count} readings are outliers: check the sensors first: {', '.join(names)} and 7 more"
@@ -158,7 +177,7 @@ def test_no_effect_is_fitted_with_opened_priors_where_one_alone_explains_all(
     given.accepted, asked = [None], []
     soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
     gap_test = SimpleNamespace(p_value=0.001)
-    look = replace(module._no_result(soil), soil_test=gap_test)
+    look = replace(module.no_result(soil), soil_test=gap_test)
     opened = OpenedPriors(CASE, tuple(free_soil_parameters(CASE, None)), Remark("prior-opened", ""))
 
     def begin(*_, only_test, likeliest):
@@ -182,7 +201,7 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
     given, run = passes
     given.accepted = [None, None]
     p_value = SimpleNamespace(p_value=0.001 if has_gap else 0.5)
-    look = replace(module._no_result(None), candidates=(SimpleNamespace(names=("a",)),))
+    look = replace(module.no_result(None), candidates=(SimpleNamespace(names=("a",)),))
     look = replace(look, soil=fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)]))
     look = module.Analysis(look.soil.problem, replace(look, soil_test=p_value))
     free = free_soil_parameters(CASE, None)
@@ -190,6 +209,7 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
     for name, value in {
         "open_priors": lambda *_: opened,
         "begin": lambda *_, **__: (look, {}),
+        "with_singles": lambda begun, _: begun,
         "_rival": lambda found: SimpleNamespace(names=()),
         "explains_better": lambda *_: better,
         "_explained_by_soil": lambda found, _: found,
@@ -198,6 +218,41 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
     found, _ = run()
     assert len(given.starts) == searches
     assert (found.opened is not None) == (searches == 2)  # the stubs find no gap in full
+
+
+@pytest.mark.parametrize("nearly", [True, False])
+def test_all_effects_are_fitted_with_opened_priors_where_the_likeliest_sets_nearly_count(
+    passes, monkeypatch, nearly
+):
+    given, run = passes
+    given.accepted, asked = [None], []
+    soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
+    look = replace(module.no_result(soil), candidates=(SimpleNamespace(names=("a",)),))
+    look = module.Analysis(soil.problem, replace(look, soil_test=SimpleNamespace(p_value=0.001)))
+    opened = OpenedPriors(CASE, tuple(free_soil_parameters(CASE, None)), Remark("prior-opened", ""))
+    for name, value in {
+        "open_priors": lambda *_: opened,
+        "begin": lambda *_, **__: (look, {}),
+        "with_singles": lambda begun, _: asked.append(begun) or begun,
+        "_rival": lambda found: SimpleNamespace(names=()),
+        "explains_better": lambda found, other, c, lacking=0.0: nearly and lacking > 0.0,
+    }.items():
+        monkeypatch.setattr(analysis, name, value)
+    run()
+    assert len(asked) == nearly and len(given.starts) == 1
+
+
+@pytest.mark.parametrize(
+    "value, nearly, better", [(-9.1, 0.0, True), (-8.9, 0.0, False), (-4.1, 5.0, True)]
+)
+def test_an_explanation_with_opened_priors_is_better_by_9(monkeypatch, value, nearly, better):
+    evidence = SimpleNamespace(evidence=lambda *_: SimpleNamespace(value=value))
+    problem = SimpleNamespace(readings=READINGS, discrepancy=evidence)
+    found = SimpleNamespace(problem=problem, error=None)
+    rival = SimpleNamespace(objective=0.0, amplitude=np.zeros(3))
+    monkeypatch.setattr(analysis, "_rival", lambda _: rival)
+    own = SimpleNamespace(names=("a",), fit=None, amplitude=np.zeros(3), penalty=0.0)
+    assert analysis.explains_better(found, found, own, nearly) == better
 
 
 def test_the_declared_noise_is_where_the_analysis_begins():
@@ -211,7 +266,7 @@ def test_the_declared_noise_is_where_the_analysis_begins():
 
 
 def test_an_analysis_without_a_search_has_no_gap():
-    found = module._no_result(None)
+    found = module.no_result(None)
     assert found.soil_test.p_value >= 0.5 and not found.has_gap
     assert found.soil_alone is None and found.likeliest is None
 
@@ -237,14 +292,14 @@ def test_the_covariance_is_estimated_from_what_a_fit_leaves():
     problem = fit_problem(case, table)
     soil = problem.fit_soil([np.full(3, 0.5)])
     small = replace(problem, effects={"slip-sinkage": problem.effects["slip-sinkage"]})
-    stray = module._stray(small, soil, ())
+    stray = rounds._stray(small, soil, ())
     assert np.flatnonzero(stray).tolist() == [
         int(i)
         for i in np.flatnonzero(problem.readings.channel == 0)
         if problem.readings.row[i] == 12
     ]
     kept = module.of_readings(small, ~stray)
-    found = module._with_estimated_covariance(kept, kept.fit_soil([soil.x]), ())
+    found = module.with_estimated_covariance(kept, kept.fit_soil([soil.x]), ())
     assert len(found.readings) == len(found.covariance.std) == 95
     torque = found.readings.channel == 0
     expected = np.delete(soil.prediction[problem.readings.channel == 0], 12)
@@ -276,10 +331,15 @@ def test_an_excluded_reading_is_judged_alone_and_cleared_for_good_where_it_does_
     problem, fit, wrong, excluded = two_outliers
     none = np.zeros(96, dtype=np.bool_)
     kept = module.of_readings(problem, ~excluded)
-    found, cleared = module._outliers_of(problem, kept, fit, (), excluded, none)
+    found, cleared = rounds._outliers_of(problem, kept, fit, (), excluded, none)
     assert np.array_equal(found, wrong) and np.array_equal(cleared, excluded & ~wrong)
-    again, _ = module._outliers_of(problem, kept, fit, (), wrong, cleared | wrong)
+    again, _ = rounds._outliers_of(problem, kept, fit, (), wrong, cleared | wrong)
     assert not again.any()
+
+
+def by_soil(fit):
+    """The result of a search whose best explanation is this fit."""
+    return SimpleNamespace(best=fit, accepted=())
 
 
 def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
@@ -287,10 +347,11 @@ def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
     none, largest = np.zeros(96, dtype=np.bool_), wrong & (problem.readings.row == 20)
     all_of_them = problem.fit_soil([np.full(3, 0.5)])
     # a lesser one strays too, but less than half as far
-    assert np.array_equal(module._stray(problem, all_of_them, ()), largest)
-    found, cleared = module._settled(problem, all_of_them, np.zeros(3), largest, none)
+    assert np.array_equal(rounds._stray(problem, all_of_them, ()), largest)
+    found, cleared, last = rounds._settled(problem, by_soil(all_of_them), largest, none)
     assert np.array_equal(found, wrong) and not cleared.any()
-    found, cleared = module._settled(problem, fit, np.zeros(3), excluded, none)
+    assert len(last.prediction) == 94
+    found, cleared, _ = rounds._settled(problem, by_soil(fit), excluded, none)
     assert np.array_equal(found, wrong) and np.array_equal(cleared, excluded & ~wrong)
 
 

@@ -17,6 +17,7 @@ from soilml.gap.search.explanation import (
     shape_directions,
 )
 from soilml.gap.search.screening import free_law_gains
+from soilml.gap.verdict.reductions import plain_fit
 from soilml.physics.effects.slip_sinkage import SlipSinkage
 
 
@@ -158,3 +159,14 @@ def test_of_two_fits_the_one_of_larger_evidence_is_kept():
     assert _better(first, second) is _better(second, first) is first
     assert _better(None, second) is _better(second, None) is second
     assert _better(None, None) is None
+
+
+def test_the_plain_fit_is_an_optimum_under_noise_alone_no_worse_than_the_soil_alone(dug):
+    problem, found = dug
+    soil = problem.fit_soil([np.full(3, 0.5)])
+    plain = plain_fit(problem, soil, found)
+    assert plain.converged and plain.objective < soil.objective
+    assert [c.path for c in plain.coordinates] == [c.path for c in found.fit.coordinates]
+    again = problem.fit(plain.case, plain.coordinates, plain.start_values())
+    assert plain.objective == pytest.approx(again.objective, abs=0.02)
+    assert plain_fit(problem, soil, SimpleNamespace(fit=soil)).objective <= soil.objective
