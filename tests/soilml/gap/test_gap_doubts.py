@@ -115,14 +115,15 @@ def test_what_is_within_the_declared_discrepancy_is_no_gap():
     )
 
 
-def test_an_effect_is_named_beside_a_declared_discrepancy_and_then_nothing_is_left():
+def test_an_effect_is_named_beside_a_declared_discrepancy_and_is_not_found_again():
     case = case_of()
     table, later = (
         waved(driven(case, [EFFECTS["slip-sinkage"](n1=0.4)], seed=seed)) for seed in (4, 5)
     )
     first = gap(case, table)
     assert first.status == "partly-named" and first.cause_set == (("slip-sinkage",),)
-    assert gap(first.model, later).status == "no-gap"
+    again = gap(first.model, later)
+    assert again.status in ("no-gap", "undecided") and not again.cause_set
 
 
 def test_a_cause_by_a_law_far_from_the_catalogue_is_suspected():
