@@ -90,10 +90,11 @@ def test_the_soil_beside_a_discrepancy_stays_where_noise_put_it_under_the_larges
 def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_runner_up():
     none, a, b, c, d = made(), made("a"), made("b"), made("c"), made("d")
     pair = made("a", "e")
-    weights = {("b",): 2.0, ("a",): 1.0, ("d",): 0.0, (): -9.0}
+    weights = {("b",): 0.6, ("a",): 0.3, ("d",): 0.1, (): 1e-6}
 
     def compared(*candidates, accepted=(), own=None, **posterior):
-        given = analysed(*candidates, accepted=accepted, weights=own or weights)
+        logs = {names: float(np.log(weight)) for names, weight in (own or weights).items()}
+        given = analysed(*candidates, accepted=accepted, weights=logs)
         given.result.posterior = replace(given.result.posterior, **posterior)
         return competing_explanations(given)
 
@@ -102,12 +103,12 @@ def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_
     # where the best is refused, suspects are listed; of what is not fitted, nothing is predicted
     assert compared(none, a, d, accepted=(a, d), unproven=frozenset({("a",)})) == [a, d]
     # a set that contains the named one is no rival of it
-    named = {("a",): 9.0, ("b",): 0.0, (): -9.0}
+    named = {("a",): 0.99, ("b",): 0.01, (): 1e-6}
     assert compared(pair, a, none, b, c, accepted=(a,), own=named) == [a, b]
     # what has no stated probability is no rival beside one that has
-    unlikely = {("a",): 30.0, ("b",): 29.0, ("c",): 10.0, (): -9.0}
+    unlikely = {("a",): 0.7, ("b",): 0.3, ("c",): 0.004, (): 1e-6}
     assert compared(a, b, c, none, own=unlikely) == [a, b]
-    alone = {("a",): 9.0, ("c",): -3.0, (): -9.0}
+    alone = {("a",): 1.0, ("c",): 0.004, (): 1e-6}
     assert compared(a, c, b, none, own=alone) == [a, c]
     assert competing_explanations(analysed(none)) == []
 
