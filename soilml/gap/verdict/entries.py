@@ -202,7 +202,8 @@ def competing_explanations(analysis: Analysis) -> list[Explanation]:
     """The explanations to distinguish, the first one from the others: those that a report lists.
 
     They are those of a class; else a named one, or the first suspect, and the suspects after it
-    whose probability is stated. Where there is none, the next of the fitted ones is the rival.
+    whose probability is stated. Where there is none, the next suspect, or else the next of the
+    fitted ones, is the rival. A suspect that was not fitted predicts nothing, and is left out.
     """
     result, posterior = analysis.result, analysis.result.posterior
     accepted = [c for c in result.accepted if c.names]
@@ -220,7 +221,7 @@ def competing_explanations(analysis: Analysis) -> list[Explanation]:
     listed = [s for s in suspects(analysis, claimed) if s.effects in fitted]
     first = [c.names for c in claimed] or [s.effects for s in listed[:1]]
     stated = [s.effects for s in listed if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]
-    ordered = list(dict.fromkeys([*first, *stated, *fitted]))
+    ordered = list(dict.fromkeys([*first, *stated, *(s.effects for s in listed), *fitted]))
     rivals = [names for names in ordered[1:] if not set(ordered[0]) < set(names)]
     count = max(1, sum(names in stated for names in rivals))
     return [fitted[names] for names in [*ordered[:1], *rivals[:count]]]

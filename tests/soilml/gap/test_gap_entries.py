@@ -109,7 +109,7 @@ def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_
     unlikely = {("a",): 0.7, ("b",): 0.3, ("c",): 0.004, (): 1e-6}
     assert compared(a, b, c, none, own=unlikely) == [a, b]
     alone = {("a",): 1.0, ("c",): 0.004, (): 1e-6}
-    assert compared(a, c, b, none, own=alone) == [a, c]
+    assert compared(a, b, c, none, own=alone) == [a, c]
     assert competing_explanations(analysed(none)) == []
 
 
