@@ -225,9 +225,13 @@ def _trimmed(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text and "×" not in text else text
 
 
+#: Probability below which only a bound is shown.
+LEAST_STATED = 0.005
+
+
 def format_probability(p: float) -> str:
     """A probability with two digits; near 0 and 1 as a bound."""
-    if p < 0.005:
+    if p < LEAST_STATED:
         return "< 0.01"
     return "> 0.99" if p > 0.995 else f"{p:.2f}"
 

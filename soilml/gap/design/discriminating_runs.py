@@ -77,8 +77,11 @@ def next_runs(problem: FitProblem, explanations: Sequence[Explanation]) -> list[
             rows = _rows(run.readings, dict(zip(run.fits, run.predicted, strict=True)), run.option)
             proposals.append(NextRun(run.option.kind, run.option.text, _mean_capped(sigmas), rows))
     proposals += _static_proposals(fits, present, effects)
+    compared = tuple(dict.fromkeys(c.names for c in explanations[:COMPARED]))
     useful = [
-        run for run in _without_equal_rows(proposals) if run.discrimination >= MIN_DISCRIMINATION
+        replace(run, compared=compared)
+        for run in _without_equal_rows(proposals)
+        if run.discrimination >= MIN_DISCRIMINATION
     ]
     return sorted(useful, key=lambda run: -run.discrimination)
 

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from soilml.gap.report.gap_figure import gap_bars
+from soilml.gap.report.listed_explanations import likelier_than_first, needed_sizes
 from soilml.gap.report.prediction_curves import prediction_curves
 from soilml.gap.report.results import STATUSES, EstimatedValue, GapReport
-from soilml.gap.report.sentences import likelier_than_first, needed_sizes
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import Z_90
@@ -103,6 +103,7 @@ def _content(report: GapReport) -> dict[str, Any]:
         "curves": report.curves and prediction_curves(report.curves, changed),
         "soil": soil_table(report),
         "soil_tests": soil_test_table(report),
+        "effects_after": effects_after(report),
         "soil_changed": report.soil_before != report.soil_after,
         "suspects": suspect_table(report),
         "by_size": bool(likelier_than_first(report.suspects)),
@@ -153,10 +154,19 @@ def shown_model(report: GapReport) -> str:
     """The model whose figures are shown beside those of the soil alone, in words."""
     names = " + ".join(e.name for e in report.effects)
     if report.status == "class":
-        return f"with {names}, one of the equally good explanations"
+        count = len(report.cause_set)
+        return f"with {names}, the likeliest of {count} explanations that the data do not reject"
     if report.status in ("named", "form-open", "partly-named"):
         return f"with {names}"
     return f"with {' + '.join(report.best_unclaimed) or 'the best candidate'}, which is not claimed"
+
+
+def effects_after(report: GapReport) -> str:
+    """The effects beside which the soil after was fitted; empty where it is the soil alone."""
+    if report.effects:
+        return " + ".join(e.name for e in report.effects)
+    written = any(note.code == "suspect-predicts" for note in report.notes)
+    return " + ".join(report.best_unclaimed) if written else ""
 
 
 def effect_descriptions(report: GapReport) -> dict[str, str]:

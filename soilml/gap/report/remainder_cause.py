@@ -37,6 +37,8 @@ class RemainderCause:
     predictive_gain
         Log density of rows kept back, above that of a smooth remainder in each channel; mean over
         the parts.
+    beside
+        Effects beside which the remainder is left; empty for that of the soil alone.
     """
 
     stage: str
@@ -44,14 +46,15 @@ class RemainderCause:
     channels: tuple[str, ...]
     probability: float
     predictive_gain: float
+    beside: tuple[str, ...] = ()
 
     def remark(self) -> Remark:
-        """The description in one sentence.
+        """The description in one or two sentences.
 
         >>> found = RemainderCause("normal stress", "load", ("torque", "sinkage"), 0.96, 4.2)
         >>> print(found.remark())
-        The remainder looks like a change of the normal stress that depends on load; torque and
-        sinkage share it.
+        The remainder beside the soil alone looks like a change of the normal stress that depends on
+        load. Torque and sinkage share it.
         """
         alone = self.stage in CHANNELS
         what = _IN_WORDS.get(self.stage, "")
@@ -65,8 +68,10 @@ class RemainderCause:
         shared = ""
         if not alone and len(self.channels) > 1:
             *first, last = map(_name, self.channels)
-            shared = f"; {', '.join(first)} and {last} share it"
-        text = f"The remainder looks like {what}{depends}{shared}."
+            names = f"{', '.join(first)} and {last}"
+            shared = f" {names[:1].upper()}{names[1:]} share it."
+        beside = " + ".join(self.beside) or "the soil alone"
+        text = f"The remainder beside {beside} looks like {what}{depends}.{shared}"
         return Remark("remainder-cause", text, (self.stage,), "note")
 
 

@@ -139,6 +139,8 @@ class NextRun:
     #: operating points and predictions of each explanation
     rows: tuple[dict[str, float | str], ...] = field(metadata=ELSEWHERE)
     cost: float | None = None  # where costs are given, in their unit
+    #: The explanations that it separates: the first one from each other one
+    compared: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -264,7 +266,7 @@ class GapReport:
     sentence : str
         The verdict in at most 25 words, without names of runs.
     lines : tuple of Remark
-        At most five sentences below it: what was tried, what is left and where, what to drive next.
+        At most five below it: what was tried, what is left and where, what to drive next.
     model : Case
         The fitted model. It contains the effects that are claimed, or those of the first suspect
         where its `predictive_gain` is above zero; `model.suspected` names the latter.

@@ -11,6 +11,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from soilml.fitting.misfit import excess_residuals
+from soilml.gap.report.listed_explanations import (
+    likelier_than_first,
+    listed_explanations,
+    next_run_in_words,
+)
+from soilml.gap.report.reasons_in_short import in_sentences, short_reason
 from soilml.gap.report.results import (
     GapReport,
     NoiseAgreement,
@@ -19,6 +25,7 @@ from soilml.gap.report.results import (
 )
 from soilml.remarks import Remark
 from soilml.report.numbers import (
+    channel_name,
     decimal,
     format_p_value,
     format_probability,
@@ -27,38 +34,11 @@ from soilml.report.numbers import (
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
-#: Words of a headline, lines below it, and words of a reason that stands in either, at most.
-HEADLINE_WORDS, MOST_LINES, REASON_WORDS = 25, 5, 12
-LISTED_SUSPECTS = 3  # Suspects that a line lists
-#: Logarithm of odds below which they are called even, and the largest odds that are stated.
-EVEN_ODDS, MOST_ODDS = 0.1, 10_000
+HEADLINE_WORDS, MOST_LINES = 25, 5  # Words of a headline, and lines below it, at most
 UNLIKELY_SUSPECT = 0.1  # Probability of the first suspect below which the headline doubts it
 HARDLY = 0.95  # Share of a gap that is left, above which it hardly shrinks
+LIKE_NOISE = 1.3  # Mean squared residual below which a gap is no matter of its size
 NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
-
-#: Reasons in a few words, by their codes; the report lists them in full.
-_IN_SHORT = {
-    "noise-scaled": "readings scatter more than their noise",
-    "runs-differ": "runs differ like different soils",
-    "repeats-disagree": "repeats differ by more than their noise",
-    "region-not-predicted": "one region is not predicted by the other rows",
-    "soil-test": "rows and tests of the soil disagree",
-    "excess-residuals": "residuals exceed the declared noise",
-    "soil-at-prior": "the soil is at ends of its priors",
-    "nothing-is-better": "no effect or smooth discrepancy is better",
-    "not-decisive": "the evidence is not decisive",
-    "implausible-fault": "a sensor's fault would be implausibly large",
-    "implausible-size": "an effect would have to be implausibly large",
-    "not-predictive": "the best fit does not predict rows kept back",
-    "other-law": "the law differs from the catalogue's",
-    "not-catalogued": "a large discrepancy is left beside it",
-    "soil-outside-priors": "a soil outside its priors explains the rows",
-    "prior-opened": "a fit pressed against its prior",
-    "few-readings": "there are few readings",
-    "one-run": "there is one run only",
-    "one-load": "there is one load only",
-    "few-slips": "there are too few slips",
-}
 
 #: What a headline says of residuals beyond the declared noise without a smooth gap, by the reason.
 _BEYOND_NOISE = {
@@ -83,10 +63,10 @@ def headline(report: GapReport) -> str:
             if (found := report.misfit) and code in _BEYOND_NOISE:
                 size = excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
                 return f"R{size[1:]}{_BEYOND_NOISE[code]}."
-            why = _short(report.reasons[:1])
+            why = "; ".join(map(short_reason, report.reasons[:1]))
             return f"No smooth gap was found, but the measurements disagree: {why}."
         case "not-testable":
-            why = _short(report.reasons[:1])
+            why = "; ".join(map(short_reason, report.reasons[:1]))
             return f"There is a gap, but these runs cannot identify its cause: {why}."
         case "unknown":
             faults = [r for r in report.reasons if r.code == "implausible-fault"]
@@ -94,8 +74,10 @@ def headline(report: GapReport) -> str:
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
             pattern = format_p_value(report.p_gap).replace("\N{NO-BREAK SPACE}", " ")
-            size = f"mean squared residual {_before(report)}; noise alone gives 1; {pattern}"
-            return f"There is a gap{which} ({size})."
+            size = f"mean squared residual {_before(report)}; noise alone gives 1"
+            if "train" in report.gap and report.gap["train"].before < LIKE_NOISE:
+                size = "residuals form a pattern that noise does not"
+            return f"There is a gap{which} ({size}; {pattern})."
         case "suspected":
             first = report.suspects[0] if report.suspects else None
             names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
@@ -136,17 +118,6 @@ def _first(report: GapReport) -> str:
     first = report.suspects[0]
     likely = first.probability >= UNLIKELY_SUSPECT or first.times_usual
     return "first suspect is" if likely else "no effect is likely, the first is"
-
-
-def likelier_than_first(suspects: Sequence[Suspect]) -> list[Suspect]:
-    """The suspects that are likelier than the first, which they follow for their sizes."""
-    return [s for s in suspects[1:] if s.log_odds > suspects[0].log_odds]
-
-
-def needed_sizes(suspect: Suspect) -> str:
-    """The implausible sizes that a suspect needs, in words; empty where it needs none."""
-    sizes = suspect.times_usual.items()
-    return " and ".join(f"{name} at {decimal(x, 2)} times its usual size" for name, x in sizes)
 
 
 def _probability(suspect: Suspect) -> str:
@@ -209,15 +180,6 @@ def _shrinks(report: GapReport) -> str:
     return f"; the gap {hardly}shrinks {format_residual(before)} -> {format_residual(after)}"
 
 
-def _short(reasons: Sequence[Remark]) -> str:
-    """Reasons in a few words each."""
-    found = []
-    for reason in reasons:
-        text = _IN_SHORT.get(reason.code, reason.text)
-        found.append(text if len(text.split()) <= REASON_WORDS else "see the reasons")
-    return "; ".join(dict.fromkeys(found))
-
-
 def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[Remark, ...]:
     """At most `MOST_LINES` lines: what was tried, what is left and where, what to drive next.
 
@@ -228,39 +190,36 @@ def report_lines(report: GapReport, model_effects: Sequence[str] = ()) -> tuple[
     lines = [_tried(report, model_effects)]
     if report.status in ("suspected", "unknown", "not-testable", "undecided"):
         why = report.reasons or ((NOT_DECISIVE,) if report.status == "suspected" else ())
-        lines += [Remark("why", f"Why no cause is named: {_short(why)}.")] if why else []
-    if report.status in ("suspected", "class") and (listed := _listed(report)):
+        text = in_sentences("Why no cause is named", [short_reason(reason) for reason in why])
+        lines += [Remark("why", text)] if why else []
+    if report.status in ("suspected", "class") and (listed := listed_explanations(report)):
         lines.append(Remark("suspects", listed))
     if left := _remainder(report):
         lines.append(Remark("left", left))
-    if report.remainder_cause is not None:
-        lines.append(report.remainder_cause.remark())
     lines += [
         Remark(note.code, f"{note.text[:1].upper()}{note.text[1:]}.", note.about, note.severity)
         for note in report.notes
         if note.code in ("hidden-effect", "outliers-matter")
     ]
     if report.next_runs:
-        best = report.next_runs[0]
-        sigma = "10 or more" if best.discrimination >= 10.0 else decimal(best.discrimination, 2)
-        cost = "" if best.cost is None else f" at a cost of {best.cost:g}"
-        text = f"Next: {best.kind} ({best.text}), which separates the rest by {sigma} sigma{cost}."
-        lines.append(Remark("next", text))
+        lines.append(Remark("next", next_run_in_words(report.next_runs[0])))
+    if len(lines) > MOST_LINES:  # the headline and the notes have figures of what was tried
+        del lines[0]
     return tuple(lines[: MOST_LINES - 1] + lines[MOST_LINES - 1 :][-1:])
 
 
 def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     """What was tried, and how large the residuals are under the declared noise and with scatter."""
-    parts = []
+    sentences, parts = [], []
+    if count := sum(len(note.about) for note in report.notes if note.code == "outliers"):
+        sentences.append(f"{outliers_in_words(count)} excluded")
     if found := report.misfit:
         size = excess_residuals(math.sqrt(found.declared), found.with_discrepancy)
         text = f"{size} by the soil alone"
         if found.grants_scatter and found.granted <= found.declared:
             text += f", {math.sqrt(found.granted):.1f} times with {_scatter(found)}"
-        parts.append(text)
-    if count := sum(len(note.about) for note in report.notes if note.code == "outliers"):
-        without = f": without {'it' if count == 1 else 'them'}, " if parts else ""
-        parts = [f"{outliers_in_words(count)} excluded{without}{''.join(parts)}"]
+        without = f"without {'it' if count == 1 else 'them'}, " if count else ""
+        sentences.append(f"{without}{text}")
     count = len(report.candidates)
     if count:
         parts.append(f"{count} explanation{'s were' if count > 1 else ' was'} fitted")
@@ -269,8 +228,9 @@ def _tried(report: GapReport, model_effects: Sequence[str]) -> Remark:
     parts += [
         f"the model has {e.name} at another size" for e in report.effects if e.name in model_effects
     ]
-    text = "; ".join(parts) or "the soil alone was fitted"
-    return Remark("tried", f"{text[:1].upper()}{text[1:]}.")
+    sentences += ["; ".join(parts)] if parts else []
+    sentences = sentences or ["the soil alone was fitted"]
+    return Remark("tried", " ".join(f"{text[:1].upper()}{text[1:]}." for text in sentences))
 
 
 def outliers_in_words(count: int) -> str:
@@ -282,42 +242,27 @@ def outliers_in_words(count: int) -> str:
     )
 
 
-def _listed(report: GapReport) -> str:
-    """The explanations that remain, in the order of the report; suspects with their odds."""
-    if report.status == "class":
-        sets = ", or ".join(" + ".join(names) for names in report.cause_set)
-        return f"These runs cannot distinguish, the likeliest first: {sets}."
-    listed = "; ".join(
-        f"{' + '.join(s.effects)} ({_odds(s.log_odds)})" for s in report.suspects[:LISTED_SUSPECTS]
-    )
-    if not listed:
-        return ""
-    likelier = likelier_than_first(report.suspects)
-    order = "the likeliest of usual size first" if likelier else "the likeliest first"
-    why = [f" {' + '.join(s.effects)} is likelier, but needs {needed_sizes(s)}." for s in likelier]
-    return f"Suspects, {order}, within the catalogue: {listed}.{''.join(why)}"
-
-
-def _odds(log_odds: float) -> str:
-    """Odds against all other explanations, in words."""
-    if abs(log_odds) < EVEN_ODDS:
-        return "even odds"
-    if abs(log_odds) > math.log(MOST_ODDS):
-        number = f"more than {MOST_ODDS}"
-    else:
-        number = decimal(math.exp(abs(log_odds)), 2)
-    return f"odds {number} to 1" if log_odds >= 0.0 else f"odds 1 to {number}"
-
-
 def _remainder(report: GapReport) -> str:
-    """The remaining discrepancy of each channel, in the reading's unit and in sigma, and where."""
+    """The remaining discrepancy of each channel, beside what it is left, where, and its cause.
+
+    That of a suspected cause is the discrepancy beside the first suspect, but the cause of a
+    remainder is told of what is left beside an explanation that is claimed, or the soil alone.
+    """
+    cause = report.remainder_cause.remark().text if report.remainder_cause is not None else ""
     left = {n: d for n, d in report.discrepancy.items() if d.after_sigma >= NOTABLE_DISCREPANCY}
     if not left:
-        return ""
+        return cause
+    names = tuple(e.name for e in report.effects)
+    if report.status == "suspected":
+        names = report.best_unclaimed
+    beside = " + ".join(names) or "the soil alone"
     parts = [f"{_size(n, d)} ({decimal(d.after_sigma, 2)} sigma)" for n, d in left.items()]
-    worst = max(left.values(), key=lambda d: d.after_sigma).description
-    where = f"; {worst}" if worst else ""
-    return f"A smooth discrepancy is left, root mean square: {', '.join(parts)}{where}."
+    text = f"A smooth discrepancy is left beside {beside}."
+    text += f" Its root mean square: {', '.join(parts)}."
+    worst, largest = max(left.items(), key=lambda item: item[1].after_sigma)
+    if where := largest.description:
+        text += f" {channel_name(worst).capitalize()} is {where}."
+    return f"{text} {cause}".rstrip()
 
 
 def _size(name: str, discrepancy: RemainingDiscrepancy) -> str:
@@ -379,8 +324,8 @@ def unsupported_conclusions(
     found += [Remark(code, text) for code, text in _NOT_SUPPORTED_BY.get(report.status, [])]
     if fixed:
         text = (
-            f"that {', '.join(fixed)} in the model file are correct: they were fixed, and an error "
-            "in them appears as an effect; free them with a prior or with --free"
+            f"that {', '.join(fixed)} in the model file are correct: they were fixed. An error in "
+            "them appears as an effect: free them with a prior or with --free"
         )
         found.append(Remark("fixed-parameters", text, tuple(fixed)))
     text = "that a smaller gap proves a cause: wrong effects reduce the gap too"

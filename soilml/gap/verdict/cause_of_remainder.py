@@ -95,7 +95,8 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
     told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
     channels = _changed_channels(problem, fit, best)
     probability *= IN_CATALOGUE  # as of any cause that is stated
-    return RemainderCause(stage, variable if told else "", channels, probability, gain)
+    beside = tuple(dict.fromkeys(c.effect for c in fit.coordinates if c.effect))
+    return RemainderCause(stage, variable if told else "", channels, probability, gain, beside)
 
 
 def likeliest_stage(none: float, found: Sequence[Hypothesis]) -> tuple[str, float]:

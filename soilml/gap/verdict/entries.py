@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.covariance import FEW_RUNS
 from soilml.gap.evidence.linearised_fit import AMPLITUDES
-from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, Evidence
-from soilml.gap.evidence.problem import AT_BOUND, FitProblem, MarginalFit
+from soilml.gap.evidence.marginal_likelihood import Evidence
+from soilml.gap.evidence.problem import FitProblem, MarginalFit
 from soilml.gap.evidence.repeats import overstated_noise_notes
 from soilml.gap.evidence.score_test import SignatureSimilarity
+from soilml.gap.report.listed_explanations import SUSPECTS_IN_LINE
 from soilml.gap.report.results import (
     CandidateSummary,
     NamedEffect,
@@ -30,12 +30,13 @@ from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.passes import Analysis
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
-from soilml.gap.verdict.decision import implausible_sizes
+from soilml.gap.verdict.decision import NAMED_PROBABILITY, by_probability, implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
+from soilml.gap.verdict.fit_notes import bound_notes, size_notes
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
-from soilml.report.numbers import format_quantity
+from soilml.report.numbers import LEAST_STATED
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 LISTED_SUSPECTS = 8  # Suspects that are listed
@@ -173,12 +174,13 @@ def prediction_notes(
         return list(not_reduced)
     gain = predictive_gains(analysis.predictions)[tuple(names)]
     text = (
-        f"model.toml contains {' + '.join(names)}, which is suspected and not named: beside a "
-        "smooth remainder, rows kept back are predicted better with it than by the soil alone "
+        f"model.toml contains {' + '.join(names)}, which is suspected and not named. Beside a "
+        "smooth remainder, it predicts rows kept back better than the soil alone does "
         f"(ln density {gain.value:+.1f} +- {gain.std_error:.1f})"
     )
     if not_reduced:
-        text += f"; without a remainder they are not: {'; '.join(texts(not_reduced))}"
+        each = [f"{figure[:1].upper()}{figure[1:]}" for figure in texts(not_reduced)]
+        text = ". ".join([text, "Without a remainder it does not", *each])
     return [Remark("suspect-predicts", text, tuple(names), "note")]
 
 
@@ -197,13 +199,32 @@ def conditions_of_suspects(
 
 
 def competing_explanations(analysis: Analysis) -> list[Explanation]:
-    """The explanations to distinguish: those not rejected, or the best one and its runner-up."""
-    accepted = [c for c in analysis.result.accepted if c.names]
-    others = [c for c in analysis.result.candidates if c.names and c not in accepted]
-    if len(accepted) > 1:
-        return accepted
-    rivals = [c for c in others if not accepted or not set(accepted[0].names) < set(c.names)]
-    return [*accepted, *rivals][:2] if accepted else rivals[:3]
+    """The explanations to distinguish, the first one from the others: those that a report lists.
+
+    They are those of a class; else a named one, or the first suspect, and the suspects after it
+    whose probability is stated. Where there is none, the next suspect, or else the next of the
+    fitted ones, is the rival. A suspect that was not fitted predicts nothing, and is left out.
+    """
+    result, posterior = analysis.result, analysis.result.posterior
+    accepted = [c for c in result.accepted if c.names]
+    doubted = posterior.unproven | posterior.oversized | posterior.unlisted
+    claimed: list[Explanation] = []
+    if accepted and () not in {c.names for c in result.accepted}:
+        refused = doubted | set(posterior.refused)
+        claimed = [c for c in accepted if c.names not in doubted]
+        claimed = [] if accepted[0].names in refused else claimed
+    if len(claimed) > 1:
+        return list(by_probability(claimed, posterior))
+    if claimed and posterior.probability(*claimed[0].names) < NAMED_PROBABILITY:
+        claimed = []
+    fitted = {c.names: c for c in (*result.candidates, *accepted) if c.names}
+    listed = [s for s in suspects(analysis, claimed) if s.effects in fitted]
+    first = [c.names for c in claimed] or [s.effects for s in listed[:1]]
+    stated = [s.effects for s in listed if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]
+    ordered = list(dict.fromkeys([*first, *stated, *(s.effects for s in listed), *fitted]))
+    rivals = [names for names in ordered[1:] if not set(ordered[0]) < set(names)]
+    count = max(1, sum(names in stated for names in rivals))
+    return [fitted[names] for names in [*ordered[:1], *rivals[:count]]]
 
 
 def analysis_notes(
@@ -234,13 +255,14 @@ def analysis_notes(
         )
         for text in far
     ]
-    notes += _bound_notes(written.coordinates, written.x.tolist())
+    notes += bound_notes(written.coordinates, written.x.tolist())
     notes += dict.fromkeys(n for fit in listed for n in size_notes(fit.coordinates, fit.x.tolist()))
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):
         if scale > NOTABLE_NOISE_SCALE:
             text = (
-                f"about the likeliest explanation, the noise of {column(name)} is {scale:.2g} "
-                "times as large as declared"
+                f"residuals of {column(name)} about the likeliest explanation, beside smooth "
+                f"functions, are {scale:.2g} times the declared noise: noise, or a law that "
+                "changes fast with slip"
             )
             notes.append(Remark("noise-scaled", text, (column(name),)))
     notes += overstated_noise_notes(readings)
@@ -248,8 +270,8 @@ def analysis_notes(
     if 1 < len(readings.runs) < FEW_RUNS:
         text = (
             f"run-to-run variation of the soil cannot be estimated from fewer than {FEW_RUNS} "
-            f"runs: {np.degrees(components.friction_angle_std):.2g} deg of friction angle and "
-            f"{100.0 * components.bearing_std:.2g} % of bearing strength are assumed, so mean "
+            f"runs. Assumed are {np.degrees(components.friction_angle_std):.2g} deg of friction "
+            f"angle and {100.0 * components.bearing_std:.2g} % of bearing strength, so mean "
             "squared residuals may be below 1"
         )
         notes.append(Remark("few-runs", text, severity="note"))
@@ -259,37 +281,6 @@ def analysis_notes(
             f"({components.autocorrelation:.2g}), which reduces their weight"
         )
         notes.append(Remark("autocorrelated", text, severity="note"))
-    return notes
-
-
-def _bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
-    """Notes on what model.toml has at the end of a prior, with the effects that it contains."""
-    notes = []
-    effects = dict.fromkeys(c.effect for c in coordinates if c.effect)
-    of_model = f"model.toml ({' + '.join(effects) or 'the soil alone'})"
-    for c, value in zip(coordinates, x, strict=True):
-        end = ""
-        if not c.effect and min(value, 1.0 - value) < AT_BOUND:
-            end = "a bound of its prior: soilml identify has its interval"
-        elif c.effect and value > c.upper - AT_BOUND * (c.upper - c.lower):
-            end = "its upper bound"
-        if end:
-            notes.append(Remark("at-bound", f"{c.path} in {of_model} is at {end}", (c.path,)))
-    return notes
-
-
-def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
-    """Notes on effects that would have to be far larger than they usually are."""
-    notes = []
-    for c, size in zip(coordinates, x, strict=True):
-        if c.effect and not c.is_shape and abs(size) > LARGEST_SIZE:
-            value, usual = c.prior.at(np.asarray([size, 1.0]))
-            text = (
-                f"{c.name} of {c.effect} would have to be {format_quantity(value, c.unit)}, "
-                f"{abs(size):.3g} times its usual size ({format_quantity(usual, c.unit)}): the law "
-                "of the catalogue does not explain the gap by an effect of plausible size"
-            )
-            notes.append(Remark("implausible-size", text, (c.effect,)))
     return notes
 
 

@@ -143,17 +143,16 @@ def without_grown(
 def grown_channels(figures: dict[str, GapReduction], addition: str) -> list[Remark]:
     """A remark on the channels whose figures grow although those of all readings shrink."""
     grown = [
-        (name, f"{channel_name(name)} from {decimal(b, 2)} to {decimal(a, 2)} ({g.description})")
+        (name, f"{channel_name(name)}: from {decimal(b, 2)} to {decimal(a, 2)} ({g.description})")
         for g in figures.values()
         for name, (b, a) in g.channels.items()
         if a > max(NOTABLE_GROWTH * b, 1.0)
     ]
     if not grown:
         return []
-    text = (
-        f"with {addition}, the mean squared residual of all readings shrinks, but that of a "
-        f"channel grows: {'; '.join(text for _, text in grown)}"
-    )
+    begin = f"with {addition}, the mean squared residual of all readings shrinks, but that of a "
+    each = [f"{text[:1].upper()}{text[1:]}" for _, text in grown]
+    text = ". ".join([f"{begin}channel grows", *each])
     return [Remark("channel-grows", text, tuple(dict.fromkeys(n for n, _ in grown)), "note")]
 
 

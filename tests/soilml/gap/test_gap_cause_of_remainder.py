@@ -79,7 +79,8 @@ def test_a_force_of_one_channel_is_stated_as_such():
     report = report_of(Cable(size=6.0))
     assert report.remainder_cause.stage == "drawbar_pull"
     assert "an error of the drawbar pull alone" in str(report.remainder_cause.remark())
-    assert report.remainder_cause.remark() in report.lines
+    (left,) = [line.text for line in report.lines if line.code == "left"]
+    assert report.remainder_cause.remark().text in left and not report.remainder_cause.beside
     assert report.as_json()["remainder_cause"]["stage"] == "drawbar_pull"
 
 
@@ -147,11 +148,13 @@ def test_the_probability_of_a_stage_counts_all_others_and_several_causes():
 def test_the_sentence_names_stage_dependence_and_channels():
     contact = RemainderCause("contact geometry", "", ("torque", "sinkage"), 0.95, 2.0)
     assert str(contact.remark()) == (
-        "The remainder looks like a change of the contact geometry; torque and sinkage share it."
+        "The remainder beside the soil alone looks like a change of the contact geometry. Torque "
+        "and sinkage share it."
     )
-    force = RemainderCause("drawbar_pull", "", ("drawbar_pull",), 0.95, 2.0)
+    force = RemainderCause("drawbar_pull", "", ("drawbar_pull",), 0.95, 2.0, ("slope", "camber"))
     assert str(force.remark()) == (
-        "The remainder looks like an error of the drawbar pull alone, of a force or of its sensor."
+        "The remainder beside slope + camber looks like an error of the drawbar pull alone, of a "
+        "force or of its sensor."
     )
     slip = RemainderCause("slip or load", "progress", ("torque",), 0.95, 2.0)
     assert "a slip or load other than the stated one that depends on time." in str(slip.remark())

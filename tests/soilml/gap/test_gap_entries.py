@@ -20,7 +20,6 @@ from soilml.gap.search.explanation import (
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.verdict import entries
 from soilml.gap.verdict.entries import (
-    _bound_notes,
     analysis_notes,
     competing_explanations,
     conditions_of_suspects,
@@ -29,6 +28,7 @@ from soilml.gap.verdict.entries import (
     suspects,
     variance_component_entries,
 )
+from soilml.gap.verdict.fit_notes import bound_notes
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import ShearStrength
 from soilml.remarks import Remark, texts
@@ -90,10 +90,26 @@ def test_the_soil_beside_a_discrepancy_stays_where_noise_put_it_under_the_larges
 def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_runner_up():
     none, a, b, c, d = made(), made("a"), made("b"), made("c"), made("d")
     pair = made("a", "e")
-    assert competing_explanations(analysed(none, a, b, accepted=(a, b, none))) == [a, b]
-    # a set that contains the accepted one is no rival of it
-    assert competing_explanations(analysed(pair, a, none, b, c, accepted=(a,))) == [a, b]
-    assert competing_explanations(analysed(pair, a, none, b, d)) == [pair, a, b]
+    weights = {("b",): 0.6, ("a",): 0.3, ("d",): 0.1, (): 1e-6}
+
+    def compared(*candidates, accepted=(), own=None, **posterior):
+        logs = {names: float(np.log(weight)) for names, weight in (own or weights).items()}
+        given = analysed(*candidates, accepted=accepted, weights=logs)
+        given.result.posterior = replace(given.result.posterior, **posterior)
+        return competing_explanations(given)
+
+    assert compared(none, a, b, d, accepted=(a, b)) == [b, a]  # a class, the likeliest first
+    assert compared(none, a, b, d, accepted=(a, b, none)) == [b, a, d]  # suspects
+    # where the best is refused, suspects are listed; of what is not fitted, nothing is predicted
+    assert compared(none, a, d, accepted=(a, d), unproven=frozenset({("a",)})) == [a, d]
+    # a set that contains the named one is no rival of it
+    named = {("a",): 0.99, ("b",): 0.01, (): 1e-6}
+    assert compared(pair, a, none, b, c, accepted=(a,), own=named) == [a, b]
+    # what has no stated probability is no rival beside one that has
+    unlikely = {("a",): 0.7, ("b",): 0.3, ("c",): 0.004, (): 1e-6}
+    assert compared(a, b, c, none, own=unlikely) == [a, b]
+    alone = {("a",): 1.0, ("c",): 0.004, (): 1e-6}
+    assert compared(a, b, c, none, own=alone) == [a, c]
     assert competing_explanations(analysed(none)) == []
 
 
@@ -168,7 +184,8 @@ def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
     )
     assert several == [
         "7 readings are outliers and were excluded: o0, o1, o2, o3, o4, o5",
-        "about the likeliest explanation, the noise of sinkage_m is 1.3 times as large as declared",
+        "residuals of sinkage_m about the likeliest explanation, beside smooth functions, are 1.3 "
+        "times the declared noise: noise, or a law that changes fast with slip",
         "replicate rows disagree: run a and run b",
         "the noise of neighbouring samples of a run is correlated (0.5), which reduces their "
         "weight",
@@ -180,7 +197,7 @@ def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
     assert few.startswith("run-to-run variation of the soil cannot be estimated from fewer than 6")
     for runs in ("ab", "abc"):
         assert notes(analysed(runs=tuple(runs)))[-1].startswith("run-to-run variation")
-    assert "0.57 deg of friction angle and 4 % of bearing strength are assumed" in few
+    assert "Assumed are 0.57 deg of friction angle and 4 % of bearing strength, so" in few
 
 
 def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
@@ -199,15 +216,15 @@ def test_estimates_at_a_bound():
     size = Coordinate("slip-sinkage.n1", "1", Prior(0.0, 1.0), upper=4.0)
     end = "is at a bound of its prior: soilml identify has its interval"
     at = [f"{soil.path} in model.toml (the soil alone) {end}"]
-    assert texts(_bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
-    assert _bound_notes([soil, soil], [0.0011, 0.9989]) == []
-    assert texts(_bound_notes([size, size], [3.9961, 0.0])) == [
+    assert texts(bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
+    assert bound_notes([soil, soil], [0.0011, 0.9989]) == []
+    assert texts(bound_notes([size, size], [3.9961, 0.0])) == [
         f"{size.path} in model.toml (slip-sinkage) is at its upper bound"
     ]
-    assert texts(_bound_notes([size, soil], [0.5, 0.0])) == [
+    assert texts(bound_notes([size, soil], [0.5, 0.0])) == [
         f"{soil.path} in model.toml (slip-sinkage) {end}"
     ]
-    assert _bound_notes([size], [3.9959]) == []
+    assert bound_notes([size], [3.9959]) == []
 
 
 def test_variance_components_by_the_names_of_columns():

@@ -38,6 +38,7 @@ def lugs_or_sensor():
 def test_reverse_tells_a_slope_from_bulldozing_by_its_own_physics(slope_or_bulldozing):
     found = {run.kind: run for run in next_runs(*slope_or_bulldozing)}
     assert found["reverse"].discrimination > 3.0
+    assert {run.compared for run in found.values()} == {(("bulldozing",), ("slope",))}
     row = found["reverse"].rows[-1]
     assert row["speed_m_s"] == -0.05
     slope = slope_or_bulldozing[1][1]

@@ -149,7 +149,7 @@ def test_a_channel_that_grows_is_a_note():
     assert codes(torque_Nm=(9.0, 2.0), sinkage_m=(2.3, 2.4)) == codes(sinkage_m=(0.5, 0.9)) == []
     ((code, about, text),) = codes(torque_Nm=(9.0, 2.0), sinkage_m=(2.3, 12.0))
     assert (code, about) == ("channel-grows", ("sinkage_m",))
-    assert text.endswith("a channel grows: sinkage from 2.3 to 12 (all rows fitted)")
+    assert text.endswith("a channel grows. Sinkage: from 2.3 to 12 (all rows fitted)")
 
 
 @pytest.mark.slow

@@ -10,6 +10,8 @@ from gap_sets import case_of, remark
 from remarked import remarked
 
 from soilml.config.measurement_noise import Discrepancy
+from soilml.gap.report.listed_explanations import _odds
+from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.gap.report.results import (
     GapReduction,
     GapReport,
@@ -17,7 +19,7 @@ from soilml.gap.report.results import (
     RemainingDiscrepancy,
     Suspect,
 )
-from soilml.gap.report.sentences import _odds, headline, report_lines, unsupported_conclusions
+from soilml.gap.report.sentences import headline, report_lines, unsupported_conclusions
 from soilml.remarks import Remark, texts
 
 FIGURES = {"train": GapReduction(8.8, 1.1, {}, 96, "all rows fitted")}
@@ -27,8 +29,8 @@ LEFT = {
     "torque_Nm": RemainingDiscrepancy("N m", 4.0, 2.5, 4.0, 0.29, ""),
 }
 REMAINDER = (
-    "A smooth discrepancy is left, root mean square: sinkage 2.1 mm (0.30 sigma), drawbar pull "
-    "2.5 N (1.3 sigma)."
+    "A smooth discrepancy is left beside {}. Its root mean square: sinkage 2.1 mm (0.30 sigma), "
+    "drawbar pull 2.5 N (1.3 sigma)."
 )
 
 
@@ -70,7 +72,7 @@ def test_granted_scatter_is_named_with_its_size():
     outliers = Remark("outliers", "...", ("torque_Nm at line 3", "sinkage_m at line 4"))
     without = lines("no-gap", misfit=SCATTER, notes=(outliers,))["tried"]
     assert without.startswith(
-        "2 readings are outliers and were excluded: without them, residuals are 1.7 times"
+        "2 readings are outliers and were excluded. Without them, residuals are 1.7 times"
     )
     one = replace(outliers, about=outliers.about[:1])
     assert lines("no-gap", notes=(one,))["tried"] == "1 reading is an outlier and was excluded."
@@ -89,8 +91,67 @@ def test_without_a_cause_the_first_reason_is_stated():
     assert "no effect explains better than a smooth error (mean squared residual 8.80" in unknown
     found = lines("unknown", reasons=reasons, discrepancy=LEFT)
     assert found["why"] == "Why no cause is named: there is one load only; runs differ."
-    assert found["left"] == REMAINDER
+    assert found["left"] == REMAINDER.format("the soil alone")
     assert "left" not in lines("unknown", discrepancy={"torque_Nm": LEFT["torque_Nm"]})
+
+
+def test_a_gap_of_the_size_of_noise_is_a_pattern():
+    small = {"train": GapReduction(1.02, 1.0, {}, 90, "all rows fitted")}
+    assert said("unknown", gap=small, p_gap=0.0065) == (
+        "There is a gap that no effect explains better than a smooth error (residuals form a "
+        "pattern that noise does not; p = 0.0065)."
+    )
+
+
+def test_what_is_left_says_beside_which_explanation_and_what_its_cause_is_like():
+    worst = replace(LEFT["drawbar_pull_N"], description="measured above the model by up to 5.0 N")
+    suspects = (Suspect(("a", "b"), 0.0, 0.5),)
+    parts = {"suspects": suspects, "best_unclaimed": ("a", "b")}
+    parts |= {"discrepancy": LEFT | {"drawbar_pull_N": worst}}
+    cause = RemainderCause("shear stress", "slip", ("torque",), 0.95, 2.0)
+    depends = (
+        "The remainder beside {} looks like a change of the shear stress that depends on slip."
+    )
+    assert lines("suspected", **parts, remainder_cause=cause)["left"] == (
+        f"{REMAINDER.format('a + b')} Drawbar pull is measured above the model by up to 5.0 N. "
+        f"{depends.format('the soil alone')}"
+    )
+    named = {"effects": (effect("dig"),), "discrepancy": LEFT}
+    named["remainder_cause"] = replace(cause, beside=("dig",))
+    assert lines("named", **named)["left"] == (f"{REMAINDER.format('dig')} {depends.format('dig')}")
+    assert lines("named", **named | {"discrepancy": {}})["left"] == depends.format("dig")
+
+
+@pytest.mark.parametrize(
+    "code, about, words",
+    [
+        ("other-law", ("dig",), "the law of dig differs from the catalogue's"),
+        ("implausible-size", ("a", "b"), "a + b would have to be implausibly large"),
+        (
+            "not-catalogued",
+            ("a", "b", "drawbar_pull_N"),
+            "a large discrepancy of drawbar pull is left beside a + b",
+        ),
+        (
+            "not-predictive",
+            ("dig",),
+            "beside a smooth remainder, dig predicts rows kept back no better than the soil alone",
+        ),
+        ("implausible-fault", ("gain",), "gain would be an implausibly large fault"),
+    ],
+)
+def test_a_reason_names_the_explanation_that_it_is_about(code, about, words):
+    reasons = (Remark(code, "...", about),)
+    assert lines("suspected", reasons=reasons)["why"] == f"Why no cause is named: {words}."
+
+
+def test_many_reasons_are_several_sentences():
+    reasons = tuple(remark(f"this reason {i} has eight words in all") for i in range(4))
+    one = "this reason {} has eight words in all"
+    assert lines("suspected", reasons=reasons)["why"] == (
+        f"Why no cause is named: {one.format(0)}; {one.format(1)}; {one.format(2)}. "
+        f"T{one.format(3)[1:]}."
+    )
 
 
 def test_residuals_beyond_the_noise_are_no_disagreement_of_measurements():
@@ -129,6 +190,9 @@ def test_suspects_have_their_odds_and_the_first_three_are_listed():
         "c (odds 1 to 2.7)."
     )
     assert found["why"].endswith("the evidence is not decisive.")
+    bound = (suspects[0], replace(suspects[1], log_odds=-5.4, probability=0.0049))
+    assert lines("suspected", suspects=bound)["suspects"].endswith("catalogue: a (odds 20 to 1).")
+    assert "suspects" not in lines("suspected", suspects=bound[1:])
 
 
 def test_a_first_suspect_of_little_probability_is_doubted():
@@ -187,6 +251,18 @@ def test_explanations_by_what_is_claimed():
         f"The cause may be dig, the likeliest of 2 explanations {shrinks}"
     )
     assert lines("class", **alone)["suspects"].endswith("first: dig, or plough + rate.")
+    outside = "A cause outside the catalogue is possible."
+    for first, probability, doubted in (
+        ("dig", 0.5, False),
+        ("dig", 0.49, True),
+        ("torque-gain", 0.9, True),
+        ("slope", 0.9, False),
+    ):
+        own = {"effects": (effect(first, probability),), "cause_set": ((first,), ("rate",))}
+        assert lines("class", **own)["suspects"].endswith(outside) == doubted
+    many = {"effects": (effect("dig"),), "cause_set": tuple((f"e{i}",) for i in range(13))}
+    listed = lines("class", **many)["suspects"]
+    assert listed.endswith("e9, or 3 others.") and len(listed.split()) == 29
     assert lines("named", ["dig"], **parts)["tried"] == "The model has dig at another size."
     weak = alone | {"effects": (effect("dig", 0.08),)}
     assert said("class", **weak) == (

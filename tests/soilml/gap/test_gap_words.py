@@ -1,9 +1,9 @@
 """A report says the same everywhere: a short headline, few lines, and suspects by probability."""
 
 import json
+import re
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from gap_sets import analysed, case_of, driven, hidden
 
@@ -11,8 +11,17 @@ from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
 from soilml.gap import gap
 from soilml.gap.presentation import gap_files, gap_text
+from soilml.gap.report.listed_explanations import next_run_in_words
 from soilml.gap.report.page import summary, suspect_table
-from soilml.gap.report.results import STATUSES, GapReduction, GapReport, NamedEffect, Suspect
+from soilml.gap.report.reasons_in_short import SENTENCE_WORDS
+from soilml.gap.report.results import (
+    STATUSES,
+    GapReduction,
+    GapReport,
+    NamedEffect,
+    NextRun,
+    Suspect,
+)
 from soilml.gap.report.sentences import HEADLINE_WORDS, MOST_LINES, headline, report_lines
 from soilml.io.table import Table
 from soilml.remarks import Remark, texts
@@ -25,12 +34,20 @@ STORIES = {
 }
 
 
+def longest(text):
+    """The longest sentence of a text."""
+    return max(re.split(r"(?<=[.?!]) (?=[A-Z0-9])", text), key=lambda own: len(own.split()))
+
+
 def check_words(report, runs):
     words = report.sentence.replace("\N{NO-BREAK SPACE}", " ").split()
     assert 3 < len(words) <= HEADLINE_WORDS, report.sentence
     assert len(report.lines) <= MOST_LINES
     named = [n for text in (report.sentence, *texts(report.lines)) for n in runs if n in text]
     assert not named
+    remarks = (*report.lines, *report.notes, *report.reasons, *report.conditions)
+    sentences = [longest(r.text) for r in remarks if r.text != LONG and r.code != "prior-opened"]
+    assert [own for own in sentences if len(own.split()) > SENTENCE_WORDS] == []
 
 
 def check_order(report):
@@ -112,16 +129,28 @@ def test_the_longest_names_leave_the_headline_short(status):
 
 def test_many_lines_leave_room_for_the_next_run():
     notes = tuple(Remark("hidden-effect", f"note {i}") for i in range(9))
-    run = type(
-        "Run",
-        (),
-        {"kind": "heavier", "text": "210 N", "discrimination": np.float64(3.2), "cost": 2.0},
-    )()
+    run = NextRun("heavier", "210 N", 3.2, (), 2.0, (("a",), ("b", "c")))
     report = GapReport(
         "suspected", "", case_of(), **(PARTS | {"notes": notes, "next_runs": (run,)})
     )
     found = report_lines(report)
     assert len(found) == MOST_LINES and found[-1].code == "next"
+    assert "tried" not in {line.code for line in found}
     assert found[-1].text == (
-        "Next: heavier (210 N), which separates the rest by 3.2 sigma at a cost of 2."
+        "Next: heavier (210 N), which separates a from b + c by 3.2 sigma at a cost of 2."
     )
+
+
+@pytest.mark.parametrize(
+    "compared, sigma, said",
+    [
+        ("ab", 12.0, "which separates a from b by 10 or more sigma."),
+        ("abc", 3.0, "which separates a from b and 1 other by 3.0 sigma on average."),
+        ("abcd", 3.0, "which separates a from b and 2 others by 3.0 sigma on average."),
+    ],
+)
+def test_the_next_run_says_what_it_separates(compared, sigma, said):
+    run = NextRun("heavier", "210 N", sigma, (), None, tuple((name,) for name in compared))
+    assert next_run_in_words(run) == f"Next: heavier (210 N), {said}"
+    long = replace(run, text="very " * 20 + "heavy")
+    assert next_run_in_words(long).endswith(f"heavy). This {said[6:]}")

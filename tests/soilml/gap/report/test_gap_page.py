@@ -304,3 +304,39 @@ def test_shown_runs_cover_all_loads():
     assert many[0].load == 40.0 and many[-1].load == 190.0
     assert len({run.colour for run in many}) == MOST_RUNS
     assert len(select_runs(curves(runs=1))) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "status, notes, words",
+    [
+        ("named", (), "Without the missing effect, the fit of the soil is biased."),
+        ("class", (), "If slip-sinkage is the cause, the fit of the soil without it is biased"),
+        (
+            "suspected",
+            (Remark("suspect-predicts", "...", ("grousers",)),),
+            "If grousers is the cause, the fit of the soil without it is biased",
+        ),
+        ("suspected", (), "After: the soil alone beside a smooth discrepancy of unknown cause"),
+        ("unknown", (), "After: the soil alone beside a smooth discrepancy of unknown cause"),
+    ],
+)
+def test_the_soil_after_is_that_beside_what_the_model_contains(status, notes, words):
+    whole = report(status, notes=notes, curves=None, best_unclaimed=("grousers",))
+    if status not in ("named", "class"):
+        whole = replace(whole, effects=())
+    sentences = [
+        "Without the missing effect, the fit of the soil is biased",
+        "is the cause, the fit of the soil without it is biased",
+        "After: the soil alone beside a smooth discrepancy",
+    ]
+    text = page(whole, "m", "r")
+    assert words in text and sum(own in text for own in sentences) == 1
+
+
+def test_the_page_says_which_explanations_a_run_separates_and_which_is_the_likeliest():
+    compared = (("slip-sinkage",), ("slope", "camber"), ("grousers",))
+    runs = (NextRun("reverse", "the same slips in reverse", 7.25, (), compared=compared),)
+    text = page(report("class", next_runs=runs, curves=None), "m", "r")
+    assert "of slip-sinkage from slope + camber and grousers, the mean over these." in text
+    assert "with slip-sinkage, the likeliest of 2 explanations that the data do not reject" in text
