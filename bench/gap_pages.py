@@ -59,8 +59,8 @@ SAME_CAUSE = (
 ENLARGED = (
     " The sample has few sets with a cause that can be named at one load, from few rows, or beside "
     "a discrepancy of 1 or 4 %. {more} more plans, of the same seeds, and at one load or for few "
-    "rows of further ones, were drawn at random, with an SNR of 3 or more before any analysis. They "
-    "count in the gates of these four groups at SNR >= 3 alone."
+    "rows of further ones, were drawn at random, with an SNR of 3 or more before any analysis. "
+    "They count in the gates of these four groups at SNR >= 3 alone."
 )
 PICTURE = "docs/gap_reliability.png"
 

@@ -90,7 +90,7 @@ def analyse(
                 if likeliest is not None and explains_better(found, other, likeliest):
                     found = replace(other, opened=opened.remark)
             elif not (other.error or other.outliers or other.result.has_gap):
-                text = f"{opened.remark}, and the soil alone then agrees with the rows"
+                text = f"{opened.remark}. The soil alone then agrees with the rows"
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
                 found = _explained_by_soil(replace(found, opened=remark), seed)
     return found

@@ -48,7 +48,8 @@ IMPLAUSIBLE_SIZE = (
     "{} would have to be far larger than it usually is, so that its law or the cause is another one"
 )
 NOT_PREDICTIVE = (
-    "{} fits the rows, but predicts rows that were kept back no better than the soil alone does"
+    "{} fits the rows, but beside a smooth remainder, it predicts rows that were kept back no "
+    "better than the soil alone does"
 )
 OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "

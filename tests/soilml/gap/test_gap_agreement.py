@@ -135,4 +135,4 @@ def test_scatter_is_not_credited_with_what_an_exclusion_did():
     report = gap(CASE, replace(table, columns=dict(table.columns) | {"torque_Nm": torque}))
     assert not report.misfit.exceeds_noise
     assert report.misfit.declared < 1.5 * report.misfit.granted
-    assert report.lines[0].text.startswith("1 reading is an outlier and was excluded: without it,")
+    assert report.lines[0].text.startswith("1 reading is an outlier and was excluded. Without it,")
