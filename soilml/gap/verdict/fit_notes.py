@@ -15,17 +15,26 @@ from soilml.report.numbers import format_quantity
 
 def bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
     """Notes on what model.toml has at the end of a prior, with the effects that it contains."""
-    notes = []
     effects = dict.fromkeys(c.effect for c in coordinates if c.effect)
-    of_model = f"model.toml ({' + '.join(effects) or 'the soil alone'})"
-    for c, value in zip(coordinates, x, strict=True):
-        end = ""
-        if not c.effect and min(value, 1.0 - value) < AT_BOUND:
-            end = "a bound of its prior: soilml identify has its interval"
-        elif c.effect and value > c.upper - AT_BOUND * (c.upper - c.lower):
-            end = "its upper bound"
-        if end:
-            notes.append(Remark("at-bound", f"{c.path} in {of_model} is at {end}", (c.path,)))
+    of_model = f"in model.toml ({' + '.join(effects) or 'the soil alone'})"
+    at_bound = [
+        c.path
+        for c, value in zip(coordinates, x, strict=True)
+        if not c.effect and min(value, 1.0 - value) < AT_BOUND
+    ]
+    several = len(at_bound) > 1
+    verb, its = ("are", "their") if several else ("is", "its")
+    prior, interval = ("priors", "intervals") if several else ("prior", "interval")
+    text = (
+        f"{', '.join(at_bound)} {of_model} {verb} at a bound of {its} {prior}: soilml identify has "
+        f"{its} {interval}"
+    )
+    notes = [Remark("at-bound", text, tuple(at_bound))] if at_bound else []
+    for c, size in zip(coordinates, x, strict=True):
+        if c.effect and size > c.upper - AT_BOUND * (c.upper - c.lower):
+            notes.append(
+                Remark("at-bound", f"{c.path} {of_model} is at its upper bound", (c.path,))
+            )
     return notes
 
 

@@ -215,8 +215,14 @@ def test_estimates_at_a_bound():
     soil = Coordinate("cohesion", "Pa", Prior(0.0, 1000.0))
     size = Coordinate("slip-sinkage.n1", "1", Prior(0.0, 1.0), upper=4.0)
     end = "is at a bound of its prior: soilml identify has its interval"
-    at = [f"{soil.path} in model.toml (the soil alone) {end}"]
-    assert texts(bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])) == 2 * at
+    one = f"{soil.path} in model.toml (the soil alone) {end}"
+    assert texts(bound_notes([soil, soil, soil], [0.0009, 0.5, 0.5])) == [one]
+    (both,) = bound_notes([soil, soil, soil], [0.0009, 0.9991, 0.5])
+    assert both.about == (soil.path,) * 2
+    assert both.text == (
+        f"{soil.path}, {soil.path} in model.toml (the soil alone) are at a bound of their priors: "
+        "soilml identify has their intervals"
+    )
     assert bound_notes([soil, soil], [0.0011, 0.9989]) == []
     assert texts(bound_notes([size, size], [3.9961, 0.0])) == [
         f"{size.path} in model.toml (slip-sinkage) is at its upper bound"
