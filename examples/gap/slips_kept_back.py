@@ -55,7 +55,7 @@ def _off(case: Case, y: Mapping[str, np.ndarray], rows: Table) -> np.ndarray:
     """Errors (n,) of all readings of some rows, over their declared noise."""
     off = []
     for name in CHANNELS:
-        if column(name) in rows:
+        if column(name) in case.noise:
             reading = rows[column(name)]
             own = (y[name] - reading) / case.noise[column(name)].std(reading)
             off.append(own[np.isfinite(reading)])

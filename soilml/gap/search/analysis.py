@@ -16,7 +16,6 @@ from soilml.gap.search.passes import (
     begin,
     declared_covariance,
     of_readings,
-    with_singles,
 )
 from soilml.gap.search.prediction import predict_with, predictive_gains
 from soilml.gap.search.residual_test import residual_test
@@ -32,9 +31,6 @@ OPENED_MARGIN = 9.0
 #: The same where less than half the remainder is left. Its evidence may then be a little smaller:
 #: wider priors cost evidence, and what a large remainder takes up is not explained.
 NO_MARGIN = -6.0
-#: Decrease of the objective that all effects may bring beyond the likeliest sets of the search
-#: within the priors: where more is lacking, only these are fitted with opened priors.
-NEARLY = 5.0
 
 
 def analyse(
@@ -78,8 +74,6 @@ def analyse(
                 found.problem, rival, found.result, seed
             )
             begun = begin(kept, seed, place, found.result, likeliest=True, only_test=complete)
-            if any(explains_better(found, begun[0], c, NEARLY) for c in begun[0].result.candidates):
-                begun = with_singles(begun, seed)
             other, _ = begun
             better = any(explains_better(found, other, c) for c in other.result.candidates)
             if better or not other.result.has_gap:
@@ -110,14 +104,10 @@ def _explained_by_soil(found: Analysis, seed: int) -> Analysis:
     return replace(found, result=result, predictions={}, opened=None)
 
 
-def explains_better(
-    found: Analysis, other: Analysis, opened: Explanation, nearly: float = 0.0
-) -> bool:
+def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bool:
     """Whether an explanation, of an analysis with opened priors, is far better than all of another.
 
     Its evidence counts beside the noise, scatter and discrepancy of the other one.
-
-    nearly: Decrease of its objective that may be lacking.
     """
     if other.error or not opened.names:
         return False
@@ -127,7 +117,7 @@ def explains_better(
     value = found.problem.discrepancy.evidence(opened.fit, opened.amplitude).value
     value += opened.penalty
     explains_more = opened.amplitude.max() < 0.5 * rival.amplitude.max()
-    return value - nearly < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
+    return value < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
 
 
 def _rival(found: Analysis) -> Explanation:

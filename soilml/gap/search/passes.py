@@ -95,8 +95,8 @@ def begin(
 
     explained: The fit that the covariance is estimated from; else it is the best of the soil alone
         and of the earlier search.
-    likeliest: Look at the likeliest sets of the earlier search alone.
-    only_test: Fit no effect.
+    likeliest: Look at the likeliest sets of the earlier search too.
+    only_test: See `first_look`.
     """
     free, starts = problem.soil, restated_candidates(problem, earlier.candidates if earlier else ())
     first = np.asarray([f.prior.fraction(f.nominal) for f in free])
@@ -118,18 +118,9 @@ def begin(
         best = min(soil, starts[earlier.accepted[0].names].fit, key=lambda fit: fit.objective)
     problem = with_estimated_covariance(problem, best, ())
     soil = problem.fit_soil([soil.x], soil.linearisation)
-    sets = likeliest_sets(starts) if likeliest and not only_test else ()
-    result = first_look(problem, soil, seed, starts, sets, singles=not (likeliest or only_test))
+    sets = likeliest_sets(starts) if likeliest else ()
+    result = first_look(problem, soil, seed, starts, sets, only_test=only_test)
     return Analysis(problem, result), starts
-
-
-def with_singles(begun: Begun, seed: int) -> Begun:
-    """A first look at some sets, with the single effects that are likely."""
-    look, starts = begun
-    starts = {**starts, **{c.names: c for c in look.result.candidates}}
-    sets = [c.names for c in look.result.candidates if c.names]
-    result = first_look(look.problem, look.result.soil, seed, starts, sets)
-    return replace(look, result=result), starts
 
 
 def search_in_passes(begun: Begun, seed: int, progress: Callable[[float], None]) -> Analysis:

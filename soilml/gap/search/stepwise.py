@@ -171,27 +171,24 @@ def first_look(
     starts: Starts,
     sets: Sequence[tuple[str, ...]] = (),
     *,
-    singles: bool = True,
+    only_test: bool = False,
 ) -> SearchResult:
     """The test for a gap, and where there is one the explanations by single effects.
 
-    sets: Other sets that are fitted.
-    singles: Fit the single effects that are likely; else these sets alone, and the soil alone from
-        its own start.
+    sets: Other sets that are fitted too.
+    only_test: Fit no effect.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
     found = without_search(soil, soil_test, untestable)
-    if soil_test.p_value >= GAP_LEVEL or not (sets or singles):
+    if only_test or soil_test.p_value >= GAP_LEVEL:
         return found
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
-    likely: Sequence[str] = ()
-    if singles:
-        likely = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-    selected = dict.fromkeys([*sets, *((name,) for name in likely)], soil_alone)
+    singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+    selected = dict.fromkeys([*sets, *((name,) for name in singles)], soil_alone)
     level = _fit_level(problem, soil, soil_alone, selected, starts)
-    again = _from_soils_of(problem, soil_alone, level) if singles else soil_alone
+    again = _from_soils_of(problem, soil_alone, level)
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
     fitted = {c.names: c for c in [again, *level]}

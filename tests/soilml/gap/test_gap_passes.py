@@ -209,7 +209,6 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
     for name, value in {
         "open_priors": lambda *_: opened,
         "begin": lambda *_, **__: (look, {}),
-        "with_singles": lambda begun, _: begun,
         "_rival": lambda found: SimpleNamespace(names=()),
         "explains_better": lambda *_: better,
         "_explained_by_soil": lambda found, _: found,
@@ -220,39 +219,15 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
     assert (found.opened is not None) == (searches == 2)  # the stubs find no gap in full
 
 
-@pytest.mark.parametrize("nearly", [True, False])
-def test_all_effects_are_fitted_with_opened_priors_where_the_likeliest_sets_nearly_count(
-    passes, monkeypatch, nearly
-):
-    given, run = passes
-    given.accepted, asked = [None], []
-    soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
-    look = replace(module.no_result(soil), candidates=(SimpleNamespace(names=("a",)),))
-    look = module.Analysis(soil.problem, replace(look, soil_test=SimpleNamespace(p_value=0.001)))
-    opened = OpenedPriors(CASE, tuple(free_soil_parameters(CASE, None)), Remark("prior-opened", ""))
-    for name, value in {
-        "open_priors": lambda *_: opened,
-        "begin": lambda *_, **__: (look, {}),
-        "with_singles": lambda begun, _: asked.append(begun) or begun,
-        "_rival": lambda found: SimpleNamespace(names=()),
-        "explains_better": lambda found, other, c, lacking=0.0: nearly and lacking > 0.0,
-    }.items():
-        monkeypatch.setattr(analysis, name, value)
-    run()
-    assert len(asked) == nearly and len(given.starts) == 1
-
-
-@pytest.mark.parametrize(
-    "value, nearly, better", [(-9.1, 0.0, True), (-8.9, 0.0, False), (-4.1, 5.0, True)]
-)
-def test_an_explanation_with_opened_priors_is_better_by_9(monkeypatch, value, nearly, better):
+@pytest.mark.parametrize("value, better", [(-9.1, True), (-8.9, False)])
+def test_an_explanation_with_opened_priors_is_better_by_9(monkeypatch, value, better):
     evidence = SimpleNamespace(evidence=lambda *_: SimpleNamespace(value=value))
     problem = SimpleNamespace(readings=READINGS, discrepancy=evidence)
     found = SimpleNamespace(problem=problem, error=None)
     rival = SimpleNamespace(objective=0.0, amplitude=np.zeros(3))
     monkeypatch.setattr(analysis, "_rival", lambda _: rival)
     own = SimpleNamespace(names=("a",), fit=None, amplitude=np.zeros(3), penalty=0.0)
-    assert analysis.explains_better(found, found, own, nearly) == better
+    assert analysis.explains_better(found, found, own) == better
 
 
 def test_the_declared_noise_is_where_the_analysis_begins():
