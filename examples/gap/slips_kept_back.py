@@ -16,7 +16,7 @@ from soilml.quantities import CHANNELS, column
 #: Width of a level of slip: rows of one level are kept back together.
 LEVEL = 0.1
 #: The levels kept back: those between others, and the smallest and the largest.
-PLACES = {"between": "slips between", "ends": "smallest and largest slip"}
+PLACES = {"between": "slips between others", "ends": "smallest and largest slip"}
 METHODS = ("soil alone", "returned model", "process")
 
 Errors = dict[str, dict[str, float]]
@@ -76,16 +76,15 @@ def table(
 
 
 def verdict(found: Sequence[Errors]) -> str:
-    """How often the returned model is nearer to the readings than the others, in sentences."""
+    """How often the returned model is nearer to the readings than the others, in a list."""
     said = []
     for place, words in PLACES.items():
         own = [e[place] for e in found if place in e]
-        for other, what in (("soil alone", "soil alone"), ("process", "Gaussian process")):
+        for other in ("soil alone", "process"):
             ratio = np.asarray([e["returned model"] / e[other] for e in own])
+            nearer = f"nearer to the readings in {int(np.sum(ratio < 1.0))} of {len(ratio)} sets"
             said.append(
-                f"At the {words}, the returned model is nearer to the readings than the {what} in "
-                f"{int(np.sum(ratio < 1.0))} of {len(ratio)} sets; its error is "
-                f"{np.median(ratio):.2f} times as large in the median, "
-                f"{ratio.max():.2f} times in the worst."
+                f"- {words}, over the {other}: {nearer}; errors {np.median(ratio):.2f} times as "
+                f"large in the median, {ratio.max():.2f} times in the worst set"
             )
-    return " ".join(said)
+    return "\n".join(said)
