@@ -90,6 +90,10 @@ def test_a_verdict_survives_where_all_priors_give_the_same_first_explanation():
     assert real.first_of(named) == "grousers + exit-angle"
 
 
+#: Errors of kept slips, all of them between others.
+KEPT = {"between": {"soil alone": 4.0, "returned model": 1.0, "process": 2.0}}
+
+
 def test_the_page_has_the_reports_figures_and_a_belief_for_every_set():
     beliefs = tomllib.loads((HERE / "beliefs.toml").read_text())
     assert set(beliefs) == set(SETS)
@@ -98,7 +102,14 @@ def test_the_page_has_the_reports_figures_and_a_belief_for_every_set():
         for name in SETS
     }
     found["kls1_both"]["wide"] = {"status": "bad-data"}
-    text = real.page(list(SETS.values()), found)
+    kept = dict.fromkeys(SETS, KEPT) | {"rashid1": {}}
+    text = real.page(list(SETS.values()), found, kept)
+    title = SETS["ding2011_smooth"].title
+    assert f"| {title} | 4.00 | 1.00 | 2.00 | - | - | - |" in text
+    assert SETS["rashid1"].title not in text.partition("ends: process")[2].partition("## ")[0]
+    count = len(SETS) - 1
+    assert f"over the soil alone: nearer to the readings in {count} of {count} sets" in text
+    assert "errors 0.25 times as large in the median, 0.25 times in the worst set" in text
     assert f"in {len(SETS) - 1} of {len(SETS)} sets" in text
     assert "slip-sinkage (2.7 to 1); slope (1 to 1)" in text and "24 -> 0.6" in text
     assert "| wide | `bad-data` | - | - | - |" in text

@@ -80,6 +80,8 @@ def verdict(found: Sequence[Errors]) -> str:
     said = []
     for place, words in PLACES.items():
         own = [e[place] for e in found if place in e]
+        if not own:
+            continue
         for other in ("soil alone", "process"):
             ratio = np.asarray([e["returned model"] / e[other] for e in own])
             nearer = f"nearer to the readings in {int(np.sum(ratio < 1.0))} of {len(ratio)} sets"
