@@ -77,7 +77,7 @@ gap-real: $(VENV)/.ready ## gap workflow on published tests, and its page: make 
 bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md and docs/benchmarks/
 	@$(BIN)/python bench/run.py
 
-bench-gap: $(VENV)/.ready ## 594 sets with hidden effects against gates and baselines; goes on where it was ended
+bench-gap: $(VENV)/.ready ## 739 sets with hidden effects against gates and baselines; goes on where it was ended
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
 	  --disable-pip-version-check --editable '.[bench]'
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 3 --enlarge 60 --write \

@@ -56,6 +56,10 @@ def test_a_sensor_that_is_off_is_not_named_as_physics(stories):
     assert story.report["status"] in ("named", "class")
     assert any(SENSORS & set(names) for names in story.report["cause_set"])
     assert ["torque-gain"] in story.report["cause_set"]
+    model = (stories[1] / "torque-sensor" / "gap" / "model.toml").read_text()
+    several = story.report["status"] == "class"
+    assert ("suspected = true" in model) == several
+    assert ("is the likeliest of several explanations" in model) == several
 
 
 def test_where_nothing_is_hidden_nothing_is_found(stories):

@@ -40,10 +40,9 @@ def errors(folder: str) -> Errors:
             continue
         place = "ends" if one in (level.min(), level.max()) else "between"
         soil = case.with_values({path: own.value for path, own in report.soil_before.items()})
-        methods = (predicted(soil, unseen), predicted(report.model, unseen))
-        for name, y in zip(
-            METHODS, (*methods, process_of_readings(case, seen, unseen)), strict=True
-        ):
+        by_model = predicted(soil, unseen), predicted(report.model, unseen)
+        by_process = process_of_readings(case, seen, unseen)
+        for name, y in zip(METHODS, (*by_model, by_process), strict=True):
             found.setdefault(place, {}).setdefault(name, []).append(_off(case, y, unseen))
     return {
         place: {name: float(np.sqrt(np.mean(np.concatenate(own) ** 2))) for name, own in by.items()}

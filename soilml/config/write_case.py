@@ -119,7 +119,7 @@ def _effect_lines(case: Case, effect: Effect, table: str, path: str) -> list[str
     """An effect with its priors, which are those below `path`."""
     lines, default = [f"[[{table}]]", f'name = "{effect.name}"'], type(effect)()
     if path in case.suspected:
-        lines.append(f"{SUSPECTED} = true  # it predicts, and is not named")
+        lines.append(f"{SUSPECTED} = true  # it is not named")
     for key in declared(type(effect)):
         if float(getattr(effect, key)) != float(getattr(default, key)):
             lines.append(f"{key} = {_number(getattr(effect, key))}")

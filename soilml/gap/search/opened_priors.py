@@ -51,9 +51,9 @@ def open_priors(problem: FitProblem, result: SearchResult) -> OpenedPriors | Non
     if not (pressed or left) or all(known.get(path) == prior for path, prior in opened.items()):
         return None
     case = replace(problem.case, prior=known | opened)
-    why = f"At an end was: {'; '.join(pressed.values())}"
-    if not pressed:
-        why = "Within them, a large remainder is left"
+    why = "Within them, a large remainder is left"
+    if pressed:
+        why = f"The fit reached {'; '.join(pressed.values())}"
     text = f"the priors of the soil were opened. {why}"
     remark = Remark("prior-opened", text, tuple(pressed))
     return OpenedPriors(case, tuple(free_soil_parameters(case, None)), remark)

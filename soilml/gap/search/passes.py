@@ -24,10 +24,7 @@ from soilml.gap.evidence.covariance import (
     run_effect_columns,
 )
 from soilml.gap.evidence.directions import smooth_basis, smooth_basis_of_few
-from soilml.gap.evidence.problem import (
-    FitProblem,
-    restated,
-)
+from soilml.gap.evidence.problem import FitProblem, restated
 from soilml.gap.evidence.score_test import ScoreTest
 from soilml.gap.search.explanation import restated_candidates
 from soilml.gap.search.likelier_scatter import with_likelier_scatter

@@ -10,6 +10,7 @@ import numpy as np
 from soilml.gap.evidence.marginal_likelihood import TEMPERING
 from soilml.gap.evidence.prior_odds import EXPECTED_CAUSES
 from soilml.gap.search.explanation import Explanation
+from soilml.report.numbers import LEAST_STATED
 
 #: Decrease of the objective by the best explanation from which another one is rejected: tempered
 #: odds of 1 to 33.
@@ -37,9 +38,6 @@ OTHER_LAW = 0.3
 #: Rise of log odds, by half, from which rows speak for an effect. One that they leave as likely as
 #: it was beforehand, such as a sensor's gain that nothing tests, is no further suspect.
 RAISED = 0.4
-#: Probability from which it is stated as a number, not as a bound: beside a likelier suspect, one
-#: below it is none.
-LEAST_STATED = 0.005
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
 

@@ -33,8 +33,8 @@ SUSPECT_MARGIN = 4.0
 #: the catalogue lacks (by default 8 % of a range), and the decrease of the objective from which a
 #: cause is stated all the same: tempered odds of 1100 to 1.
 LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
-#: The same for a name: 5 % of a range, and tempered odds of 270 000 to 1. Where all laws of a soil
-#: are others, one of them is imitated best by some effect, and a part of the gap stays.
+#: The same for a name: 5 % of a range, and tempered odds of 270 000 to 1. Where every law of
+#: the soil differs from the model's, some effect imitates that best, and a part of the gap stays.
 LARGE_BESIDE_NAME, NAME_GAIN = 2.5, 50.0
 #: Probability, causes outside the catalogue included, from which a single explanation is named; a
 #: smaller one lists it first among the suspects. That of right names lies near `IN_CATALOGUE`.
@@ -56,9 +56,7 @@ OTHER_LAW = (
     "one that the catalogue lacks"
 )
 NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
-LEFT_BESIDE = (
-    "beside {}, an error of the {} is left that is large for its evidence: all laws may be others"
-)
+LEFT_BESIDE = "beside {}, too large an error of the {} is left for a name: further laws may differ"
 #: Why nothing is said where the soil alone is rejected without an alternative.
 NOTHING_IS_BETTER = Remark(
     "nothing-is-better", "the soil alone is rejected, and no effect or smooth discrepancy is better"

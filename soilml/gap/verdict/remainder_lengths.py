@@ -60,8 +60,10 @@ def with_fitted_lengths(
     a size that is fitted too: what changes fast with slip or load is no noise, and the variance
     components of a search take it for noise or for scatter between runs. The process of a channel
     whose discrepancy the case declares stays as it is. A process that predicts readings of its
-    channel no better than none does, each from the others, is left out: see `_gains`. Soil and
-    effects, which were fitted beside it, are then fitted again, and else stay as they are.
+    channel no better than none does, each from the others, gives way to one that is the same at all
+    slips, since few readings tell no function of slip; it is left out where that predicts no better
+    either: see `_gains`. Soil and effects, which were fitted beside it, are then fitted again, and
+    else stay as they are.
 
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.8.
     """
@@ -141,7 +143,7 @@ def _likeliest(
 ) -> dict[int, _Likeliest]:
     """The likeliest process of each channel without a declared discrepancy, by its number.
 
-    steady: Of those that hardly change with slip.
+    steady: Of those that are the same at all slips.
     """
     readings, usual = problem.readings, problem.discrepancy.process.usual
     residual = readings.measured - marginal.fit.prediction
@@ -231,7 +233,7 @@ def _of_channel(
 ) -> _Likeliest:
     """The likeliest process of one channel, with the usual lengths where these are as good.
 
-    Or the likeliest one that is steady in slip, with the usual length in load.
+    steady: The likeliest one that is the same at all slips, with the usual length in load.
 
     white (m,): Residuals, whitened by their noise. root (m, m): What whitens it, times the usual
     amplitude. log_determinant: Logarithm of the determinant of the noise. needed: Decrease of

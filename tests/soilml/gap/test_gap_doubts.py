@@ -231,3 +231,5 @@ def test_a_suspect_predicts_where_rows_kept_back_are_likelier_with_it():
     assert chosen(2.0, scored=("c",)) == ()  # another suspect than the one that is shown
     assert chosen(2.0, status="named") == ()
     assert predictive_suspect(Decision("suspected", (), None), {}) == ()
+    several = tuple(SimpleNamespace(names=(name,)) for name in "ab")
+    assert predictive_suspect(Decision("class", several, several[0]), {}) == ("a",)

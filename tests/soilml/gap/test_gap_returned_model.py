@@ -4,11 +4,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from gap_sets import case_of, driven
 
+from soilml.gap import workflow
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
 from soilml.gap.verdict import returned_model as module
 from soilml.gap.verdict.returned_model import returned_model
+from soilml.physics.effects import EFFECTS
 
 MEASURED = np.asarray([1.0, 2.0, 3.0])
 PROBLEM = SimpleNamespace(
@@ -46,3 +49,21 @@ def test_else_it_is_the_soil_alone_with_the_uncertainty_of_a_remainder(last):
     assert written.fit is SOIL
     assert not written.evidence.amplitude.any()
     assert written.evidence.expected_amplitude == pytest.approx([0.7])
+
+
+@pytest.mark.parametrize("nearer", [True, False])
+def test_the_likeliest_of_a_class_is_returned_as_suspected_or_not_at_all(monkeypatch, nearer):
+    """The report has its size in both cases; the last option is the soil alone."""
+
+    def one_of(problem, soil, options, stated):
+        assert not stated and len(options) == 2
+        return problem, options[0 if nearer else 1]
+
+    monkeypatch.setattr(workflow, "returned_model", one_of)
+    case = case_of()
+    report = workflow.gap(case, driven(case, [EFFECTS["bulldozing"](share=0.05)]))
+    assert report.status == "class" and report.effects[0].name == "bulldozing"
+    assert [e.name for e in report.model.model.effects] == ["bulldozing"] * nearer
+    assert report.model.suspected == ("bulldozing",) * nearer
+    share = report.effects[0].parameters["share"]
+    assert share.value == pytest.approx(0.05, abs=0.02)
