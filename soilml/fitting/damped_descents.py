@@ -32,9 +32,6 @@ KEPT_PROMISE = 0.5
 #: factor after an iteration without improvement, and the bounds.
 FIRST_DAMPING, DAMPING_FACTORS, DAMPING_INCREASE = 1e-3, (0.1, 0.3, 1.0, 10.0), 1e2
 MIN_DAMPING, MAX_DAMPING = 1e-9, 1e9
-#: Multiples of the last step that are tried beside damped ones: along a curved valley these are
-#: short, and each is like the last.
-REPETITIONS = (1.5, 3.0, 9.0)
 #: Damping, and curvature of a coordinate that changes nothing, with which a step is defined.
 LEAST_DAMPING, LEAST_SCALE = 1e-9, 1e-9
 #: A parameter whose positive bounds differ by this ratio moves by ratios: valleys of the objective
@@ -107,11 +104,12 @@ class DampedSteps:
         It is zero where the bounds hold every coordinate.
         """
         normal, descent = self._normal(x, jacobian.T @ jacobian), jacobian.T @ residual
-        step, descent = self._steps(x[None], descent[None], normal[None], np.full(1, LEAST_DAMPING))
-        return float(2.0 * descent[0] @ step[0] - step[0] @ normal @ step[0])
+        descent = self._descent(x[None], descent[None])
+        (step,) = self._steps(x[None], descent, normal[None], np.full(1, LEAST_DAMPING))
+        return float(2.0 * descent[0] @ step - step @ normal @ step)
 
-    def from_points(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
-        r"""Where damped steps lead from several points, (b, p).
+    def from_point(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
+        r"""Where damped steps lead from a point x (p,), (b, p).
 
         .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u
             = J^T r - P_0 x - T^T z
@@ -119,32 +117,51 @@ class DampedSteps:
         with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
         and P = P_0 + T^T T. Where a step meets a bound, the others are those that belong to it.
 
-        x (b, p): The points.
-        residual (b, m): Whitened residuals at each point.
-        jacobian (m, p): Whitened derivatives of the readings, the same for all points.
+        residual (m,), jacobian (m, p): Whitened residuals and derivatives of the readings there.
         damping (b,): Factor lambda of each step.
         """
+        points = np.tile(x, (len(damping), 1))
+        return self._moved_by(points, self._descent(points, residual @ jacobian), jacobian, damping)
+
+    def corrected(self, last: Solution, x: Floats, residual: Floats, damping: Floats) -> Floats:
+        r"""Points x (b, p) that steps led to, corrected by what of the model is not linear.
+
+        .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u
+            = J^T (r - r_0 + J\, \delta u)
+
+        with the residuals r (b, m) at these points, r_0 and J at the iterate, and the steps from
+        it. That leads back to the floor of a curved valley, and no further along it.
+
+        References: Transtrum and Sethna, arXiv:1201.5885, 2012 (geodesic acceleration).
+        """
+        step = np.stack([self._between(last.x, to) for to in x])
+        bent = residual - last.residual + step @ last.jacobian.T
+        return self._moved_by(x, bent @ last.jacobian, last.jacobian, damping)
+
+    def _moved_by(self, x: Floats, descent: Floats, jacobian: Floats, damping: Floats) -> Floats:
+        """Where damped steps lead from points (b, p); see `_steps`."""
         gram = jacobian.T @ jacobian
         normal = np.stack([self._normal(point, gram) for point in x])
-        return self.within(self.moved(x, self._steps(x, residual @ jacobian, normal, damping)[0]))
+        return self.within(self.moved(x, self._steps(x, descent, normal, damping)))
 
-    def _steps(
-        self, x: Floats, of_readings: Floats, normal: Floats, damping: Floats
-    ) -> tuple[Floats, Floats]:
-        """Damped steps (b, p) from points (b, p), and half the negative gradient (b, p) there.
+    def _descent(self, x: Floats, of_readings: Floats) -> Floats:
+        """Half the negative gradient (b, p) at points (b, p), from that of the readings."""
+        return of_readings - self.precision * (x - self.centre) - self._of_tests(x)
 
-        of_readings (b, p): Half the negative gradient of what the readings contribute.
+    def _steps(self, x: Floats, descent: Floats, normal: Floats, damping: Floats) -> Floats:
+        """Damped steps (b, p) from points (b, p).
+
+        descent (b, p): Half the negative gradient there.
         normal (b, p, p): Half the curvature of the linearised objective at each point.
         """
-        descent = of_readings - self.precision * (x - self.centre) - self._of_tests(x)
         held = ((x <= self.lower) & (descent < 0)) | ((x >= self.upper) & (descent > 0))
         diagonal = np.arange(x.shape[1])
         damped = normal.copy()
         own = normal[:, diagonal, diagonal] + LEAST_SCALE
         damped[:, diagonal, diagonal] += damping[:, None] * own
-        return bounded_steps(damped, descent, ~held, *self._ends(x)), descent
+        return bounded_steps(damped, descent, ~held, *self._ends(x))
 
-    def between(self, x: Floats, to: Floats) -> Floats:
+    def _between(self, x: Floats, to: Floats) -> Floats:
         """The step (p,) from coordinates (p,) to others; see `moved`."""
         multiple = x + self.offset
         with np.errstate(invalid="ignore"):
@@ -317,11 +334,10 @@ def descent(
     """One descent; see `descend_together`.
 
     As long as the linearised model keeps its promise, each iteration is one step, at the end of
-    which the model is linearised again. Else several dampings and `REPETITIONS` of the last step
-    are tried first, each followed by a step with the same Jacobian, which leads back to the floor
-    of a curved valley. Trials start at the sinkage that the last iterate predicts. An iterate
-    is solved by the full search; it is no improvement where that finds an equilibrium before the
-    one of the trial.
+    which the model is linearised again. Else several dampings are tried first, each with and
+    without a correction by what of the model is not linear. Trials start at the sinkage that the
+    last iterate predicts. An iterate is solved by the full search; it is no improvement where that
+    finds an equilibrium before the one of the trial.
     """
     steps = DampedSteps.of(problem)
 
@@ -333,7 +349,7 @@ def descent(
         sinkage = replace(last.linearisation.sinkage_at(x - last.x), nearest=True)
         return ModelQuestion(problem.request(x, sinkage), linearise=False)
 
-    x, repeated = steps.within(start), np.zeros((0, len(start)))
+    x = steps.within(start)
     if known is None or not np.array_equal(known.x, x):
         known = yield ModelQuestion(problem.request(x[None, :]), linearise=True)
     last = problem.at(x, known)
@@ -343,57 +359,44 @@ def descent(
         excess = last.objective - len(last.residual)
         promised = steps.promised(last.x, last.residual, last.jacobian)
         share = tolerance.share * excess
-        slow = max(tolerance.creeping, share)
-        creeps = len(passed) == passed.maxlen and passed[0] - last.objective < slow
-        converged = creeps or promised < max(tolerance.enough, share)
+        given = passed[0] - last.objective if len(passed) == passed.maxlen else np.inf
+        converged = promised < max(tolerance.enough, share) or given < max(
+            tolerance.creeping, share
+        )
         if converged:
             break
         passed.append(last.objective)
         if trusted:
             factor = np.asarray([damping * DAMPING_FACTORS[0]])
-            points = last.x[None, :], last.residual[None, :]
-            (x,) = steps.from_points(*points, last.jacobian, factor)
+            (x,) = steps.from_point(last.x, last.residual, last.jacobian, factor)
             new = problem.at(x, (yield at(last, x)))
             improvement = last.objective - new.objective
             trusted = improvement > KEPT_PROMISE * promised
             if improvement > 0.0:
-                repeated = _repeated(steps, last.x, new.x)
                 last, damping = new, max(float(factor[0]), MIN_DAMPING)
                 continue
         dampings = damping * np.asarray(DAMPING_FACTORS)
-        here = np.tile(last.x, (len(dampings), 1))
-        residual = np.tile(last.residual, (len(dampings), 1))
-        found, objectives = [], []
-        for repetitions in (repeated, repeated[:0]):
-            here = steps.from_points(here, residual, last.jacobian, dampings)
-            here = np.vstack([here, repetitions])
-            dampings = np.append(dampings, np.full(len(repetitions), damping))
-            residual = problem.whitened((yield trials(last, here)))
-            found.append(here)
-            objectives.append(problem.objective(residual, here))
+        here = steps.from_point(last.x, last.residual, last.jacobian, dampings)
+        bent = problem.whitened((yield trials(last, here)))
+        back = steps.corrected(last, here, bent, dampings)
+        straight = problem.whitened((yield trials(last, back)))
+        tried = np.vstack([here, back])
+        objectives = problem.objective(np.vstack([bent, straight]), tried)
         best = int(np.argmin(objectives))
-        improvement = last.objective - float(np.ravel(objectives)[best])
+        improvement = last.objective - float(objectives[best])
         if improvement > 0.0:
-            x = np.concatenate(found)[best]
-            new = problem.at(x, (yield at(last, x)))
+            new = problem.at(tried[best], (yield at(last, tried[best])))
             improvement = last.objective - new.objective
         if improvement <= 0.0:
             # if the most damped, shortest step is negligible this is an optimum; else damp more
-            converged = float(np.abs(found[0][len(DAMPING_FACTORS) - 1] - last.x).max()) < 1e-3
+            converged = float(np.abs(here[-1] - last.x).max()) < 1e-3
             damping *= DAMPING_INCREASE
             if converged or damping > MAX_DAMPING:
                 break
             continue
-        repeated = _repeated(steps, last.x, new.x)
         last, damping = new, max(float(dampings[best % len(dampings)]), MIN_DAMPING)
         trusted = improvement > KEPT_PROMISE * promised
         converged = improvement < max(tolerance.enough, tolerance.step_share * excess)
         if converged:
             break
     return replace(last, converged=converged)
-
-
-def _repeated(steps: DampedSteps, before: Floats, after: Floats) -> Floats:
-    """Where multiples of the last step lead from its end, (repetitions, p)."""
-    step = steps.between(before, after)
-    return steps.within(np.stack([steps.moved(after, k * step) for k in REPETITIONS]))

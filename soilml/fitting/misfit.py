@@ -20,6 +20,7 @@ from soilml.fitting.covariance import (
     noise_of_operation,
     sensor_columns,
 )
+from soilml.fitting.damped_descents import levenberg_marquardt
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
@@ -214,7 +215,7 @@ def fit_under_declared_noise(
     if start is None or len(weighted.unknown) > len(free):
         optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
     else:
-        optimum = descend(weighted.problem, start)
+        optimum = levenberg_marquardt(weighted.problem, start)
     for _ in range(NOISE_ROUNDS if readings.undeclared or readings.shared_errors else 1):
         weighted = weighted.with_noise_at(optimum)
         optimum = descend(weighted.problem, optimum.x, near=optimum.linearisation)

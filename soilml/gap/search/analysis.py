@@ -82,7 +82,8 @@ def analyse(
                 other = replace(other, predictions=predict_with(other.problem, other.result, seed))
                 likeliest = _predictive(other)
                 if likeliest is not None and explains_better(found, other, likeliest):
-                    found = replace(other, opened=opened.remark)
+                    within = found.result.soil
+                    found = replace(other, opened=opened.remark, within_priors=within)
             elif not (other.error or other.outliers or other.result.has_gap):
                 text = f"{opened.remark}. The soil alone then agrees with the rows"
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)

@@ -53,7 +53,8 @@ class Analysis:
     `predictions` are those of rows kept back, by the soil alone and the likeliest explanations.
     `of_all` is the analysis of all readings, where some were excluded.
     `excluded` (m,) are the readings of `outliers` among all.
-    `opened` says which priors of the soil were opened where that matters, which forbids a name.
+    `opened` says which priors of the soil were opened where that matters, which forbids a name;
+    `within_priors` is then the fit of the soil alone within those of the case.
     `error` is the reason why the data could not be analysed, if they could not.
     """
 
@@ -64,6 +65,7 @@ class Analysis:
     predictions: Predictions = field(default_factory=dict)
     of_all: Analysis | None = None
     opened: Remark | None = None
+    within_priors: Solution | None = None
     error: Remark | None = None
 
 

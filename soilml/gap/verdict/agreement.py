@@ -45,8 +45,8 @@ def noise_agreement(
     """
     if analysis.excluded is not None:
         readings = readings.subset(~analysis.excluded)
-    start = None if analysis.opened is not None else analysis.result.soil.x
-    found = declared_misfit(case, readings, soil, start)
+    within = analysis.within_priors or analysis.result.soil
+    found = declared_misfit(case, readings, soil, within.x)
     if found is None:
         return None
     problem, components = analysis.problem, analysis.problem.covariance.components

@@ -42,8 +42,8 @@ def problem_of(coordinate: Coordinate) -> LeastSquaresProblem:
 def one_step(of: Coordinate, x: float, residual: float) -> float:
     """Where an undamped step leads whose length in the coordinate is the residual."""
     steps = DampedSteps.of(problem_of(of))
-    here, left = np.asarray([[x]]), np.asarray([[residual]])
-    return float(steps.from_points(here, left, np.eye(1), np.zeros(1))[0, 0])
+    here, left = np.asarray([x]), np.asarray([residual])
+    return float(steps.from_point(here, left, np.eye(1), np.zeros(1))[0, 0])
 
 
 def test_a_wide_positive_parameter_moves_by_ratios():
@@ -92,7 +92,7 @@ def test_a_step_counts_the_prior(prior, std, optimum, objective):
     of = Coordinate("kphi", "", prior, normal_std=std, lower=-5.0, upper=5.0)
     problem = problem_of(of)
     steps = DampedSteps.of(problem)
-    moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
+    moved = steps.from_point(np.zeros(1), np.ones(1), np.eye(1), np.zeros(1))
     assert moved[0, 0] == pytest.approx(optimum)
     assert problem.objective(1.0 - moved[0], moved[0]) == pytest.approx(objective)
 
@@ -110,7 +110,7 @@ def test_the_objective_counts_tests_of_the_soil():
     of = Coordinate("kphi", "", Prior(0.0, 1.0), lower=-5.0, upper=5.0)
     problem = Tested(**vars(problem_of(of)))
     steps = DampedSteps.of(problem)
-    moved = steps.from_points(np.zeros((1, 1)), np.ones((1, 1)), np.eye(1), np.zeros(1))
+    moved = steps.from_point(np.zeros(1), np.ones(1), np.eye(1), np.zeros(1))
     assert moved[0, 0] == pytest.approx(0.6)
     assert problem.objective(np.asarray([0.4]), moved[0]) == pytest.approx(0.16 + 0.04)
     assert problem.objective(np.asarray([2.0]), np.asarray([-1.0])) == pytest.approx(4.0 + 9.0)
