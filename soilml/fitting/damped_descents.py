@@ -103,8 +103,8 @@ class DampedSteps:
 
         It is zero where the bounds hold every coordinate.
         """
-        normal, descent = self._normal(x, jacobian.T @ jacobian), jacobian.T @ residual
-        descent = self._descent(x[None], descent[None])
+        normal = self._normal(x, jacobian.T @ jacobian)
+        descent = self._descent(x[None], (residual @ jacobian)[None])
         (step,) = self._steps(x[None], descent, normal[None], np.full(1, LEAST_DAMPING))
         return float(2.0 * descent[0] @ step - step @ normal @ step)
 
@@ -155,10 +155,8 @@ class DampedSteps:
         normal (b, p, p): Half the curvature of the linearised objective at each point.
         """
         held = ((x <= self.lower) & (descent < 0)) | ((x >= self.upper) & (descent > 0))
-        diagonal = np.arange(x.shape[1])
-        damped = normal.copy()
-        own = normal[:, diagonal, diagonal] + LEAST_SCALE
-        damped[:, diagonal, diagonal] += damping[:, None] * own
+        damped, i = normal.copy(), np.arange(x.shape[1])
+        damped[:, i, i] += damping[:, None] * (normal[:, i, i] + LEAST_SCALE)
         return bounded_steps(damped, descent, ~held, *self._ends(x))
 
     def _between(self, x: Floats, to: Floats) -> Floats:
@@ -360,9 +358,8 @@ def descent(
         promised = steps.promised(last.x, last.residual, last.jacobian)
         share = tolerance.share * excess
         given = passed[0] - last.objective if len(passed) == passed.maxlen else np.inf
-        converged = promised < max(tolerance.enough, share) or given < max(
-            tolerance.creeping, share
-        )
+        least, slow = max(tolerance.enough, share), max(tolerance.creeping, share)
+        converged = promised < least or given < slow
         if converged:
             break
         passed.append(last.objective)

@@ -233,3 +233,23 @@ def test_works_share_calls_and_a_refusal_is_raised_where_it_was_asked(monkeypatc
     assert (one, two, four) == (["a"], ["b", "caught", "c"], [])
     assert isinstance(three, InputError)
     assert calls == [[0, 1, 2], [1], [1]]
+
+
+@pytest.mark.parametrize(("damping", "along"), [(0.0, 1.0), (0.1, 1.0 / 1.1)])
+def test_a_correction_leads_back_to_the_floor_of_a_valley_and_no_further_along_it(damping, along):
+    """Of Rosenbrock's valley, y = x^2, from x = y = 0: a step along x leaves it by x^2."""
+    of = Coordinate("kphi", "", Prior(0.0, 1.0), lower=-5.0, upper=5.0)
+    problem = problem_of(of)
+    steps = DampedSteps.of(replace(problem, coordinates=[of, of]))
+
+    def residual(points):
+        x, y = points.T
+        return np.stack([-100.0 * (y - x**2), 1.0 - x], axis=1)
+
+    start, jacobian = np.zeros(2), np.asarray([[0.0, 100.0], [1.0, 0.0]])
+    last = SimpleNamespace(x=start, residual=residual(start[None, :])[0], jacobian=jacobian)
+    dampings = np.full(1, damping)
+    ends = steps.from_point(last.x, last.residual, jacobian, dampings)
+    assert ends[0] == pytest.approx([along, 0.0])
+    back = steps.corrected(last, ends, residual(ends), dampings)
+    assert back[0] == pytest.approx([along, along**2 / (1.0 + damping)])
