@@ -31,6 +31,9 @@ OPENED_MARGIN = 9.0
 #: The same where less than half the remainder is left. Its evidence may then be a little smaller:
 #: wider priors cost evidence, and what a large remainder takes up is not explained.
 NO_MARGIN = -6.0
+#: What may be missing of either where single effects are then fitted too, if the parameters that
+#: are fitted are the same and only their priors are wider.
+NEARLY = 10.0
 
 
 def analyse(
@@ -73,8 +76,20 @@ def analyse(
             complete = len(rival.names) == 1 and is_complete(
                 found.problem, rival, found.result, seed
             )
-            begun = begin(kept, seed, place, found.result, likeliest=True, only_test=complete)
+            singles = len(opened.soil) > len(problem.soil)
+            begun = begin(
+                kept,
+                seed,
+                place,
+                found.result,
+                likeliest=not complete,
+                singles=singles and not complete,
+            )
             other, _ = begun
+            near = any(explains_better(found, other, c, NEARLY) for c in other.result.candidates)
+            if near and not singles and not complete:
+                begun = begin(kept, seed, place, found.result, likeliest=True)
+                other, _ = begun
             better = any(explains_better(found, other, c) for c in other.result.candidates)
             if better or not other.result.has_gap:
                 other = without_outliers(start, seed, place, progress, found, begun)
@@ -105,10 +120,13 @@ def _explained_by_soil(found: Analysis, seed: int) -> Analysis:
     return replace(found, result=result, predictions={}, opened=None)
 
 
-def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bool:
+def explains_better(
+    found: Analysis, other: Analysis, opened: Explanation, lacking: float = 0.0
+) -> bool:
     """Whether an explanation, of an analysis with opened priors, is far better than all of another.
 
-    Its evidence counts beside the noise, scatter and discrepancy of the other one.
+    Its evidence counts beside the noise, scatter and discrepancy of the other one. So much of it
+    may be `lacking`.
     """
     if other.error or not opened.names:
         return False
@@ -118,7 +136,8 @@ def explains_better(found: Analysis, other: Analysis, opened: Explanation) -> bo
     value = found.problem.discrepancy.evidence(opened.fit, opened.amplitude).value
     value += opened.penalty
     explains_more = opened.amplitude.max() < 0.5 * rival.amplitude.max()
-    return value < rival.objective - (NO_MARGIN if explains_more else OPENED_MARGIN)
+    margin = NO_MARGIN if explains_more else OPENED_MARGIN
+    return value < rival.objective - margin + lacking
 
 
 def _rival(found: Analysis) -> Explanation:

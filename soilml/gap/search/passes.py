@@ -88,14 +88,14 @@ def begin(
     explained: Solution | None = None,
     *,
     likeliest: bool = False,
-    only_test: bool = False,
+    singles: bool = True,
 ) -> Begun:
     """The covariance and a first look, from the explanations of an `earlier` search.
 
     explained: The fit that the covariance is estimated from; else it is the best of the soil alone
         and of the earlier search.
     likeliest: Look at the likeliest sets of the earlier search too.
-    only_test: See `first_look`.
+    singles: See `first_look`.
     """
     free, starts = problem.soil, restated_candidates(problem, earlier.candidates if earlier else ())
     first = np.asarray([f.prior.fraction(f.nominal) for f in free])
@@ -118,7 +118,7 @@ def begin(
     problem = with_estimated_covariance(problem, best, ())
     soil = problem.fit_soil([soil.x], soil.linearisation)
     sets = likeliest_sets(starts) if likeliest else ()
-    result = first_look(problem, soil, seed, starts, sets, only_test=only_test)
+    result = first_look(problem, soil, seed, starts, sets, singles=singles)
     return Analysis(problem, result), starts
 
 

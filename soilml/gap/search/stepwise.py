@@ -171,22 +171,22 @@ def first_look(
     starts: Starts,
     sets: Sequence[tuple[str, ...]] = (),
     *,
-    only_test: bool = False,
+    singles: bool = True,
 ) -> SearchResult:
     """The test for a gap, and where there is one the explanations by single effects.
 
     sets: Other sets that are fitted too.
-    only_test: Fit no effect.
+    singles: Fit single effects. With neither these nor sets, it is the test alone.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
     found = without_search(soil, soil_test, untestable)
-    if only_test or soil_test.p_value >= GAP_LEVEL:
+    if not (singles or sets) or soil_test.p_value >= GAP_LEVEL:
         return found
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
-    singles = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
-    selected = dict.fromkeys([*sets, *((name,) for name in singles)], soil_alone)
+    likely = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+    selected = dict.fromkeys([*sets, *((name,) for name in likely if singles)], soil_alone)
     level = _fit_level(problem, soil, soil_alone, selected, starts)
     again = _from_soils_of(problem, soil_alone, level)
     if again is not soil_alone:

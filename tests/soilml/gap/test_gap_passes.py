@@ -166,30 +166,46 @@ def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
     assert isinstance(found.result, SearchResult) and not found.result.has_gap
 
 
+TEST_ALONE, LIKELIEST, SINGLES = (False, False), (True, False), (True, True)
+
+
 @pytest.mark.parametrize(
-    "rival, complete, only_test",
-    [(("a",), True, True), (("a",), False, False), (("a", "b"), True, False)],
+    "rival, complete, freed, near, expected",
+    [
+        (("a",), True, True, False, [TEST_ALONE]),
+        (("a",), False, True, False, [SINGLES]),
+        (("a", "b"), True, True, False, [SINGLES]),
+        (("a",), False, False, False, [LIKELIEST]),
+        (("a",), False, False, True, [LIKELIEST, SINGLES]),
+        (("a",), True, False, True, [TEST_ALONE]),
+    ],
 )
-def test_no_effect_is_fitted_with_opened_priors_where_one_alone_explains_all(
-    passes, monkeypatch, rival, complete, only_test
+def test_effects_are_fitted_with_opened_priors_where_they_can_count(
+    passes, monkeypatch, rival, complete, freed, near, expected
 ):
+    """None where one alone explains all; the likeliest first where no other parameter is free."""
     given, run = passes
     given.accepted, asked = [None], []
     soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
     gap_test = SimpleNamespace(p_value=0.001)
-    look = replace(module.no_result(soil), soil_test=gap_test)
-    opened = OpenedPriors(CASE, tuple(free_soil_parameters(CASE, None)), Remark("prior-opened", ""))
+    look = replace(module.no_result(soil), soil_test=gap_test, candidates=(None,))
+    free = free_soil_parameters(CASE, None)
+    more = (*free, free[0]) if freed else tuple(free)
+    opened = OpenedPriors(CASE, more, Remark("prior-opened", ""))
 
-    def begin(*_, only_test, likeliest):
-        asked.append(only_test)
+    def begin(*_, likeliest, singles=True):
+        asked.append((likeliest, singles))
         return module.Analysis(soil.problem, look), {}
 
     monkeypatch.setattr(analysis, "open_priors", lambda *_: opened)
     monkeypatch.setattr(analysis, "begin", begin)
     monkeypatch.setattr(analysis, "_rival", lambda found: SimpleNamespace(names=rival))
     monkeypatch.setattr(analysis, "is_complete", lambda *_: complete)
+    monkeypatch.setattr(
+        analysis, "explains_better", lambda found, other, c, lacking=0.0: near and lacking > 0.0
+    )
     run()
-    assert asked == [only_test]
+    assert asked == expected
 
 
 @pytest.mark.parametrize(
