@@ -171,6 +171,9 @@ def share_and_constant_as_setting(share: float, constant: float) -> Any:
 SLIP_LENGTH, LOG_LOAD_LENGTH = 0.3, 0.6
 
 
+LEARNED = "learned"  # Key of a discrepancy that `gap` found
+
+
 @dataclass(frozen=True)
 class Discrepancy:
     r"""A smooth error of the model in one channel, as a Gaussian process of zero mean.
@@ -188,6 +191,7 @@ class Discrepancy:
     slip_length: float = SLIP_LENGTH  # Correlation length l_s in slip
     # Correlation length l_W in the natural logarithm of the load
     log_load_length: float = LOG_LOAD_LENGTH
+    learned: bool = False  # `gap` found it beside a fit; a further analysis finds it anew
 
     def amplitude(self, span: float) -> float:
         """Standard deviation a of the model error, in the unit of the column.
@@ -225,6 +229,7 @@ def take_discrepancy(settings: Settings) -> dict[str, Discrepancy]:
     common = Discrepancy(
         slip_length=_take_length(settings, "slip_length", SLIP_LENGTH),
         log_load_length=_take_length(settings, "log_load_length", LOG_LOAD_LENGTH),
+        learned=settings.take(LEARNED, bool, "true or false", False),
     )
     settings.finish()
     if settings.content and not parts:
@@ -245,6 +250,8 @@ def discrepancy_as_settings(discrepancy: dict[str, Discrepancy]) -> dict[str, An
             raise ValueError(f"channels differ in {name}: {sorted(lengths)}; one can be written")
         if lengths and lengths != {usual}:
             settings[name] = lengths.pop()
+    if any(one.learned for one in discrepancy.values()):
+        settings[LEARNED] = True
     return settings
 
 

@@ -139,6 +139,8 @@ def _number(value: object) -> str:
 def _setting(value: object) -> str:
     if isinstance(value, str):
         return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
     if isinstance(value, dict):
         inner = ", ".join(f"{k} = {_setting(v)}" for k, v in value.items())
         return "{ " + inner + " }"

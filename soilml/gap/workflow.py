@@ -362,7 +362,7 @@ def _build_report(
         residual_trend=residual_trend(problem, left_by.fit),
         discrepancy=remaining_discrepancy(problem, beside, left_by),
         remainder_cause=described_cause(problem, explained, seed),
-        next_runs=tuple(next_runs(problem, competing_explanations(analysis))),
+        next_runs=tuple(next_runs(problem, competing_explanations(analysis, decision.claimed))),
     )
 
 

@@ -30,7 +30,7 @@ from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.passes import Analysis
 from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
-from soilml.gap.verdict.decision import NAMED_PROBABILITY, by_probability, implausible_sizes
+from soilml.gap.verdict.decision import implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
 from soilml.gap.verdict.fit_notes import bound_notes, size_notes
 from soilml.identification.fit import disagreeing_soil_tests
@@ -198,26 +198,19 @@ def conditions_of_suspects(
     return tuple(conditions)
 
 
-def competing_explanations(analysis: Analysis) -> list[Explanation]:
+def competing_explanations(analysis: Analysis, claimed: Sequence[Explanation]) -> list[Explanation]:
     """The explanations to distinguish, the first one from the others: those that a report lists.
 
     They are those of a class; else a named one, or the first suspect, and the suspects after it
     whose probability is stated. Where there is none, the next suspect, or else the next of the
     fitted ones, is the rival. A suspect that was not fitted predicts nothing, and is left out.
+
+    claimed: The explanations that the verdict states.
     """
-    result, posterior = analysis.result, analysis.result.posterior
-    accepted = [c for c in result.accepted if c.names]
-    doubted = posterior.unproven | posterior.oversized | posterior.unlisted
-    claimed: list[Explanation] = []
-    if accepted and () not in {c.names for c in result.accepted}:
-        refused = doubted | set(posterior.refused)
-        claimed = [c for c in accepted if c.names not in doubted]
-        claimed = [] if accepted[0].names in refused else claimed
+    result = analysis.result
     if len(claimed) > 1:
-        return list(by_probability(claimed, posterior))
-    if claimed and posterior.probability(*claimed[0].names) < NAMED_PROBABILITY:
-        claimed = []
-    fitted = {c.names: c for c in (*result.candidates, *accepted) if c.names}
+        return list(claimed)
+    fitted = {c.names: c for c in (*result.candidates, *claimed) if c.names}
     listed = [s for s in suspects(analysis, claimed) if s.effects in fitted]
     first = [c.names for c in claimed] or [s.effects for s in listed[:1]]
     stated = [s.effects for s in listed if s.probability >= LEAST_STATED][:SUSPECTS_IN_LINE]

@@ -174,7 +174,7 @@ def updated_case(
     if discrepancy is not None:
         declared = next(iter(remaining.values()), Discrepancy())
         remaining = {
-            name: replace(declared, share=0.0, constant=significant(std))
+            name: replace(declared, share=0.0, constant=significant(std), learned=True)
             for name, std in discrepancy.items()
         }
     bias = unestimated_bias(fit.case.bias, set(fit.effects))

@@ -74,12 +74,12 @@ def learned_remainder(problem: FitProblem, marginal: MarginalFit) -> Remainder |
 
 
 def without_learned_discrepancy(case: Case) -> Case:
-    """The case without the declared discrepancy of channels that have a remainder.
+    """The case without the discrepancy that an earlier analysis learned.
 
-    A further analysis starts from its mean, and finds anew how large an error is left beside it.
+    A further one starts from the mean of the remainder, and finds anew how large an error is left.
     """
-    learned = [] if case.remainder is None else case.remainder.columns
-    left = {key: own for key, own in case.discrepancy.items() if key not in learned}
+    known = [] if case.remainder is None else case.remainder.columns
+    left = {k: own for k, own in case.discrepancy.items() if not own.learned and k not in known}
     return replace(case, discrepancy=left)
 
 

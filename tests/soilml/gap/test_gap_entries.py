@@ -92,25 +92,22 @@ def test_explanations_to_distinguish_are_those_not_rejected_or_the_best_and_its_
     pair = made("a", "e")
     weights = {("b",): 0.6, ("a",): 0.3, ("d",): 0.1, (): 1e-6}
 
-    def compared(*candidates, accepted=(), own=None, **posterior):
+    def compared(*candidates, claimed=(), own=None):
         logs = {names: float(np.log(weight)) for names, weight in (own or weights).items()}
-        given = analysed(*candidates, accepted=accepted, weights=logs)
-        given.result.posterior = replace(given.result.posterior, **posterior)
-        return competing_explanations(given)
+        return competing_explanations(analysed(*candidates, weights=logs), claimed)
 
-    assert compared(none, a, b, d, accepted=(a, b)) == [b, a]  # a class, the likeliest first
-    assert compared(none, a, b, d, accepted=(a, b, none)) == [b, a, d]  # suspects
-    # where the best is refused, suspects are listed; of what is not fitted, nothing is predicted
-    assert compared(none, a, d, accepted=(a, d), unproven=frozenset({("a",)})) == [a, d]
+    assert compared(none, a, b, d, claimed=(b, a)) == [b, a]  # a class
+    assert compared(none, a, b, d) == [b, a, d]  # suspects
+    assert compared(none, a, d) == [a, d]  # of what is not fitted, nothing is predicted
     # a set that contains the named one is no rival of it
     named = {("a",): 0.99, ("b",): 0.01, (): 1e-6}
-    assert compared(pair, a, none, b, c, accepted=(a,), own=named) == [a, b]
+    assert compared(pair, a, none, b, c, claimed=(a,), own=named) == [a, b]
     # what has no stated probability is no rival beside one that has
     unlikely = {("a",): 0.7, ("b",): 0.3, ("c",): 0.004, (): 1e-6}
     assert compared(a, b, c, none, own=unlikely) == [a, b]
     alone = {("a",): 1.0, ("c",): 0.004, (): 1e-6}
     assert compared(a, b, c, none, own=alone) == [a, c]
-    assert competing_explanations(analysed(none)) == []
+    assert competing_explanations(analysed(none), ()) == []
 
 
 def test_suspects_are_the_likeliest_eight_under_stated_conditions():

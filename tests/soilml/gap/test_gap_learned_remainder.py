@@ -15,6 +15,7 @@ from soilml.fitting.predictions import predict
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
 from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.verdict.estimates import updated_case
 from soilml.gap.verdict.learned_remainder import learned_remainder, without_learned_discrepancy
 from soilml.gap.verdict.remainder import posterior_discrepancy
 from soilml.io.table import Table
@@ -80,6 +81,16 @@ def test_a_further_analysis_counts_it_once(fitted):
     again = learned_remainder(replace(problem, case=case), marginal)
     assert again.parts[:2] == found.parts
     assert len(again.parts) == 4
+
+
+def test_a_further_analysis_leaves_out_the_discrepancy_that_an_earlier_one_learned(fitted):
+    """Without a remainder too: where the soil alone is returned, only its error is stated."""
+    problem, marginal = fitted
+    found = updated_case(marginal.fit, {"torque_Nm": 0.1}).discrepancy
+    assert found == {"torque_Nm": Discrepancy(0.1, learned=True)}
+    declared = {"sinkage_m": Discrepancy(0.001)}
+    case = replace(problem.case, remainder=None, discrepancy=found | declared)
+    assert without_learned_discrepancy(case).discrepancy == declared
 
 
 @pytest.mark.long
