@@ -88,7 +88,9 @@ def analyse(
             other, _ = begun
             near = any(explains_better(found, other, c, NEARLY) for c in other.result.candidates)
             if near and not singles and not complete:
-                begun = begin(kept, seed, place, found.result, likeliest=True)
+                known = (*found.result.candidates, *other.result.candidates)
+                looked = replace(other.result, candidates=known)
+                begun = begin(kept, seed, place, looked, likeliest=True)
                 other, _ = begun
             better = any(explains_better(found, other, c) for c in other.result.candidates)
             if better or not other.result.has_gap:
