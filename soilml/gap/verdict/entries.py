@@ -36,7 +36,7 @@ from soilml.gap.verdict.fit_notes import bound_notes, size_notes
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
-from soilml.report.numbers import LEAST_STATED
+from soilml.report.numbers import LEAST_STATED, format_log_density
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 LISTED_SUSPECTS = 8  # Suspects that are listed
@@ -176,7 +176,7 @@ def prediction_notes(
     text = (
         f"model.toml contains {' + '.join(names)}, which is suspected and not named. Beside a "
         "smooth remainder, it predicts rows kept back better than the soil alone does "
-        f"(ln density {gain.value:+.1f} +- {gain.std_error:.1f})"
+        f"(ln density {format_log_density(gain.value, gain.std_error)})"
     )
     if not_reduced:
         each = [f"{figure[:1].upper()}{figure[1:]}" for figure in texts(not_reduced)]
