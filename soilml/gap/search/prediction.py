@@ -49,7 +49,16 @@ class PredictiveGain:
     @property
     def is_worse(self) -> bool:
         """Whether they are predicted worse, beyond what folds differ by chance."""
-        return self.value <= -max(self.std_error or 0.0, LEAST_ERROR)
+        return self.value <= -self._judged_error
+
+    @property
+    def is_clearly_better(self) -> bool:
+        """Whether they are predicted better, beyond what folds differ by chance."""
+        return self.value >= self._judged_error
+
+    @property
+    def _judged_error(self) -> float:
+        return max(self.std_error or 0.0, LEAST_ERROR)
 
 
 #: Predictions of each part that was kept back, by the effects of the explanation.

@@ -173,9 +173,10 @@ def prediction_notes(
     if not names:
         return list(not_reduced)
     gain = predictive_gains(analysis.predictions)[tuple(names)]
+    how = "better" if gain.is_clearly_better else "no worse"
     text = (
         f"model.toml contains {' + '.join(names)}, which is suspected and not named. Beside a "
-        "smooth remainder, it predicts rows kept back better than the soil alone does "
+        f"smooth remainder, it predicts rows kept back {how} than the soil alone does "
         f"(ln density {format_log_density(gain.value, gain.std_error)})"
     )
     if not_reduced:

@@ -105,9 +105,30 @@ def test_one_fold_tells_no_standard_error_and_none_is_stated():
     assert own == PredictiveGain(1.0, None) and own.is_better
     assert Suspect(("a",), 0.0, 0.5, own.value, own.std_error).prediction == "+1.0"
     assert Suspect(("a",), 0.0, 0.5, 1.0, 0.25).prediction == "+1.0 +- 0.2"
-    analysis = SimpleNamespace(predictions=single)
-    (note,) = prediction_notes(("a",), analysis, ())
-    assert "ln density +1.0)" in note.text
+    assert "ln density +1.0)" in predicted(1.0, None)
+
+
+def predicted(value, error):
+    """The note on a suspect whose gain this is."""
+    with pytest.MonkeyPatch.context() as patch:
+        gains = {("a",): PredictiveGain(value, error)}
+        patch.setattr("soilml.gap.verdict.entries.predictive_gains", lambda _: gains)
+        (note,) = prediction_notes(("a",), SimpleNamespace(predictions={}), ())
+    return note.text
+
+
+@pytest.mark.parametrize(
+    "value, error, how",
+    [
+        (0.04, 0.9, "no worse"),
+        (2.0, 2.5, "no worse"),
+        (0.9, None, "no worse"),
+        (3.0, 2.5, "better"),
+        (1.1, None, "better"),
+    ],
+)
+def test_a_suspect_predicts_better_only_beyond_the_error_of_its_gain(value, error, how):
+    assert f"predicts rows kept back {how} than the soil alone does" in predicted(value, error)
 
 
 @pytest.mark.slow
