@@ -43,7 +43,9 @@ NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
 #: What a headline says of residuals beyond the declared noise without a smooth gap, by the reason.
 _BEYOND_NOISE = {
     "excess-residuals": "; these rows cannot tell a gap from understated noise",
-    "soil-at-prior": ", with the soil at ends of its priors: widen them, or an effect is missing",
+    "soil-at-prior": (
+        ", with the soil at ends of its priors: widen them, or model or noise is wrong"
+    ),
 }
 
 
