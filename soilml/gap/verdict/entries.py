@@ -32,7 +32,7 @@ from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.decision import NAMED_PROBABILITY, by_probability, implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
-from soilml.gap.verdict.fit_notes import bound_notes, size_notes
+from soilml.gap.verdict.fit_notes import bound_notes, large_noise_notes, size_notes
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
@@ -266,7 +266,10 @@ def analysis_notes(
                 "changes fast with slip"
             )
             notes.append(Remark("noise-scaled", text, (column(name),)))
-    notes += overstated_noise_notes(readings)
+    known = overstated_noise_notes(readings)
+    said = {note.about for note in known}
+    large = large_noise_notes(analysis.problem, analysis.result.soil)
+    notes += [*known, *(note for note in large if note.about not in said)]
     notes += [replace(r, text=f"replicate rows disagree: {r}") for r in replicates]
     if 1 < len(readings.runs) < FEW_RUNS:
         text = (
