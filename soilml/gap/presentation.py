@@ -34,7 +34,7 @@ def gap_files(
         why = (
             "the likeliest of several explanations that these runs cannot distinguish"
             if report.status == "class"
-            else "suspected, not named: beside a remainder, it predicts rows kept back better"
+            else "suspected, not named: beside a remainder, it predicts rows kept back no worse"
         )
         comments += [f"{' + '.join(names)} is {why}."]
     return {

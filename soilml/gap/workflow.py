@@ -200,10 +200,10 @@ def gap(
     readings, exclusions = readings.with_default_std(repeat_noise).with_known_noise()
     notes += [*readings.notes, *exclusions]
     checks = check_readings(readings, split.analysed, len(soil))
-    if checks.errors:
-        errors = (*checks.errors, *checks.naming_obstacles)
-        return _bad_data_report(case, errors, (*copies, *checks.notes), seed)
     checks = replace(checks, notes=(*copies, *notes, *excluded_rows, *checks.notes))
+    if checks.errors:
+        remarks = (*checks.notes, *checks.naming_obstacles)
+        return _bad_data_report(case, checks.errors, remarks, seed)
 
     from threadpoolctl import threadpool_limits
 

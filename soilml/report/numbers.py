@@ -83,6 +83,11 @@ def format_gain(x: float) -> str:
     return _minus(f"{x:.0f}" if abs(x) >= 999.95 else f"{x + 0.0:.1f}").replace("−0.0", "0.0")
 
 
+def format_log_density(gain: float, std_error: float | None) -> str:
+    """A difference of log densities, with its standard error where that is known: +5.1 +- 0.4."""
+    return f"{gain:+.1f}" + ("" if std_error is None else f" +- {std_error:.1f}")
+
+
 def format_p_value(p: float) -> str:
     """A p value, to at most two digits."""
     text = "p < 0.001" if p < 1e-3 else f"p = {p:.2f}" if p >= 0.1 else f"p = {p:.2g}"

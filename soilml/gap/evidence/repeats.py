@@ -85,7 +85,7 @@ def repeat_disagreement(
                 channel=readings.channels[channel],
                 chi_square=chi_square,
                 degrees_of_freedom=len(contrasts),
-                p_value=_chi_square_tail(chi_square, len(contrasts)),
+                p_value=chi_square_tail(chi_square, len(contrasts)),
                 sentence=_pair_sentence(readings, *pair),
             )
         )
@@ -100,7 +100,7 @@ def overstated_noise(readings: Readings) -> dict[str, float]:
     """
     found = {}
     for comparison in repeat_disagreement(readings):
-        by_chance = 1.0 - _chi_square_tail(comparison.chi_square, comparison.degrees_of_freedom)
+        by_chance = 1.0 - chi_square_tail(comparison.chi_square, comparison.degrees_of_freedom)
         if comparison.scatter_ratio < OVERSTATED_BELOW and by_chance < SIGNIFICANCE:
             found[comparison.channel] = comparison.scatter_ratio
     return found
@@ -164,7 +164,7 @@ def _pair_sentence(readings: Readings, i: int, j: int) -> str:
     return text + f"{abs(first - second):.2g}{unit}"
 
 
-def _chi_square_tail(value: float, degrees_of_freedom: int) -> float:
+def chi_square_tail(value: float, degrees_of_freedom: float) -> float:
     """Probability that a chi-square variable is above a value."""
     from scipy.special import chdtrc
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.report.gap_figure import gap_bars
 from soilml.gap.report.listed_explanations import likelier_than_first, needed_sizes
 from soilml.gap.report.prediction_curves import prediction_curves
@@ -95,6 +96,8 @@ def _content(report: GapReport) -> dict[str, Any]:
         "finite": math.isfinite,
         "changed": changed,
         "reasons": report.reasons,
+        "least_readings": MIN_RESIDUAL_READINGS,
+        "naming_readings": NAMING_RESIDUAL_READINGS,
         "shown_model": shown_model(report),
         "known": effect_descriptions(report),
         "bars": gap_bars(report, changed),

@@ -14,7 +14,7 @@ from soilml.config.case import Case
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.physics.soils.soil_tests import SoilTest, deviations
 from soilml.remarks import Remark
-from soilml.report.numbers import format_residual
+from soilml.report.numbers import format_log_density, format_residual
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
@@ -61,7 +61,7 @@ class Suspect:
     #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
     #: smooth remainder; None where no row was kept back for it
     predictive_gain: float | None = None
-    #: Standard error of that, by which the rows kept back differ by chance
+    #: Its standard error, by which folds of them differ by chance; None where no part has two
     predictive_gain_error: float | None = None
     #: Sizes of its effects that are implausibly large, in usual ones, by name
     times_usual: dict[str, float] = field(default_factory=dict)
@@ -71,7 +71,7 @@ class Suspect:
         """The predictive gain with its standard error, for tables; empty where none is known."""
         if self.predictive_gain is None:
             return ""
-        return f"{self.predictive_gain:+.1f} +- {self.predictive_gain_error or 0.0:.1f}"
+        return format_log_density(self.predictive_gain, self.predictive_gain_error)
 
 
 @dataclass(frozen=True)

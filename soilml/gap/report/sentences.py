@@ -31,6 +31,7 @@ from soilml.report.numbers import (
     format_probability,
     format_residual,
 )
+from soilml.report.terminal import shown_unit
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
@@ -43,7 +44,9 @@ NOTABLE_DISCREPANCY = 0.3  # Discrepancy in sigma from which a line states it
 #: What a headline says of residuals beyond the declared noise without a smooth gap, by the reason.
 _BEYOND_NOISE = {
     "excess-residuals": "; these rows cannot tell a gap from understated noise",
-    "soil-at-prior": ", with the soil at ends of its priors: widen them, or an effect is missing",
+    "soil-at-prior": (
+        ", with the soil at ends of its priors: widen them, or model or noise is wrong"
+    ),
 }
 
 
@@ -268,9 +271,8 @@ def _remainder(report: GapReport) -> str:
 def _size(name: str, discrepancy: RemainingDiscrepancy) -> str:
     """A discrepancy with the name of its channel; lengths in mm."""
     channel = name.rpartition("_")[0].replace("_", " ")
-    if discrepancy.unit == "m":
-        return f"{channel} {decimal(1e3 * discrepancy.after_value, 2)} mm"
-    return f"{channel} {decimal(discrepancy.after_value, 2)} {discrepancy.unit}"
+    factor, unit = shown_unit(discrepancy.unit)
+    return f"{channel} {decimal(factor * discrepancy.after_value, 2)} {unit}"
 
 
 #: What a status does not support, as the code and the text of a remark.

@@ -24,6 +24,10 @@ SCORED, ROUNDS = 4, 2
 #: Explanations that are scored first: those that may be stated. Larger sets that contain them can
 #: be likelier.
 FIRST_ACCEPTED = 2
+#: Least standard error of a gain, in nats, by which it is judged: a difference of log densities
+#: below 1 is no evidence. Kass and Raftery, Journal of the American Statistical Association 90,
+#: 1995, section 3.2, call twice such a difference below 2 "not worth more than a bare mention".
+LEAST_ERROR = 1.0
 
 
 @dataclass(frozen=True)
@@ -31,10 +35,11 @@ class PredictiveGain:
     """Log density of rows kept back, above that of the soil alone, and its standard error.
 
     The error is that of a sum over folds that differ by chance; a part that is one fold adds none.
+    It is None where every part is one fold, since nothing then tells it.
     """
 
     value: float
-    std_error: float
+    std_error: float | None = None
 
     @property
     def is_better(self) -> bool:
@@ -43,8 +48,17 @@ class PredictiveGain:
 
     @property
     def is_worse(self) -> bool:
-        """Whether they are predicted no better, beyond what folds differ by chance."""
-        return self.value <= -self.std_error
+        """Whether they are predicted worse, beyond what folds differ by chance."""
+        return self.value <= -self._judged_error
+
+    @property
+    def is_clearly_better(self) -> bool:
+        """Whether they are predicted better, beyond what folds differ by chance."""
+        return self.value >= self._judged_error
+
+    @property
+    def _judged_error(self) -> float:
+        return max(self.std_error or 0.0, LEAST_ERROR)
 
 
 #: Predictions of each part that was kept back, by the effects of the explanation.
@@ -93,7 +107,8 @@ def predictive_gains(predictions: Predictions) -> dict[Names, PredictiveGain]:
         by_fold = [
             np.subtract(own[part].log_densities, alone[part].log_densities) for part in counted
         ]
-        variance = sum(len(d) * float(np.var(d, ddof=1)) for d in by_fold if len(d) > 1)
+        variances = [len(d) * float(np.var(d, ddof=1)) for d in by_fold if len(d) > 1]
         value = float(np.mean([d.sum() for d in by_fold]))
-        gains[names] = PredictiveGain(value, np.sqrt(variance) / len(by_fold))
+        error = float(np.sqrt(sum(variances))) / len(by_fold) if variances else None
+        gains[names] = PredictiveGain(value, error)
     return gains

@@ -64,7 +64,9 @@ def noise_agreement(
 def misfit_remarks(found: NoiseAgreement | None, case: Case, analysis: Analysis) -> list[Remark]:
     """Residuals beyond the declared noise that scatter does not account for.
 
-    The score test does not see those that another soil beyond the priors would explain.
+    The score test does not see those that another soil beyond the priors would explain. Where the
+    noise that the residuals show, rough in slip, alone accounts for them, the priors are not
+    doubted.
     """
     if found is None or not found.exceeds_noise:
         return []
@@ -72,11 +74,14 @@ def misfit_remarks(found: NoiseAgreement | None, case: Case, analysis: Analysis)
     if found.grants_scatter and found.granted <= misfit_limit(left):
         return []
     factor = float(np.sqrt(found.declared))
-    if pressed := pressed_priors(analysis.result.soil):
+    problem = analysis.problem
+    scale = problem.covariance.components.noise_scale[problem.readings.channel]
+    noisier = found.declared / float(np.mean(scale**2)) <= misfit_limit(left)
+    if not noisier and (pressed := pressed_priors(analysis.result.soil)):
         text = (
             f"{excess_residuals(factor, bool(case.discrepancy))} with "
             f"{'; '.join(pressed.values())}: widen these priors in [soil.prior], or the model "
-            "lacks an effect"
+            "lacks an effect, or the noise is understated"
         )
         return [Remark("soil-at-prior", text, tuple(pressed))]
     consequence = "no scatter from run to run accounts for them"

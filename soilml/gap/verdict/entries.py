@@ -32,11 +32,11 @@ from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.decision import implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
-from soilml.gap.verdict.fit_notes import bound_notes, size_notes
+from soilml.gap.verdict.fit_notes import bound_notes, large_noise_notes, size_notes
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
-from soilml.report.numbers import LEAST_STATED
+from soilml.report.numbers import LEAST_STATED, format_log_density
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 LISTED_SUSPECTS = 8  # Suspects that are listed
@@ -173,10 +173,11 @@ def prediction_notes(
     if not names:
         return list(not_reduced)
     gain = predictive_gains(analysis.predictions)[tuple(names)]
+    how = "better" if gain.is_clearly_better else "no worse"
     text = (
         f"model.toml contains {' + '.join(names)}, which is suspected and not named. Beside a "
-        "smooth remainder, it predicts rows kept back better than the soil alone does "
-        f"(ln density {gain.value:+.1f} +- {gain.std_error:.1f})"
+        f"smooth remainder, it predicts rows kept back {how} than the soil alone does "
+        f"(ln density {format_log_density(gain.value, gain.std_error)})"
     )
     if not_reduced:
         each = [f"{figure[:1].upper()}{figure[1:]}" for figure in texts(not_reduced)]
@@ -258,7 +259,10 @@ def analysis_notes(
                 "changes fast with slip"
             )
             notes.append(Remark("noise-scaled", text, (column(name),)))
-    notes += overstated_noise_notes(readings)
+    known = overstated_noise_notes(readings)
+    said = {note.about for note in known}
+    large = large_noise_notes(analysis.problem, analysis.result.soil)
+    notes += [*known, *(note for note in large if note.about not in said)]
     notes += [replace(r, text=f"replicate rows disagree: {r}") for r in replicates]
     if 1 < len(readings.runs) < FEW_RUNS:
         text = (

@@ -1,4 +1,4 @@
-"""Notes on a fit: estimates at a bound, and effects that would have to be far larger than usual."""
+"""Notes on a fit: estimates at a bound, effects of an unusual size, noise that is too large."""
 
 from __future__ import annotations
 
@@ -7,10 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE
-from soilml.gap.evidence.problem import AT_BOUND
+from soilml.gap.evidence.problem import AT_BOUND, FitProblem
+from soilml.gap.evidence.repeats import SIGNIFICANCE, chi_square_tail
+from soilml.numerics.subspaces import ROUNDING, column_space
+from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import format_quantity
+from soilml.report.numbers import decimal, format_quantity
 
 
 def bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
@@ -49,4 +53,46 @@ def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Re
                 f"{abs(size):.3g} times its usual size ({format_quantity(usual, c.unit)})"
             )
             notes.append(Remark("implausible-size", text, (c.effect,)))
+    return notes
+
+
+def large_noise_notes(problem: FitProblem, soil: Solution) -> list[Remark]:
+    r"""Notes on channels whose residuals about the soil alone are too small for their noise.
+
+    With the residuals r in standard deviations of the readings and :math:`A = I - H`, the
+    projection out of what the soil explains, the squares of channel c are, under that noise, nearly
+    a multiple of chi-squared,
+
+    .. math::
+        r_c^T r_c \sim \frac{\mathrm{tr} A_{cc}^2}{\mathrm{tr} A_{cc}} \chi^2_k, \quad
+        k = \frac{(\mathrm{tr} A_{cc})^2}{\mathrm{tr} A_{cc}^2}
+
+    A gap, or scatter of the soil, makes them larger. None are made where neighbouring samples are
+    correlated, for such noise is in part explained by the soil.
+
+    References: Satterthwaite, Biometrics Bulletin 2, 1946.
+    """
+    readings = problem.readings
+    if problem.covariance.components.autocorrelation > 0.0:
+        return []
+    std = readings.std
+    basis = column_space(soil.derivatives / std[:, None], relative_tolerance=ROUNDING)
+    residual = (readings.measured - soil.prediction) / std
+    residual = residual - basis @ (basis.T @ residual)
+    notes = []
+    for i, name in enumerate(readings.channels):
+        own = readings.channel == i
+        projection = np.eye(int(own.sum())) - basis[own] @ basis[own].T
+        expected, spread = float(np.trace(projection)), float(np.sum(projection**2))
+        squares = float(np.sum(residual[own] ** 2))
+        if squares <= 0.0 or spread <= 0.0:
+            continue
+        by_chance = 1.0 - chi_square_tail(squares * expected / spread, expected**2 / spread)
+        if by_chance < SIGNIFICANCE / len(readings.channels):
+            text = (
+                f"the noise of {column(name)}, with that of slip and load, is declared "
+                f"{decimal(np.sqrt(expected / squares), 2)} times too large for these rows, which "
+                "hides small gaps"
+            )
+            notes.append(Remark("noise-too-large", text, (column(name),)))
     return notes

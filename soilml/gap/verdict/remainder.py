@@ -13,6 +13,7 @@ from soilml.gap.report.results import RegionScore, RemainingDiscrepancy
 from soilml.numerics.subspaces import column_space, project_out
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal
+from soilml.report.terminal import shown_unit
 
 #: Factor on the expected amplitude in intervals: the part of a discrepancy that resembles a change
 #: of the soil leaves no residual that determines its size. It lies between 1.5, with which 90 %
@@ -89,8 +90,9 @@ def _largest(values: Floats, slip: Floats, load: Floats, unit: str) -> str:
     if values[i] == 0.0:
         return ""
     side = "above" if values[i] > 0.0 else "below"
+    factor, shown = shown_unit(unit)
     return (
-        f"measured {side} the model by up to {decimal(abs(float(values[i])), 2)} {unit}, "
+        f"measured {side} the model by up to {decimal(abs(factor * float(values[i])), 2)} {shown}, "
         f"at slip {slip[i]:.2f} under {load[i]:.3g} N"
     )
 

@@ -1,6 +1,7 @@
 """Agreement: one misfit for all commands, and trends with the order of runs and rows."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from soilml import identify
 from soilml.gap import gap
 from soilml.gap.evidence.order_trend import FEWEST_RUNS, TREND_LEVEL, order_trends
 from soilml.gap.report.results import NoiseAgreement
-from soilml.gap.verdict.agreement import trend_remarks
+from soilml.gap.search.passes import Analysis
+from soilml.gap.verdict.agreement import misfit_remarks, trend_remarks
 from soilml.numerics.prior import Prior
 from soilml.traction.soil_draws import measured_soil
 
@@ -95,7 +97,23 @@ def test_a_prior_without_the_true_soil_is_no_agreement(name):
     report = gap(prior, driven(CASE, seed=4))
     assert report.status == "undecided" and report.reasons[0].code == "soil-at-prior"
     assert name in report.reasons[0].about
-    assert report.sentence.endswith("widen them, or an effect is missing.")
+    assert report.sentence.endswith("widen them, or model or noise is wrong.")
+    assert "or the noise is understated" in report.reasons[0].text
+
+
+@pytest.mark.parametrize("scale, code", [(1.0, "soil-at-prior"), (1.6, "excess-residuals")])
+def test_noise_that_accounts_for_the_residuals_is_doubted_before_the_priors(
+    monkeypatch, scale, code
+):
+    problem = fit_problem(CASE, driven(CASE))
+    components = replace(problem.covariance.components, noise_scale=np.full(3, scale))
+    problem = replace(problem, covariance=replace(problem.covariance, components=components))
+    analysis = Analysis(problem, SimpleNamespace(soil=None))
+    pressed = {"n": "n at 1.4, the upper end of its prior"}
+    monkeypatch.setattr("soilml.gap.verdict.agreement.pressed_priors", lambda _: pressed)
+    found = NoiseAgreement(2.9, True, 2.9 / scale**2, 0.0, 0.0)
+    (remark,) = misfit_remarks(found, CASE, analysis)
+    assert remark.code == code
 
 
 @pytest.mark.slow

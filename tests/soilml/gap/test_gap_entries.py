@@ -163,6 +163,14 @@ def test_a_part_of_a_stated_pair_is_listed_only_if_it_occurs_without_the_rest():
         assert (("c",) in found) == listed and ("b",) not in found
 
 
+def test_noise_that_is_declared_too_large_is_said_once_for_each_channel(monkeypatch):
+    repeated = Remark("noise-overstated", "a", ("x",))
+    torque, other = (Remark("noise-too-large", *own) for own in (("b", ("x",)), ("c", ("y",))))
+    monkeypatch.setattr(entries, "overstated_noise_notes", lambda readings: [repeated])
+    monkeypatch.setattr(entries, "large_noise_notes", lambda problem, soil: [torque, other])
+    assert notes(analysed(runs=("a",)))[:2] == ["a", "c"]
+
+
 def notes(given):
     fit = SimpleNamespace(coordinates=[], x=np.zeros(0))
     return texts(analysis_notes(given, fit, [fit], [remark("run a and run b")]))
@@ -170,6 +178,7 @@ def notes(given):
 
 def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
     monkeypatch.setattr(entries, "overstated_noise_notes", lambda readings: [])
+    monkeypatch.setattr(entries, "large_noise_notes", lambda problem, soil: [])
     assert notes(analysed(runs=("a",))) == ["replicate rows disagree: run a and run b"]
     several = notes(
         analysed(
@@ -199,6 +208,7 @@ def test_notes_on_outliers_noise_runs_and_autocorrelation(monkeypatch):
 
 def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
     monkeypatch.setattr(entries, "overstated_noise_notes", lambda readings: [])
+    monkeypatch.setattr(entries, "large_noise_notes", lambda problem, soil: [])
     monkeypatch.setattr(
         entries, "disagreeing_soil_tests", lambda case, values: ["plate 3 sigma off"]
     )

@@ -12,10 +12,11 @@ from soilml.gap import gap, workflow
 from soilml.gap.evidence.held_out import HeldOutPrediction
 from soilml.gap.evidence.outliers import ends_of_monotone_series
 from soilml.gap.evidence.score_test import score_test
-from soilml.gap.report.results import GapReduction
+from soilml.gap.report.results import GapReduction, Suspect
 from soilml.gap.search import prediction
 from soilml.gap.search.posterior import Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
+from soilml.gap.verdict.entries import prediction_notes
 from soilml.gap.verdict.reductions import grown_channels, without_grown
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -89,7 +90,45 @@ def test_a_gain_below_zero_within_its_error_is_neither_better_nor_worse():
     assert not within.is_better
     assert not within.is_worse
     assert PredictiveGain(-3.5, 3.0).is_worse
-    assert PredictiveGain(0.0, 0.0).is_worse  # an effect that changes no prediction
+
+
+@pytest.mark.parametrize("error", [0.0, 0.2, None])
+def test_a_difference_below_one_is_no_evidence_that_an_effect_predicts_worse(error):
+    assert not PredictiveGain(-0.9, error).is_worse
+    assert PredictiveGain(-1.1, error).is_worse
+    assert not PredictiveGain(0.0, error).is_better
+
+
+def test_one_fold_tells_no_standard_error_and_none_is_stated():
+    single = {(): {"held_out_region": scored(-4.0)}, ("a",): {"held_out_region": scored(-3.0)}}
+    own = predictive_gains(single)[("a",)]
+    assert own == PredictiveGain(1.0, None) and own.is_better
+    assert Suspect(("a",), 0.0, 0.5, own.value, own.std_error).prediction == "+1.0"
+    assert Suspect(("a",), 0.0, 0.5, 1.0, 0.25).prediction == "+1.0 +- 0.2"
+    assert "ln density +1.0)" in predicted(1.0, None)
+
+
+def predicted(value, error):
+    """The note on a suspect whose gain this is."""
+    with pytest.MonkeyPatch.context() as patch:
+        gains = {("a",): PredictiveGain(value, error)}
+        patch.setattr("soilml.gap.verdict.entries.predictive_gains", lambda _: gains)
+        (note,) = prediction_notes(("a",), SimpleNamespace(predictions={}), ())
+    return note.text
+
+
+@pytest.mark.parametrize(
+    "value, error, how",
+    [
+        (0.04, 0.9, "no worse"),
+        (2.0, 2.5, "no worse"),
+        (0.9, None, "no worse"),
+        (3.0, 2.5, "better"),
+        (1.1, None, "better"),
+    ],
+)
+def test_a_suspect_predicts_better_only_beyond_the_error_of_its_gain(value, error, how):
+    assert f"predicts rows kept back {how} than the soil alone does" in predicted(value, error)
 
 
 @pytest.mark.slow

@@ -18,6 +18,7 @@ from soilml.gap.evidence.repeats import (
     overstated_noise_notes,
     repeat_disagreement,
 )
+from soilml.gap.verdict.fit_notes import large_noise_notes
 from soilml.io.table import Table
 from soilml.physics.operating_point import Operating
 
@@ -133,3 +134,30 @@ def test_a_difference_is_in_per_cent_where_the_smaller_reading_is_a_tenth(values
     assert sentence.endswith(f"under 40 N: {said}")
     own = _pair_sentence(replace(readings, measured=reading), 3, 3)
     assert own.startswith("two rows of run run_0 at slip 0.29")
+
+
+def about_large_noise(table, **changes):
+    """The channels of which a note says that their noise is declared too large, and the words."""
+    problem = replace(fit_problem(case_of(), table), **changes)
+    found = large_noise_notes(problem, problem.fit_soil([np.full(3, 0.5)]))
+    assert {note.code for note in found} <= {"noise-too-large"}
+    return {note.about[0]: note.text for note in found}
+
+
+def test_residuals_below_the_declared_noise_say_by_what_factor_it_is_too_large():
+    case = case_of()
+    actual = driven(case, noise=0.4, seed=2)["torque_Nm"]
+    declared = driven(case, seed=3)
+    found = about_large_noise(Table(declared.columns | {"torque_Nm": actual}))
+    assert list(found) == ["torque_Nm"]
+    factor = float(found["torque_Nm"].split(" times too large")[0].rpartition(" ")[2])
+    assert factor == pytest.approx(1.0 / 0.4, rel=0.3)
+
+
+def test_noise_as_declared_or_correlated_is_not_too_large():
+    notes = [about_large_noise(driven(case_of(), seed=seed)) for seed in range(30)]
+    assert sum(map(bool, notes)) <= 1
+    problem = fit_problem(case_of(), driven(case_of(), noise=0.4))
+    components = replace(problem.covariance.components, autocorrelation=0.5)
+    correlated = replace(problem.covariance, components=components)
+    assert about_large_noise(driven(case_of(), noise=0.4), covariance=correlated) == {}

@@ -165,7 +165,7 @@ def test_residuals_beyond_the_noise_are_no_disagreement_of_measurements():
     pressed = Remark("soil-at-prior", "n at 1.4, the upper end of its prior", ("n",))
     assert said("undecided", misfit=misfit, reasons=(pressed,)) == (
         "Residuals are 2.5 times the declared noise, with the soil at ends of its priors: widen "
-        "them, or an effect is missing."
+        "them, or model or noise is wrong."
     )
 
 

@@ -124,7 +124,7 @@ def test_the_remaining_discrepancy_is_the_mean_of_the_process_given_the_residual
     assert both["sinkage_m"].before_value == pytest.approx(2.0 * 2.0 / 3.0)
     assert both["sinkage_m"].before_sigma == pytest.approx(2.0 / 3.0)
     assert one.description == "measured above the model by up to 5.3 N m, at slip 0.10 under 60 N"
-    assert both["sinkage_m"].description.startswith("measured below the model by up to 1.9 m")
+    assert both["sinkage_m"].description.startswith("measured below the model by up to 1895 mm")
 
 
 def test_where_the_discrepancy_is_largest():

@@ -10,6 +10,7 @@ import pytest
 
 from soilml import Model, Wheel, soil
 from soilml.config.case import Case
+from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.report.page import page
 from soilml.gap.report.prediction_curves import MOST_RUNS, select_runs
 from soilml.gap.report.results import (
@@ -194,6 +195,12 @@ def test_every_status_gives_a_complete_page_with_its_meaning(status):
     assert "What to do" in text
     assert seen.tags.count("h1") == 1
     assert seen.tags.count("caption") == seen.tags.count("table")
+
+
+def test_the_page_on_bad_data_says_how_many_readings_the_checks_ask_for():
+    text = " ".join(read(page(bad(), "rover.toml", "runs.csv")).text)
+    assert f"at least {MIN_RESIDUAL_READINGS} readings more than free soil parameters" in text
+    assert f"to name a cause: at least {NAMING_RESIDUAL_READINGS} readings more" in text
 
 
 @pytest.mark.slow
