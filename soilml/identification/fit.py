@@ -20,6 +20,7 @@ from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
 from soilml.remarks import Remark
+from soilml.report.numbers import share_left
 
 if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
@@ -305,7 +306,7 @@ def identifiability_remarks(name: str, fraction: float, one_load: bool = False) 
         text = "one load only: cohesion is not identified"
         return [Remark("not-identified", text, (name,))]
     if fraction > NOT_IDENTIFIED_ABOVE:
-        text = f"{name} is not identified: {fraction:.0%} of the prior's width remains"
+        text = f"{name} is not identified: {share_left(fraction)} the prior's width remains"
         return [Remark("not-identified", text, (name,))]
     if fraction > WEAKLY_IDENTIFIED_ABOVE:
         text = f"{name} is weakly identified: {fraction:.0%} of the prior's width remains"
