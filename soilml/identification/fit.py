@@ -36,6 +36,8 @@ BOUND_TOLERANCE = 1e-3
 
 #: Codes of the remarks by which rows speak against the model taken as exact.
 AGAINST_EXACT = ("excess-residuals", "unlikely")
+#: Probability of typical errors above which it is said that the shares do not test effects.
+MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,8 @@ class Fit:
         }
         if self.explanations:
             content["explanations"] = [one.as_json() for one in self.explanations]
+        if self.use_of_shares is not None:
+            content["explanations_use"] = self.use_of_shares.as_json()
         if self.exact_model is not None:
             exact = self.exact_model.as_json()
             kept = ("method", "parameters", "warnings", "misfit")
@@ -207,6 +211,18 @@ class Fit:
                 "use": self.exact_model.use_of_exact.as_json()
             }
         return content
+
+    @property
+    def use_of_shares(self) -> Remark | None:
+        """What the shares of `explanations` are not, where those of typical errors are most."""
+        errors = [one for one in self.explanations if not (one.effect or one.exact)]
+        if sum(one.probability for one in errors) <= MOST:
+            return None
+        text = (
+            "these shares weigh what the intervals include and are no test for a missing effect: "
+            "soilml gap makes that test"
+        )
+        return Remark("shares-no-test", text, severity="note")
 
     @property
     def use_of_exact(self) -> Remark:

@@ -196,6 +196,8 @@ def _fit_text(found: Fit) -> str:
     shown = stated_explanations(found.explanations)[:_MOST_EXPLANATIONS]
     parts = [f"{one} ({one.probability:.0%})" for one in shown]
     by = f"\nexplained by: {', '.join(parts)}" if parts else ""
+    if found.use_of_shares is not None:
+        by += f"\n{found.use_of_shares}"
     warnings = "".join(f"\n! {text}" for text in found.warnings)
     return f"{first}\n\n{format_table(head, rows)}{by}{warnings}"
 

@@ -1,4 +1,4 @@
-"""Explanations in words: shares of errors of any size are one statement."""
+"""Explanations in words: shares of errors of any size are one statement, and what they are not."""
 
 from dataclasses import replace
 
@@ -39,6 +39,15 @@ def test_shares_are_summed_over_the_sizes_of_errors_the_likeliest_first():
     assert [one.probability for one in stated] == pytest.approx([0.4, 0.3, 0.25, 0.05])
     assert [one.exact for one in stated] == [False, False, False, True]
     assert "explained by: typical errors x 1 to 2 (40%), " in Identification(fit_of(*FOUND)).text()
+
+
+def test_that_shares_test_no_effect_is_said_where_typical_errors_have_most():
+    few, many = fit_of(*FOUND), fit_of(SoilExplanation("", 0.5, 0.6), SoilExplanation("", 0.0, 0.4))
+    assert few.use_of_shares is None and "explanations_use" not in few.as_json()
+    assert many.use_of_shares.code == many.as_json()["explanations_use"]["code"] == "shares-no-test"
+    assert many.use_of_shares.text in Identification(many).text()
+    assert fit_of().use_of_shares is None
+    assert fit_of(SoilExplanation("", 0.0, 1.0)).use_of_shares is None
 
 
 def test_pull_states_the_errors_of_all_sizes_together(model_file, monkeypatch):
