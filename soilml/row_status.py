@@ -26,7 +26,7 @@ _REASONS: dict[Status, str] = {
     Status.TOO_HEAVY: "no equilibrium: the soil carries less than this load at any sinkage "
     "up to the hub",
     Status.NO_PEAK: "no stress profile: the angle of maximum stress lies outside the contact, "
-    "a0 + a1 slip must lie between 0 and 1",
+    "a0 + a1 slip must be above 0 and below 1",
     Status.NO_BEARING: "no bearing: kc / width + kphi is not positive",
     Status.NOT_CONVERGED: "no equilibrium found: the search for the sinkage did not converge",
     Status.NOT_SIMULATED: "not simulated: slip or load lies outside the runs of the simulator",

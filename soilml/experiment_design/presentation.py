@@ -15,6 +15,7 @@ from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import NEXT_ROW, Remark
+from soilml.report import numbers
 from soilml.report.figure_style import save_png, take_axes
 
 #: Differences of remaining fractions that are not reported: the sampling error of one call.
@@ -31,9 +32,8 @@ def is_identified(remaining_fraction: Floats) -> NDArray[np.bool_]:
 def abstention_message(name: str, remaining_fraction: float, rows: str = "these rows") -> str:
     """That a parameter is not identified; `rows` is "these rows" or "this row"."""
     name = name.replace("_", " ")
-    return (
-        f"{name}: not identified by {rows}, {remaining_fraction:.0%} of the prior's width remains"
-    )
+    left = numbers.share_left(remaining_fraction)
+    return f"{name}: not identified by {rows}, {left} the prior's width remains"
 
 
 def next_row_remarks(advice: Advice, rows: str = "these rows") -> list[Remark]:

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.errors import FitError, MissingLibraryError
+from soilml.errors import MissingLibraryError
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
+from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.numerics.prior import UNIFORM_PRECISION
 
 #: Points of the table of Sobol points, and the most dimensions that it has.
@@ -48,9 +49,7 @@ def global_optimum(problem: LeastSquaresProblem, few: LeastSquaresProblem) -> So
     if not any(np.isfinite(o.prediction).all() for o in found) and not any(
         np.isfinite(problem.predict(start[None, :])).all() for start in starts
     ):
-        raise FitError(
-            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
-        )
+        raise_uncarried(problem.case, problem.readings.at)
     lowest = min(o.cost_with_priors for o in found)
     equal = [o for o in found if o.cost_with_priors <= lowest + EQUAL_COST]
     return min(equal, key=lambda optimum: float(np.sum((optimum.x - 0.5) ** 2)))

@@ -19,6 +19,7 @@ from soilml.fitting.readings import (
 from soilml.fitting.row_order import with_order_columns
 from soilml.io.table import Table
 from soilml.physics.gears.emulated import EmulatedGear
+from soilml.physics.operating_point import FROM_ORDER
 from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.remarks import Remark
 
@@ -29,14 +30,13 @@ def usable_readings(case: Case, table: Table) -> Readings:
     A channel whose noise is not declared is excluded if that of another one is; if none is, all
     are used and their noise is to be estimated. Rows whose status is not ok are excluded. A
     standard deviation of zero, which a relative noise has at a reading of zero, is replaced by the
-    median of the others.
+    median of the others. What follows from the order of the rows is read where it is known, so that
+    drifts can be explanations of rows whose case has none.
 
     Raises `InputError` where no row remains, `TableError` where the table names another wheel than
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
-    models = (case.model, *case.gears.values())
-    if any(effect.about.uses for model in models for effect in model.effects):
-        table = with_order_columns(case, table)
+    table = with_order_columns(case, table, FROM_ORDER)
     table, excluded = answered_rows(with_rover_columns(case, table))
     check_wheel_size(case, table)
     if isinstance(case.model.gear, EmulatedGear):

@@ -9,12 +9,12 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.errors import FitError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.misfit import fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
+from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.identification.fit import SoilExplanation
 from soilml.identification.hypotheses import ErrorHypothesis, fit_hypothesis
 from soilml.identification.posterior import PosteriorSamples
@@ -90,9 +90,7 @@ def averaged_samples(
     effects = candidate_effects(case, effects)
     found = _fitted(case, readings, free, effects, start)
     if not found:
-        raise FitError(
-            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
-        )
+        raise_uncarried(case, readings.at)
     likeliest = max(found, key=_log_weight)[1]
     freedom = readings.reading_count - len(free)
     misfit = (likeliest.squares + readings.squares_within) / max(freedom, 1)

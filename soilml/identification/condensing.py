@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from heapq import heapify, heappop, heappush
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from soilml.fitting.operating_points import gear_numbers, operating_points_of_ro
 from soilml.fitting.predictions import forces, predict
 from soilml.fitting.readings import CondensedRows, Readings
 from soilml.identification.nonlinear import nonlinear
-from soilml.physics.operating_point import COVARIATES, Operating
+from soilml.physics.operating_point import COVARIATES, FROM_ORDER, Operating
 
 MOST_ROWS, CELLS = 5_000, 1024  # Rows above which they are condensed, and rows that become of them
 #: Rows of the fit that shows where the optimum is, and rounds in which it is approached.
@@ -41,7 +42,8 @@ def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Rea
 
     Noise of slip and load becomes part of the noise of the readings. The squared distances within
     the cells are kept for the misfit. Rows without equilibrium at :math:`\theta_0`, of which there
-    are few where the model holds, stay as they are.
+    are few where the model holds, stay as they are. What follows from the order of the rows is kept
+    where an effect of the case uses it: else cells would be wider in slip and load.
 
     case, free: The model, and its free parameters.
     readings: Rows (n,); they are returned where there are no more than `MOST_ROWS`.
@@ -51,6 +53,7 @@ def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Rea
     count = len(readings.row_slip)
     if count <= MOST_ROWS:
         return readings
+    readings = replace(readings, at=_without_unused_order(case, readings.at))
     part = np.random.default_rng(0).permutation(count)[:FIRST_ROWS]
     fewer = readings.of_rows(np.sort(part))[1]
     cell: Integers | None = None
@@ -63,6 +66,14 @@ def condensed(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Rea
             cell = cells_of(_coordinates(readings, std), _groups(readings.at), CELLS)
         fewer = _condensed_at(known, readings, residual, std, cell)
     return fewer
+
+
+def _without_unused_order(case: Case, at: Operating) -> Operating:
+    """The operating points without what follows from the order of rows and no effect uses."""
+    models = (case.model, *case.gears.values())
+    used = {field for model in models for effect in model.effects for field in effect.about.uses}
+    unknown: dict[str, Any] = dict.fromkeys(FROM_ORDER.keys() - used)
+    return replace(at, **unknown)
 
 
 def _condensed_at(

@@ -20,6 +20,7 @@ from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
 from soilml.remarks import Remark
+from soilml.report.numbers import share_left
 
 if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
@@ -35,6 +36,8 @@ BOUND_TOLERANCE = 1e-3
 
 #: Codes of the remarks by which rows speak against the model taken as exact.
 AGAINST_EXACT = ("excess-residuals", "unlikely")
+#: Probability of typical errors above which it is said that the shares do not test effects.
+MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -199,6 +202,8 @@ class Fit:
         }
         if self.explanations:
             content["explanations"] = [one.as_json() for one in self.explanations]
+        if self.use_of_shares is not None:
+            content["explanations_use"] = self.use_of_shares.as_json()
         if self.exact_model is not None:
             exact = self.exact_model.as_json()
             kept = ("method", "parameters", "warnings", "misfit")
@@ -206,6 +211,18 @@ class Fit:
                 "use": self.exact_model.use_of_exact.as_json()
             }
         return content
+
+    @property
+    def use_of_shares(self) -> Remark | None:
+        """What the shares of `explanations` are not, where those of typical errors are most."""
+        errors = [one for one in self.explanations if not (one.effect or one.exact)]
+        if sum(one.probability for one in errors) <= MOST:
+            return None
+        text = (
+            "these shares weigh what the intervals include and are no test for a missing effect: "
+            "soilml gap makes that test"
+        )
+        return Remark("shares-no-test", text, severity="note")
 
     @property
     def use_of_exact(self) -> Remark:
@@ -305,7 +322,7 @@ def identifiability_remarks(name: str, fraction: float, one_load: bool = False) 
         text = "one load only: cohesion is not identified"
         return [Remark("not-identified", text, (name,))]
     if fraction > NOT_IDENTIFIED_ABOVE:
-        text = f"{name} is not identified: {fraction:.0%} of the prior's width remains"
+        text = f"{name} is not identified: {share_left(fraction)} the prior's width remains"
         return [Remark("not-identified", text, (name,))]
     if fraction > WEAKLY_IDENTIFIED_ABOVE:
         text = f"{name} is weakly identified: {fraction:.0%} of the prior's width remains"

@@ -8,6 +8,7 @@ from soilml.arrays import Floats
 from soilml.errors import FitError
 from soilml.fitting.coordinates import log_ratios
 from soilml.fitting.least_squares import Solution
+from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.surface_sampling import MOST_ROUNDS, normal_sample, surface_sample
@@ -61,9 +62,7 @@ def sampled(
     if sample is None:
         sample = importance_sample(logs, len(density.free))
     if not np.isfinite(sample.evidence):
-        raise FitError(
-            "no parameters in the prior carry the measured loads: check load_N, kphi, n and [gear]"
-        )
+        raise_uncarried(density.case, density.readings.at)
     if sample.effective_size < LEAST_USABLE_SIZE:
         raise FitError(
             f"the effective sample size is {sample.effective_size:.0f}, too small for a mean and a "

@@ -12,6 +12,7 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
 from soilml.identification.fit import Fit
+from soilml.identification.stated_explanations import stated_explanations
 from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
@@ -192,9 +193,11 @@ def _fit_text(found: Fit) -> str:
     first = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
     if len(unknown) == len(found.names):
         first = f"nothing is determined by these rows\n\n{first}"
-    shown = found.explanations[:_MOST_EXPLANATIONS]
-    parts = [f"{one} {one.probability:.0%}" for one in shown]
+    shown = stated_explanations(found.explanations)[:_MOST_EXPLANATIONS]
+    parts = [f"{one} ({one.probability:.0%})" for one in shown]
     by = f"\nexplained by: {', '.join(parts)}" if parts else ""
+    if found.use_of_shares is not None:
+        by += f"\n{found.use_of_shares}"
     warnings = "".join(f"\n! {text}" for text in found.warnings)
     return f"{first}\n\n{format_table(head, rows)}{by}{warnings}"
 

@@ -64,6 +64,11 @@ def format_residual(x: float, digits: int = 3) -> str:
     return "< 0.001" if 0.0 <= x < 1e-3 else format_number(x, digits)
 
 
+def share_left(fraction: float) -> str:
+    """The share of a prior's width that remains: 92% of; all of, from a whole on."""
+    return f"{fraction:.0%} of" if round(fraction, 2) < 1.0 else "all of"
+
+
 def format_number(x: float, digits: int = 3) -> str:
     """A number to this many significant digits: 320, 1.00, 0.0832, 1.2 × 10⁷; a dash for NaN."""
     if math.isnan(x):

@@ -31,6 +31,7 @@ from soilml.identification.model_error_inputs import (
     with_stated_model_error,
 )
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
+from soilml.identification.stated_explanations import stated_explanations
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
@@ -217,7 +218,7 @@ def measured_soil(
             warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
     known = [] if twice or not isinstance(samples, AveragedSamples) else samples.explanations
     if known and not any(e.exact for e in known):
-        first = known[0]
+        first = stated_explanations(known)[0]
         likeliest = str(first) if first.effect else "errors of sensors and model"
         text = (
             f"the rows speak against the model as in its file, and first for {likeliest} "

@@ -106,6 +106,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.fitting.simulation import simulate
+    from soilml.fitting.uncarried_loads import missing_peak
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
@@ -140,6 +141,8 @@ def run(args: argparse.Namespace) -> int:
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))
+        if missing := missing_peak(case, Operating(slip=slip[:1], load=load[:1], **known)):
+            raise InputError(f"no row has an equilibrium or a stress profile: {missing}")
         worst = Status(int(force.status[0]))
         limit = f" (at most {force.load.max():.4g} N)" if worst is Status.TOO_HEAVY else ""
         raise InputError(

@@ -14,6 +14,7 @@ from soilml.experiment_design.advice_after_results import advice_after_fit
 from soilml.experiment_design.presentation import abstention_message, next_row_remarks, row_message
 from soilml.fitting.coordinates import select_free
 from soilml.identification import Fit, identify
+from soilml.identification.stated_explanations import stated_explanations
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_remarks
@@ -65,7 +66,10 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         **table_summary(table),
         "remarks": texts(remarks),
         "parameters": parameters(case, fit, exact),
-        "explanations": [one.as_json() for one in fit.explanations],
+        "explanations": [
+            {"text": str(one), "probability": one.probability}
+            for one in stated_explanations(fit.explanations)
+        ],
         "use": "" if exact is None else exact.use_of_exact.text,
         "words": words(fit, advice),
         "warnings": texts(r for r in fit.warnings if r.code not in STATED_BESIDE),

@@ -13,6 +13,7 @@ from soilml.identification.fit import STRONG_CORRELATION, Fit
 from soilml.numerics.prior import Prior
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES, SHEAR, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
+from soilml.report.numbers import share_left
 from soilml.systems.climbing.climb import Climb, Rover, ShearParameters, Uncertainty, group_by_slope
 from soilml.systems.climbing.climb_balances import ForceBalances
 from soilml.systems.climbing.soil_sampling import SoilPosterior, SoilSampler
@@ -176,7 +177,7 @@ def _fit(
     warnings = []
     for name, left in fit.remaining_fraction.items():
         if left > NOT_IDENTIFIED_ABOVE:
-            text = f"{name} is not identified: {left:.0%} of its prior width remains"
+            text = f"{name} is not identified: {share_left(left)} its prior width remains"
             warnings.append(Remark("not-identified", text, (name,)))
         elif left > WEAKLY_IDENTIFIED_ABOVE:
             text = f"{name} is weakly identified: {left:.0%} of its prior width remains"

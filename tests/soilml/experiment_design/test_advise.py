@@ -136,6 +136,7 @@ def test_messages_name_parameters_that_are_not_identified(case):
     assert is_identified(np.asarray([0.3, 0.8, 0.81])).tolist() == [True, True, False]
     text = abstention_message("friction_angle", 0.92)
     assert text == "friction angle: not identified by these rows, 92% of the prior's width remains"
+    assert abstention_message("n", 1.03).endswith("all of the prior's width remains")
     found = after(case, [0.6] * 3, [60.0] * 3, count=2)
     said = " | ".join(texts(next_row_remarks(found)))
     assert "cohesion: not identified by these rows" in said and "a repetition leaves" in said

@@ -17,6 +17,7 @@ from soilml.identification import averaged_fit
 from soilml.identification.averaged import averaged_samples
 from soilml.identification.hypotheses import ErrorHypothesis, fit_hypothesis
 from soilml.physics.effects import EFFECTS
+from soilml.physics.effects.friction_drift import FrictionDrift
 from soilml.quantities import SHEAR
 
 CASE = read_recipe("wheel").case
@@ -103,6 +104,18 @@ def test_the_average_is_little_wider_where_the_model_is_right():
     ratio = fit.std / fit.exact_model.std
     assert (ratio > 1.0).all() and ratio.mean() < 3.0
     assert fit.exact_model.use_of_exact.text.startswith("use exact_model only where")
+
+
+@pytest.mark.slow
+def test_a_drift_of_the_soil_is_an_explanation_where_the_order_of_the_rows_is_known():
+    order = np.random.default_rng(6).permutation(2 * len(SLIP)) % len(SLIP)
+    table = rows()
+    columns = {name: values[order] for name, values in table.columns.items()}
+    case = CASE.with_values(dict(zip(SHEAR, TRUTH, strict=True)))
+    at = Operating(slip=SLIP[order], load=LOAD[order], progress=np.linspace(0.0, 1.0, len(order)))
+    drifting = (case.model + FrictionDrift(gain=0.2))(case.soil, at)
+    columns |= {key: np.asarray(getattr(drifting, name)) for key, name in COLUMNS.items()}
+    assert identify(CASE, Table(columns)).explanations[0].effect == "friction-drift"
 
 
 @pytest.mark.slow

@@ -104,6 +104,7 @@ def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condens
     assert len(few.row_slip) == condensing_rows.CELLS
     assert few.reading_count == data.reading_count == 3 * ROWS
     assert few.channels == data.channels
+    assert data.at.progress is not None and few.at.progress is None  # no effect uses the order
     for i in range(3):
         all_std = data.noise_at(data.measured)
         weights = [

@@ -167,6 +167,11 @@ def test_what_the_rows_leave_open_is_said_by_how_much_of_the_prior_remains(case)
         "cohesion is weakly identified: 51% of the prior's width remains",
         "friction_angle is not identified: 81% of the prior's width remains",
     )
+    wide = {"cohesion": 1.03, "friction_angle": 0.996}
+    assert warned(case, fit_of(remaining_fraction=wide), rows_of()) == (
+        "cohesion is not identified: all of the prior's width remains",
+        "friction_angle is not identified: all of the prior's width remains",
+    )
     weak = {"cohesion": 0.8, "friction_angle": 0.8}
     assert all("weakly" in t for t in warned(case, fit_of(remaining_fraction=weak), rows_of()))
     one_load = rows_of(load=(60.0, 60.0, 60.0))

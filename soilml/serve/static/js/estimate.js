@@ -141,7 +141,7 @@ function sureness(parameters) {
 
 /** The explanations with their probabilities, in words. */
 function explained(explanations) {
-  const named = (explanations ?? []).map((one) => `${one.text} ${percent(one.probability)}`);
+  const named = (explanations ?? []).map((one) => `${one.text}: ${percent(one.probability)}`);
   return named.length ? ` (${named.join(", ")})` : "";
 }
 
