@@ -191,8 +191,8 @@ def _few_rows(script: ModuleType) -> Callable[[], object]:
 
 
 def _challenge(script: ModuleType) -> Callable[[], object]:
-    """Two sets in place of 24."""
-    script.SETS = 2
+    """Two sets in place of 24, of a seed with the same figures on all processors."""
+    script.SETS, script.SEED = 2, 3
     return lambda: script.run(_folder(), ("gap", "stepwise", "lasso", "gp"))
 
 
