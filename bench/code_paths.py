@@ -113,7 +113,7 @@ def counted_calls(folder: Path) -> list[CountedCall]:
         CountedCall(
             "`soilml identify`, which weighs the catalogue, without the files of effects",
             command("identify"),
-            75,
+            77,
             EFFECTS_FOLDER,
         ),
         CountedCall("`soilml identify --method posterior`", command("identify", *POSTERIOR)),

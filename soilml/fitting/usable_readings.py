@@ -24,19 +24,23 @@ from soilml.quantities import CHANNELS, QUANTITIES, column
 from soilml.remarks import Remark
 
 
-def usable_readings(case: Case, table: Table) -> Readings:
+def usable_readings(case: Case, table: Table, *, drifts: bool = True) -> Readings:
     """The readings that an identification of a case uses of a table.
+
+    drifts: Read what follows from the order of the rows, where it is known, though no effect of the
+        case uses it: for drifts among the explanations.
 
     A channel whose noise is not declared is excluded if that of another one is; if none is, all
     are used and their noise is to be estimated. Rows whose status is not ok are excluded. A
     standard deviation of zero, which a relative noise has at a reading of zero, is replaced by the
-    median of the others. What follows from the order of the rows is read where it is known, so that
-    drifts can be explanations of rows whose case has none.
+    median of the others.
 
     Raises `InputError` where no row remains, `TableError` where the table names another wheel than
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
-    table = with_order_columns(case, table, FROM_ORDER)
+    models = (case.model, *case.gears.values())
+    if drifts or any(effect.about.uses for model in models for effect in model.effects):
+        table = with_order_columns(case, table, FROM_ORDER if drifts else None)
     table, excluded = answered_rows(with_rover_columns(case, table))
     check_wheel_size(case, table)
     if isinstance(case.model.gear, EmulatedGear):

@@ -121,7 +121,8 @@ def identify(
             f"{MOST_ROWS}: take nonlinear, or fit each run by itself"
         )
     learned, case = case.remainder, case.without_remainder_of(table)
-    readings, selected = usable_readings(case, table), select_free(case, free)
+    readings = usable_readings(case, table, drifts=METHODS[method] is averaged)
+    selected = select_free(case, free)
     if method not in CLOSED_FORM and len(readings.row_slip) > condensing.MOST_ROWS:
         readings = condensing.condensed(case, readings, selected)
     fit = METHODS[method](case, readings, selected)

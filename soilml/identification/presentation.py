@@ -11,8 +11,8 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
+from soilml.identification.averaged import stated_explanations
 from soilml.identification.fit import Fit
-from soilml.identification.stated_explanations import stated_explanations
 from soilml.io.text_tables import format_table
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
@@ -193,9 +193,10 @@ def _fit_text(found: Fit) -> str:
     first = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
     if len(unknown) == len(found.names):
         first = f"nothing is determined by these rows\n\n{first}"
-    shown = stated_explanations(found.explanations)[:_MOST_EXPLANATIONS]
-    parts = [f"{one} ({one.probability:.0%})" for one in shown]
-    by = f"\nexplained by: {', '.join(parts)}" if parts else ""
+    by = ""
+    if found.explanations:
+        shown = stated_explanations(found.explanations)[:_MOST_EXPLANATIONS]
+        by = f"\nexplained by: {', '.join(f'{one} ({one.probability:.0%})' for one in shown)}"
     if found.use_of_shares is not None:
         by += f"\n{found.use_of_shares}"
     warnings = "".join(f"\n! {text}" for text in found.warnings)

@@ -21,7 +21,7 @@ from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.averaged import AveragedSamples
+from soilml.identification.averaged import AveragedSamples, stated_explanations
 from soilml.identification.averaged_fit import beyond_all_explanations, soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
@@ -31,7 +31,6 @@ from soilml.identification.model_error_inputs import (
     with_stated_model_error,
 )
 from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
-from soilml.identification.stated_explanations import stated_explanations
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights

@@ -14,7 +14,7 @@ from soilml.experiment_design.advice_after_results import advice_after_fit
 from soilml.experiment_design.presentation import abstention_message, next_row_remarks, row_message
 from soilml.fitting.coordinates import select_free
 from soilml.identification import Fit, identify
-from soilml.identification.stated_explanations import stated_explanations
+from soilml.identification.averaged import stated_explanations
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_remarks

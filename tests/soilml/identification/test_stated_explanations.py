@@ -7,10 +7,9 @@ import pytest
 
 from soilml import read_case, simulate
 from soilml.fitting.coordinates import select_free
-from soilml.identification.averaged import AveragedSamples
+from soilml.identification.averaged import AveragedSamples, stated_explanations
 from soilml.identification.fit import Fit, SoilExplanation
 from soilml.identification.presentation import Identification
-from soilml.identification.stated_explanations import stated_explanations
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.traction import soil_draws
 
