@@ -231,11 +231,6 @@ class StatedExplanation:
     error_scales: tuple[float, ...]
     probability: float
 
-    @property
-    def exact(self) -> bool:
-        """Whether it takes model and sensors to be exactly as in the file."""
-        return not self.effect and self.error_scales == (0.0,)
-
     def __str__(self) -> str:
         """What it says, in words."""
         low, high = self.error_scales[0], self.error_scales[-1]

@@ -37,7 +37,7 @@ BOUND_TOLERANCE = 1e-3
 #: Codes of the remarks by which rows speak against the model taken as exact.
 AGAINST_EXACT = ("excess-residuals", "unlikely")
 #: Probability of typical errors above which it is said that the shares do not test effects.
-MOST = 0.5
+MAJORITY = 0.5
 
 
 @dataclass(frozen=True)
@@ -216,7 +216,7 @@ class Fit:
     def use_of_shares(self) -> Remark | None:
         """What the shares of `explanations` are not, where those of typical errors are most."""
         errors = [one for one in self.explanations if not (one.effect or one.exact)]
-        if sum(one.probability for one in errors) <= MOST:
+        if sum(one.probability for one in errors) <= MAJORITY:
             return None
         text = (
             "these shares weigh what the intervals include and are no test for a missing effect: "

@@ -14,6 +14,7 @@ from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.opened_priors import open_priors
 from soilml.gap.search.passes import (
     Analysis,
+    Begun,
     begin,
     declared_covariance,
     of_readings,
@@ -70,29 +71,8 @@ def analyse(
         opened = open_priors(found.problem, found.result)
         if opened is not None:
             start = replace(problem, case=opened.case, soil=opened.soil)
-            kept = start if found.excluded is None else of_readings(start, ~found.excluded)
-            # if no effect explains far more here, sets of several seldom do; and none explains
-            # more than one alone that leaves nothing
-            rival = _rival(found)
-            complete = len(rival.names) == 1 and is_complete(
-                found.problem, rival, found.result, seed
-            )
-            singles = len(opened.soil) > len(problem.soil)
-            begun = begin(
-                kept,
-                seed,
-                place,
-                found.result,
-                likeliest=not complete,
-                singles=singles and not complete,
-            )
+            begun = _begun_beyond(found, start, seed, place)
             other, _ = begun
-            near = any(explains_better(found, other, c, NEARLY) for c in other.result.candidates)
-            if near and not singles and not complete:
-                known = (*found.result.candidates, *other.result.candidates)
-                looked = replace(other.result, candidates=known)
-                begun = begin(kept, seed, place, looked, likeliest=True)
-                other, _ = begun
             better = any(explains_better(found, other, c) for c in other.result.candidates)
             if better or not other.result.has_gap:
                 other = without_outliers(start, seed, place, progress, found, begun)
@@ -107,6 +87,32 @@ def analyse(
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
                 found = _explained_by_soil(replace(found, opened=remark), seed)
     return found
+
+
+def _begun_beyond(
+    found: Analysis, start: FitProblem, seed: int, place: Callable[[int], str]
+) -> Begun:
+    """A first look with opened priors, which tells whether they can count.
+
+    If no effect explains far more in it, sets of several seldom do. None explains more than one
+    alone that leaves nothing within the priors; then the soil alone is tested. Where the parameters
+    that are fitted stay the same, single effects are fitted only if one of the likeliest sets
+    nearly counts.
+
+    start: The problem of all readings, with opened priors.
+    """
+    kept = start if found.excluded is None else of_readings(start, ~found.excluded)
+    rival = _rival(found)
+    if len(rival.names) == 1 and is_complete(found.problem, rival, found.result, seed):
+        return begin(kept, seed, place, found.result, singles=False)
+    if len(start.soil) > len(found.problem.soil):
+        return begin(kept, seed, place, found.result, likeliest=True)
+    begun = begin(kept, seed, place, found.result, likeliest=True, singles=False)
+    first = begun[0].result
+    if not any(explains_better(found, begun[0], c, NEARLY) for c in first.candidates):
+        return begun
+    both = replace(first, candidates=(*found.result.candidates, *first.candidates))
+    return begin(kept, seed, place, both, likeliest=True)
 
 
 def _agrees(found: Analysis) -> bool:

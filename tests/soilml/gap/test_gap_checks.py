@@ -180,3 +180,15 @@ def test_undeclared_noise_is_estimated_from_repeated_rows():
     assert found["sinkage"] == pytest.approx(2e-4, rel=0.2)
     assert "noise of sinkage_m is not declared" in notes[0].text
     assert check(table, QUIET).errors == ()
+
+
+def test_the_report_on_bad_data_says_what_was_left_out_and_counts_only_what_prevents_it():
+    whole = case_of()
+    case = replace(whole, noise={"torque_Nm": whole.noise["torque_Nm"]})
+    table = driven(whole, loads=(60.0,), slips=6)
+    report = gap(case, table)
+    assert [reason.code for reason in report.reasons] == ["few-readings"]
+    assert report.sentence == report.reasons[0].text
+    unused = [note.about for note in report.notes if note.code == "unused-channel"]
+    assert sorted(unused) == [("drawbar_pull_N",), ("sinkage_m",)]
+    assert {"one-run", "one-load"} <= {note.code for note in report.notes}

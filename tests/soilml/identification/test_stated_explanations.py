@@ -36,7 +36,6 @@ def test_shares_are_summed_over_the_sizes_of_errors_the_likeliest_first():
         "the model as in its file",
     ]
     assert [one.probability for one in stated] == pytest.approx([0.4, 0.3, 0.25, 0.05])
-    assert [one.exact for one in stated] == [False, False, False, True]
     assert "explained by: typical errors x 1 to 2 (40%), " in Identification(fit_of(*FOUND)).text()
 
 
