@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
-from soilml.fitting.misfit import misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.problem import FitProblem
 from soilml.gap.search.explanation import Explanation
@@ -82,7 +81,7 @@ def analyse(
                 if likeliest is not None and explains_better(found, other, likeliest):
                     within = found.result.soil
                     found = replace(other, opened=opened.remark, within_priors=within)
-            elif not (other.error or other.outliers or other.result.has_gap) and _agrees(other):
+            elif not (other.error or other.outliers or other.result.has_gap):
                 text = f"{opened.remark}. The soil alone then agrees with the rows"
                 remark = replace(opened.remark, code=OUTSIDE_PRIORS, text=text)
                 found = _explained_by_soil(replace(found, opened=remark), seed)
@@ -113,15 +112,6 @@ def _begun_beyond(
         return begun
     both = replace(first, candidates=(*found.result.candidates, *first.candidates))
     return begin(kept, seed, place, both, likeliest=True)
-
-
-def _agrees(found: Analysis) -> bool:
-    """Whether noise and scatter account for what the soil alone leaves, smooth or not.
-
-    Few readings do not reject a soil at ends of its priors by what of the residuals is smooth.
-    """
-    left = max(len(found.problem.readings) - len(found.problem.soil), 1)
-    return found.result.soil.cost / left <= misfit_limit(left)
 
 
 def _explained_by_soil(found: Analysis, seed: int) -> Analysis:

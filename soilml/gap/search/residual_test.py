@@ -41,7 +41,8 @@ def residual_test(
 
     All that the coordinates of the fit can explain is projected out, with second-order terms in
     the laws of its effects; see `soilml.gap.search.explanation.shape_directions`. What another
-    soil could explain is, with tests of the soil, what these permit.
+    soil could explain is what its priors and tests of the soil permit: few readings determine some
+    changes of it so badly that a line through the fit would explain all by a soil far away.
 
     within_priors: Do not project out coordinates of the soil that the fit presses against a bound:
         a soil that the priors exclude explains nothing.
@@ -54,8 +55,11 @@ def residual_test(
     directions = [whiten @ columns for columns in shape_directions(problem, fit)]
     jacobian = within_bounds(fit) if within_priors else fit.jacobian
     space = np.column_stack([jacobian, *directions])
-    # tests of the soil are residuals that no effect changes: a change of the soil costs something
-    deviation, rates = fit.soil_tests.deviation(fit.x), fit.soil_tests.rates(fit.x)
+    # priors and tests of the soil are residuals that no effect changes: a change of the soil costs
+    # something; one over a whole prior counts as much as a standard deviation of the noise
+    priors = np.diag([0.0 if c.effect else 1.0 for c in fit.coordinates])
+    deviation = np.append(fit.soil_tests.deviation(fit.x), np.zeros(len(fit.x)))
+    rates = np.vstack([fit.soil_tests.rates(fit.x), priors])
     tests, k = len(deviation), len(fit.x)
     columns = np.vstack([columns, np.zeros((tests, columns.shape[1]))])
     space = np.vstack([space, np.hstack([rates, np.zeros((tests, space.shape[1] - k))])])

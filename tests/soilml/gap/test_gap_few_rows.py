@@ -107,6 +107,28 @@ def test_a_gap_that_only_a_soil_beyond_its_priors_would_explain_is_a_gap():
     assert free > 0.5 and held < 0.001
 
 
+@pytest.mark.parametrize("sigma, explained", [(0.1, False), (30.0, True)])
+def test_a_soil_far_beyond_its_priors_explains_nothing(sigma, explained):
+    """One parameter changes the readings like an effect, by so many sigma over its whole prior.
+
+    The effect is one of ten. As in published tests of few slips, that bend a soil of five
+    parameters along a line which no soil within its priors follows.
+    """
+    case = case_of()
+    problem = fit_problem(case, driven(case))
+    fit = problem.fit_soil([np.full(3, 0.5)])
+    signatures = problem.signatures_beside(fit)
+    effect = next(s for s in signatures if s.name == "slip-sinkage").column
+    effect = effect / np.linalg.norm(problem.covariance.whiten @ effect)
+    derivatives = fit.derivatives.copy()
+    derivatives[:, 0] = sigma * effect
+    rows = replace(fit.problem.readings, measured=fit.prediction + 10.0 * effect)
+    line = replace(fit.linearisation, jacobian=derivatives)
+    bent = replace(fit, linearisation=line, problem=replace(fit.problem, readings=rows))
+    p = residual_test(problem, bent, signatures, 0, within_priors=True).p_value
+    assert p > 0.5 if explained else p < 0.001
+
+
 @pytest.mark.parametrize("tier, cause, size", [("A", "slip-sinkage", 1.0), ("N0", "", 0.0)])
 def test_torque_and_sinkage_of_few_rows_show_slip_sinkage_and_else_nothing(tier, cause, size):
     drawn = draw_blind_set(Plan(tier, cause, size, 0.02, 1, "loam", 5, 7400016, 0.0, "few-rows"))
