@@ -118,7 +118,10 @@ def begin(
     problem = with_estimated_covariance(problem, best, ())
     soil = problem.fit_soil([soil.x], soil.linearisation)
     sets = likeliest_sets(starts) if likeliest else ()
-    result = first_look(problem, soil, seed, starts, sets, singles=singles)
+    vain = frozenset[str]()
+    if earlier is not None and tuple(earlier.soil.coordinates) == problem.soil:
+        vain = frozenset(earlier.vain)
+    result = first_look(problem, soil, seed, starts, sets, singles=singles, vain=vain)
     return Analysis(problem, result), starts
 
 
@@ -159,7 +162,7 @@ def _looked_again(problem: FitProblem, result: SearchResult, seed: int) -> Begun
     """A first look with another covariance, from the explanations of a search."""
     soil = problem.fit_soil([result.soil.x], result.soil.linearisation)
     starts = {c.names: c for c in result.candidates}
-    return Analysis(problem, first_look(problem, soil, seed, starts)), starts
+    return Analysis(problem, first_look(problem, soil, seed, starts, vain=result.vain)), starts
 
 
 def _search_again(

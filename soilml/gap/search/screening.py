@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
@@ -99,6 +99,9 @@ LARGE_DISCREPANCY = 2.5
 #: effects fitted again in a further search.
 WITHIN_REACH = 15.0
 
+#: Decrease of the objective, but for the penalty of an effect, below which it explains nothing.
+LEAST_GAIN = 1.0
+
 #: Candidates of an earlier search, by effect names, whose optima are starts of this one.
 Starts = Mapping[tuple[str, ...], Explanation]
 
@@ -110,15 +113,18 @@ def effects_to_fit(
     signatures: Sequence[Signature],
     gains: Mapping[str, float],
     starts: Starts,
+    vain: Set[str] = frozenset(),
 ) -> list[str]:
     """Names of the effects that are fitted in full, each alone.
 
     A prediction from the soil alone is linear, while the soil has adapted to what is missing and
     the law of the cause may be another one. Several predictions are therefore made, and the best of
     each are selected, together with those that were within reach of the best in an earlier search.
+    One that was fitted in `vain` then, and should not gain now, is left out, but for the first.
 
     soil_alone, soil: The soil alone, beside a discrepancy and under noise alone.
     gains: Predicted decrease of the objective by each effect.
+    vain: Effects that explained nothing in an earlier search of the same soil.
     """
     selected = _largest_gains(gains)
     ranked = [
@@ -133,7 +139,17 @@ def effects_to_fit(
     single = [c for names, c in starts.items() if len(names) == 1]
     ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])
     names = dict.fromkeys([*selected, *(name for own in ranked for name in own)])
-    return [name for name in names if name in gains]
+    in_vain = {n for n in vain if gains.get(n, 0.0) + problem.penalties[n] < LEAST_GAIN}
+    in_vain -= set(selected[:1])
+    return [name for name in names if name in gains and name not in in_vain]
+
+
+def explained_nothing(problem: FitProblem, fitted: Starts) -> set[str]:
+    """The single effects that were fitted beside the soil and changed nothing."""
+    alone = fitted[()].objective
+    single = [c for names, c in fitted.items() if len(names) == 1]
+    names = {c.names[0]: alone - c.objective for c in single}
+    return {n for n, gain in names.items() if gain + problem.penalties[n] < LEAST_GAIN}
 
 
 FIRST_CANDIDATES = 4  # Candidates of an earlier search that a first look takes

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,6 +28,7 @@ from soilml.gap.search.screening import (
     WITHIN_REACH,
     Starts,
     effects_to_fit,
+    explained_nothing,
     predicted_gains,
     predicted_with_and_without,
 )
@@ -75,6 +76,8 @@ class SearchResult:
     posterior: Posterior
     #: why these runs cannot test an effect, by its name
     untestable: Mapping[str, Remark] = field(default_factory=dict)
+    #: single effects that explained nothing where they were last fitted
+    vain: Set[str] = frozenset()
 
     @property
     def has_gap(self) -> bool:
@@ -172,11 +175,13 @@ def first_look(
     sets: Sequence[tuple[str, ...]] = (),
     *,
     singles: bool = True,
+    vain: Set[str] = frozenset(),
 ) -> SearchResult:
     """The test for a gap, and where there is one the explanations by single effects.
 
     sets: Other sets that are fitted too.
     singles: Fit single effects. With neither these nor sets, it is the test alone.
+    vain: Those that explained nothing in an earlier search of the same soil; see `effects_to_fit`.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
@@ -185,14 +190,17 @@ def first_look(
         return found
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
-    likely = effects_to_fit(problem, soil_alone, soil, signatures, gains=gains, starts=starts)
+    likely = effects_to_fit(
+        problem, soil_alone, soil, signatures, gains=gains, starts=starts, vain=vain
+    )
     selected = dict.fromkeys([*sets, *((name,) for name in likely if singles)], soil_alone)
     level = _fit_level(problem, soil, soil_alone, selected, starts)
     again = _from_soils_of(problem, soil_alone, level)
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
     fitted = {c.names: c for c in [again, *level]}
-    return _concluded(problem, replace(found, predicted_gain=gains), fitted, seed)
+    vain = explained_nothing(problem, fitted) | {n for n in vain if (n,) not in fitted}
+    return _concluded(problem, replace(found, predicted_gain=gains, vain=vain), fitted, seed)
 
 
 def _concluded(
