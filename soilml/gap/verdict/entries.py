@@ -32,7 +32,12 @@ from soilml.gap.search.posterior import REJECTION_THRESHOLD, Posterior
 from soilml.gap.search.prediction import PredictiveGain, predictive_gains
 from soilml.gap.verdict.decision import implausible_sizes
 from soilml.gap.verdict.estimates import effect_estimates
-from soilml.gap.verdict.fit_notes import bound_notes, large_noise_notes, size_notes
+from soilml.gap.verdict.fit_notes import (
+    beyond_priors_notes,
+    bound_notes,
+    large_noise_notes,
+    size_notes,
+)
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
@@ -249,6 +254,8 @@ def analysis_notes(
         )
         for text in far
     ]
+    if analysis.within_priors is not None:
+        notes += beyond_priors_notes(analysis.within_priors.case.prior, written)
     notes += bound_notes(written.coordinates, written.x.tolist())
     notes += dict.fromkeys(n for fit in listed for n in size_notes(fit.coordinates, fit.x.tolist()))
     for name, scale in zip(readings.channels, components.noise_scale, strict=True):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE
 from soilml.gap.evidence.problem import AT_BOUND, FitProblem
 from soilml.gap.evidence.repeats import SIGNIFICANCE, chi_square_tail
+from soilml.numerics.prior import Prior
 from soilml.numerics.subspaces import ROUNDING, column_space
 from soilml.quantities import column
 from soilml.remarks import Remark
@@ -40,6 +41,22 @@ def bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[R
                 Remark("at-bound", f"{c.path} {of_model} is at its upper bound", (c.path,))
             )
     return notes
+
+
+def beyond_priors_notes(given: Mapping[str, Prior], fit: Solution) -> list[Remark]:
+    """A note on a soil in model.toml that the given priors, by path, exclude."""
+    values, beyond = fit.values(), {}
+    for c in fit.coordinates:
+        value, prior = values[c.path], given.get(c.path)
+        if c.effect or (prior is not None and prior.lower <= value <= prior.upper):
+            continue
+        where = f"given as {format_quantity(c.nominal, c.unit)}"
+        if prior is not None:
+            ends = (format_quantity(end, c.unit) for end in (prior.lower, prior.upper))
+            where = f"prior {' to '.join(ends)}"
+        beyond[c.path] = f"{c.name.replace('_', ' ')} {format_quantity(value, c.unit)} ({where})"
+    text = f"the soil in model.toml is outside the given priors: {', '.join(beyond.values())}"
+    return [Remark("beyond-priors", text, tuple(beyond))] if beyond else []
 
 
 def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:

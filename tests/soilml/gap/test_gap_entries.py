@@ -28,7 +28,7 @@ from soilml.gap.verdict.entries import (
     suspects,
     variance_component_entries,
 )
-from soilml.gap.verdict.fit_notes import bound_notes
+from soilml.gap.verdict.fit_notes import beyond_priors_notes, bound_notes
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import ShearStrength
 from soilml.remarks import Remark, texts
@@ -66,7 +66,8 @@ def analysed(*candidates, accepted=(), runs=("a", "b"), weights=None, outliers=(
         posterior=Posterior(weights or {}),
         has_gap=False,
     )
-    return SimpleNamespace(problem=problem, result=result, outliers=outliers, predictions={})
+    given = {"outliers": outliers, "predictions": {}, "within_priors": None}
+    return SimpleNamespace(problem=problem, result=result, **given)
 
 
 def test_the_soil_beside_a_discrepancy_stays_where_noise_put_it_under_the_largest():
@@ -216,6 +217,24 @@ def test_a_gap_lies_partly_in_a_test_of_the_soil_that_disagrees(monkeypatch):
     assert not any("plate" in note for note in notes(given))
     given.result.has_gap = True
     assert any("plate 3 sigma off; part of the gap" in note for note in notes(given))
+
+
+def test_a_soil_outside_the_given_priors():
+    soil = {
+        "inside": Coordinate("cohesion", "Pa", Prior(0.0, 9000.0)),
+        "beyond": Coordinate("friction_angle", "rad", Prior(0.2, 0.9)),
+        "fixed": Coordinate("n", "1", Prior(0.5, 1.5), nominal=1.0),
+        "effect": Coordinate("slip-sinkage.n1", "1", Prior(0.0, 1.0)),
+    }
+    values = dict(zip((c.path for c in soil.values()), (900.0, 0.3, 1.2, 0.4), strict=True))
+    fit = SimpleNamespace(coordinates=list(soil.values()), values=lambda: values)
+    given = {"cohesion": Prior(0.0, 1000.0), "friction_angle": Prior(0.5, 0.7)}
+    (note,) = beyond_priors_notes(given, fit)
+    assert note.about == ("friction_angle", "n")
+    assert note.text.endswith("friction angle 17.2° (prior 28.6° to 40.1°), n 1.20 (given as 1.00)")
+    values |= {"friction_angle": 0.5}
+    assert [note.about for note in beyond_priors_notes(given, fit)] == [("n",)]
+    assert beyond_priors_notes(given | {"n": Prior(1.0, 1.2)}, fit) == []
 
 
 def test_estimates_at_a_bound():
