@@ -226,17 +226,29 @@ def explained_space(problem: FitProblem, fit: Solution, signatures: Sequence[Sig
 def with_noise_of_fit(
     problem: FitProblem, fit: Solution, residual: Floats, space: Floats
 ) -> tuple[Readings, Floats]:
-    """The readings with their noise at a fit, and their changes from run to run, (m, 2).
+    """The readings with their noise at a fit, and their changes from run to run, (m, 2)."""
+    case, readings = fit.fitted(), problem.readings
+    columns, operation = run_effect_columns(case, readings), noise_of_operation(case, readings)
+    return with_noise_at(readings, fit.prediction, residual, space, columns, operation), columns
+
+
+def with_noise_at(
+    readings: Readings,
+    prediction: Floats,
+    residual: Floats,
+    space: Floats,
+    columns: Floats,
+    operation: Floats,
+) -> Readings:
+    """The readings with their noise at a prediction (m,), and that of slip and load (m,).
 
     Noise that is a fraction of the reading is evaluated at a smoothed prediction.
     """
-    case, readings = fit.fitted(), problem.readings
-    columns = run_effect_columns(case, readings)
     several_runs = len(readings.runs) > 1
     typical = VarianceComponents.usual(readings)
     smoothing = assemble_covariance(readings, columns if several_runs else 0.0 * columns, typical)
-    readings = readings.with_noise_at(fit.prediction + _gls_prediction(smoothing, residual, space))
-    return readings.with_noise_of_operation(noise_of_operation(case, readings)), columns
+    readings = readings.with_noise_at(prediction + _gls_prediction(smoothing, residual, space))
+    return readings.with_noise_of_operation(operation)
 
 
 def _gls_prediction(covariance: Covariance, residual: Floats, space: Floats) -> Floats:

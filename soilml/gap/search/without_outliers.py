@@ -9,11 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
+from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import VarianceComponents, assemble_covariance
+from soilml.gap.evidence.covariance import (
+    VarianceComponents,
+    assemble_covariance,
+    run_effect_columns,
+)
 from soilml.gap.evidence.directions import smooth_basis_of_few
 from soilml.gap.evidence.outliers import (
     MAX_OUTLIER_FRACTION,
@@ -39,7 +44,7 @@ from soilml.gap.search.passes import (
     of_readings,
     search_in_passes,
     with_estimated_covariance,
-    with_noise_of_fit,
+    with_noise_at,
 )
 from soilml.gap.search.screening import Starts
 from soilml.gap.search.stepwise import SearchResult, search
@@ -156,19 +161,20 @@ def _settled(
     fit, amplitude = result.best, problem.declared_amplitude
     if result.accepted:
         amplitude = result.accepted[0].amplitude
+    signatures = problem.signatures_beside(*restated(problem, [fit]))  # they hardly change
     for _ in range(SETTLING_FITS):
         if not excluded.any() or _are_many(excluded):
             break
         own = of_readings(problem, ~excluded)
         (fit,) = restated(own, [fit])
-        own = with_estimated_covariance(own, fit, ())
+        own = with_estimated_covariance(own, fit, _of_some(signatures, ~excluded))
         whiten = own.discrepancy.whiten(amplitude)
         start = StartedFit(fit.case, fit.coordinates, fit.start_values(), whiten, fit.linearisation)
         (found,) = fit_many(own, [start])
         if isinstance(found, InputError):
             break
         fit = found
-        again, cleared = _outliers_of(problem, own, fit, (), excluded, cleared)
+        again, cleared = _outliers_of(problem, own, fit, signatures, excluded, cleared)
         if np.array_equal(again, excluded):
             break
         excluded = again
@@ -195,27 +201,19 @@ def _outliers_of(
     if excluded.any():
         far[excluded] = _far_from(own, fit, problem.readings.subset(excluded))
         (fit,) = restated(problem, [fit])
-        signatures = problem.signatures_beside(fit)
-    found = _stray_among(problem, fit, signatures, ~excluded) | far
+    stray = _strays_from(problem, fit, signatures)
+    found = stray(~excluded) | far
     for i in np.flatnonzero(excluded & ~far):
         others = ~excluded
         others[i] = True
-        found[i] = _stray_among(problem, fit, signatures, others)[i]
+        found[i] = stray(others)[i]
     found &= ~cleared
     return found, cleared | (excluded & ~found)
 
 
-def _stray_among(
-    problem: FitProblem, fit: Solution, signatures: Sequence[Signature], kept: NDArray[np.bool_]
-) -> NDArray[np.bool_]:
-    """The readings (m,), of those that are kept, that stray from a fit beside the others kept."""
-    if not kept.all():
-        problem = of_readings(problem, kept)
-        (fit,) = restated(problem, [fit])
-        signatures = [replace(s, column=s.column[kept]) for s in signatures]
-    found = np.zeros(len(kept), dtype=np.bool_)
-    found[kept] = _stray(problem, fit, signatures)
-    return found
+def _of_some(signatures: Sequence[Signature], kept: NDArray[np.bool_]) -> list[Signature]:
+    """The signatures at some of the readings."""
+    return [replace(s, column=s.column[kept]) for s in signatures]
 
 
 def _are_many(outliers: NDArray[np.bool_]) -> bool:
@@ -223,24 +221,35 @@ def _are_many(outliers: NDArray[np.bool_]) -> bool:
     return int(np.count_nonzero(outliers)) > MAX_OUTLIER_FRACTION * len(outliers)
 
 
-def _stray(
+def _strays_from(
     problem: FitProblem, fit: Solution, signatures: Sequence[Signature]
-) -> NDArray[np.bool_]:
-    """The readings (m,) that stray from a fit, from what resembles it, and from smooth functions.
+) -> Callable[[NDArray[np.bool_]], NDArray[np.bool_]]:
+    """Which readings (m,), of those that are kept, stray from a fit beside the others kept (m,).
 
-    In channels with few readings they stray from both the few smooth functions of a test and the
-    larger number that separates rough from smooth. The last reading of a monotone series is none.
+    They stray from what resembles it and from smooth functions too. In channels with few readings
+    they stray from both the few smooth functions of a test and the larger number that separates
+    rough from smooth. The last reading of a monotone series is none.
     """
+    case, every = fit.fitted(), problem.readings
     space = explained_space(problem, fit, signatures)
-    residual = problem.readings.measured - fit.prediction
-    readings, columns = with_noise_of_fit(problem, fit, residual, space)
-    covariance = assemble_covariance(readings, columns, VarianceComponents.usual(readings))
-    replicates = readings.replicates * len(readings.channels) + readings.channel
-    run, smooth = readings.run[readings.row], smooth_basis_of_few(readings)
-    found = outliers(covariance, residual, space, replicates, run)
-    if smooth.shape[1]:
-        found &= outliers(covariance, residual, space, replicates, run, smooth)
-    return found & ~ends_of_monotone_series(readings)
+    of_runs, operation = run_effect_columns(case, every), noise_of_operation(case, every)
+
+    def stray(kept: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        own, columns, explained = every.subset(kept), of_runs[kept], space[kept]
+        prediction = fit.prediction[kept]
+        residual = own.measured - prediction
+        own = with_noise_at(own, prediction, residual, explained, columns, operation[kept])
+        covariance = assemble_covariance(own, columns, VarianceComponents.usual(own))
+        replicates = own.replicates * len(own.channels) + own.channel
+        run, smooth = own.run[own.row], smooth_basis_of_few(own)
+        found = outliers(covariance, residual, explained, replicates, run)
+        if smooth.shape[1]:
+            found &= outliers(covariance, residual, explained, replicates, run, smooth)
+        among = np.zeros(len(kept), dtype=np.bool_)
+        among[kept] = found & ~ends_of_monotone_series(own)
+        return among
+
+    return stray
 
 
 def _far_from(problem: FitProblem, fit: Solution, readings: Readings) -> NDArray[np.bool_]:

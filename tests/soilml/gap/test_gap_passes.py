@@ -283,7 +283,7 @@ def test_the_covariance_is_estimated_from_what_a_fit_leaves():
     problem = fit_problem(case, table)
     soil = problem.fit_soil([np.full(3, 0.5)])
     small = replace(problem, effects={"slip-sinkage": problem.effects["slip-sinkage"]})
-    stray = rounds._stray(small, soil, ())
+    stray = rounds._strays_from(small, soil, ())(np.ones(96, dtype=np.bool_))
     assert np.flatnonzero(stray).tolist() == [
         int(i)
         for i in np.flatnonzero(problem.readings.channel == 0)
@@ -338,7 +338,8 @@ def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
     none, largest = np.zeros(96, dtype=np.bool_), wrong & (problem.readings.row == 20)
     all_of_them = problem.fit_soil([np.full(3, 0.5)])
     # a lesser one strays too, but less than half as far
-    assert np.array_equal(rounds._stray(problem, all_of_them, ()), largest)
+    stray = rounds._strays_from(problem, all_of_them, ())(~none)
+    assert np.array_equal(stray, largest)
     found, cleared, last = rounds._settled(problem, by_soil(all_of_them), largest, none)
     assert np.array_equal(found, wrong) and not cleared.any()
     assert len(last.prediction) == 94
