@@ -118,10 +118,12 @@ def begin(
     problem = with_estimated_covariance(problem, best, ())
     soil = problem.fit_soil([soil.x], soil.linearisation)
     sets = likeliest_sets(starts) if likeliest else ()
-    vain = frozenset[str]()
+    without_gain = frozenset[str]()
     if earlier is not None and tuple(earlier.soil.coordinates) == problem.soil:
-        vain = frozenset(earlier.vain)
-    result = first_look(problem, soil, seed, starts, sets, singles=singles, vain=vain)
+        without_gain = frozenset(earlier.without_gain)
+    result = first_look(
+        problem, soil, seed, starts, sets, singles=singles, without_gain=without_gain
+    )
     return Analysis(problem, result), starts
 
 
@@ -162,7 +164,9 @@ def _looked_again(problem: FitProblem, result: SearchResult, seed: int) -> Begun
     """A first look with another covariance, from the explanations of a search."""
     soil = problem.fit_soil([result.soil.x], result.soil.linearisation)
     starts = {c.names: c for c in result.candidates}
-    return Analysis(problem, first_look(problem, soil, seed, starts, vain=result.vain)), starts
+    return Analysis(
+        problem, first_look(problem, soil, seed, starts, without_gain=result.without_gain)
+    ), starts
 
 
 def _search_again(
@@ -229,10 +233,11 @@ def with_noise_of_fit(
     """The readings with their noise at a fit, and their changes from run to run, (m, 2)."""
     case, readings = fit.fitted(), problem.readings
     columns, operation = run_effect_columns(case, readings), noise_of_operation(case, readings)
-    return with_noise_at(readings, fit.prediction, residual, space, columns, operation), columns
+    noisy = with_smoothed_noise(readings, fit.prediction, residual, space, columns, operation)
+    return noisy, columns
 
 
-def with_noise_at(
+def with_smoothed_noise(
     readings: Readings,
     prediction: Floats,
     residual: Floats,
@@ -240,9 +245,13 @@ def with_noise_at(
     columns: Floats,
     operation: Floats,
 ) -> Readings:
-    """The readings with their noise at a prediction (m,), and that of slip and load (m,).
+    """The readings with their noise at a smoothed prediction (m,), and that of slip and load (m,).
 
-    Noise that is a fraction of the reading is evaluated at a smoothed prediction.
+    The prediction is smoothed by the part of the residuals that lies in the space (m, q). Noise
+    that is a fraction of the reading is that fraction of it.
+
+    columns (m, 2): Changes from run to run.
+    operation (m,): Noise by that of slip and load.
     """
     several_runs = len(readings.runs) > 1
     typical = VarianceComponents.usual(readings)

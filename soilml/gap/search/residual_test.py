@@ -60,9 +60,9 @@ def residual_test(
     priors = np.diag([0.0 if c.effect else 1.0 for c in fit.coordinates])
     deviation = np.append(fit.soil_tests.deviation(fit.x), np.zeros(len(fit.x)))
     rates = np.vstack([fit.soil_tests.rates(fit.x), priors])
-    tests, k = len(deviation), len(fit.x)
-    columns = np.vstack([columns, np.zeros((tests, columns.shape[1]))])
-    space = np.vstack([space, np.hstack([rates, np.zeros((tests, space.shape[1] - k))])])
+    terms, k = len(deviation), len(fit.x)
+    columns = np.vstack([columns, np.zeros((terms, columns.shape[1]))])
+    space = np.vstack([space, np.hstack([rates, np.zeros((terms, space.shape[1] - k))])])
     residual = np.append(fit.residual, -deviation)
     test = score_test(
         residual,

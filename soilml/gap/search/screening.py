@@ -113,18 +113,18 @@ def effects_to_fit(
     signatures: Sequence[Signature],
     gains: Mapping[str, float],
     starts: Starts,
-    vain: Set[str] = frozenset(),
+    without_gain: Set[str] = frozenset(),
 ) -> list[str]:
     """Names of the effects that are fitted in full, each alone.
 
     A prediction from the soil alone is linear, while the soil has adapted to what is missing and
     the law of the cause may be another one. Several predictions are therefore made, and the best of
     each are selected, together with those that were within reach of the best in an earlier search.
-    One that was fitted in `vain` then, and should not gain now, is left out, but for the first.
+    One that explained nothing there, and should not gain now, is left out, but for the first.
 
     soil_alone, soil: The soil alone, beside a discrepancy and under noise alone.
     gains: Predicted decrease of the objective by each effect.
-    vain: Effects that explained nothing in an earlier search of the same soil.
+    without_gain: Effects that explained nothing in an earlier search of the same soil.
     """
     selected = _largest_gains(gains)
     ranked = [
@@ -139,17 +139,17 @@ def effects_to_fit(
     single = [c for names, c in starts.items() if len(names) == 1]
     ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])
     names = dict.fromkeys([*selected, *(name for own in ranked for name in own)])
-    in_vain = {n for n in vain if gains.get(n, 0.0) + problem.penalties[n] < LEAST_GAIN}
-    in_vain -= set(selected[:1])
-    return [name for name in names if name in gains and name not in in_vain]
+    left_out = {n for n in without_gain if gains.get(n, 0.0) + problem.penalties[n] < LEAST_GAIN}
+    left_out -= set(selected[:1])
+    return [name for name in names if name in gains and name not in left_out]
 
 
 def explained_nothing(problem: FitProblem, fitted: Starts) -> set[str]:
     """The single effects that were fitted beside the soil and changed nothing."""
     alone = fitted[()].objective
-    single = [c for names, c in fitted.items() if len(names) == 1]
-    names = {c.names[0]: alone - c.objective for c in single}
-    return {n for n, gain in names.items() if gain + problem.penalties[n] < LEAST_GAIN}
+    single = {names[0]: c for names, c in fitted.items() if len(names) == 1}
+    gains = {name: alone - c.objective + problem.penalties[name] for name, c in single.items()}
+    return {name for name, gain in gains.items() if gain < LEAST_GAIN}
 
 
 FIRST_CANDIDATES = 4  # Candidates of an earlier search that a first look takes

@@ -77,7 +77,7 @@ class SearchResult:
     #: why these runs cannot test an effect, by its name
     untestable: Mapping[str, Remark] = field(default_factory=dict)
     #: single effects that explained nothing where they were last fitted
-    vain: Set[str] = frozenset()
+    without_gain: Set[str] = frozenset()
 
     @property
     def has_gap(self) -> bool:
@@ -175,13 +175,13 @@ def first_look(
     sets: Sequence[tuple[str, ...]] = (),
     *,
     singles: bool = True,
-    vain: Set[str] = frozenset(),
+    without_gain: Set[str] = frozenset(),
 ) -> SearchResult:
     """The test for a gap, and where there is one the explanations by single effects.
 
     sets: Other sets that are fitted too.
     singles: Fit single effects. With neither these nor sets, it is the test alone.
-    vain: Those that explained nothing in an earlier search of the same soil; see `effects_to_fit`.
+    without_gain: Those that explained nothing in an earlier search of this soil; they are left out.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
@@ -191,7 +191,7 @@ def first_look(
     soil_alone = _fit_soil_alone(problem, soil, starts)
     gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
     likely = effects_to_fit(
-        problem, soil_alone, soil, signatures, gains=gains, starts=starts, vain=vain
+        problem, soil_alone, soil, signatures, gains=gains, starts=starts, without_gain=without_gain
     )
     selected = dict.fromkeys([*sets, *((name,) for name in likely if singles)], soil_alone)
     level = _fit_level(problem, soil, soil_alone, selected, starts)
@@ -199,8 +199,12 @@ def first_look(
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
     fitted = {c.names: c for c in [again, *level]}
-    vain = explained_nothing(problem, fitted) | {n for n in vain if (n,) not in fitted}
-    return _concluded(problem, replace(found, predicted_gain=gains, vain=vain), fitted, seed)
+    without_gain = explained_nothing(problem, fitted) | {
+        n for n in without_gain if (n,) not in fitted
+    }
+    return _concluded(
+        problem, replace(found, predicted_gain=gains, without_gain=without_gain), fitted, seed
+    )
 
 
 def _concluded(

@@ -44,7 +44,7 @@ from soilml.gap.search.passes import (
     of_readings,
     search_in_passes,
     with_estimated_covariance,
-    with_noise_at,
+    with_smoothed_noise,
 )
 from soilml.gap.search.screening import Starts
 from soilml.gap.search.stepwise import SearchResult, search
@@ -161,7 +161,7 @@ def _settled(
     fit, amplitude = result.best, problem.declared_amplitude
     if result.accepted:
         amplitude = result.accepted[0].amplitude
-    signatures = problem.signatures_beside(*restated(problem, [fit]))  # they hardly change
+    signatures = problem.signatures_beside(*restated(problem, [fit]))  # fits differ little
     for _ in range(SETTLING_FITS):
         if not excluded.any() or _are_many(excluded):
             break
@@ -238,7 +238,7 @@ def _strays_from(
         own, columns, explained = every.subset(kept), of_runs[kept], space[kept]
         prediction = fit.prediction[kept]
         residual = own.measured - prediction
-        own = with_noise_at(own, prediction, residual, explained, columns, operation[kept])
+        own = with_smoothed_noise(own, prediction, residual, explained, columns, operation[kept])
         covariance = assemble_covariance(own, columns, VarianceComponents.usual(own))
         replicates = own.replicates * len(own.channels) + own.channel
         run, smooth = own.run[own.row], smooth_basis_of_few(own)

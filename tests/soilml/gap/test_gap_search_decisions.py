@@ -44,10 +44,10 @@ def screens(monkeypatch):
     return given
 
 
-def selected(gains, amplitude=(0.0, 0.0), starts=None, vain=frozenset()):
+def selected(gains, amplitude=(0.0, 0.0), starts=None, without_gain=frozenset()):
     none = made(amplitude=amplitude)
     problem = SimpleNamespace(penalties=dict.fromkeys(gains, 7.0))
-    return screening.effects_to_fit(problem, none, fit_of(), [], gains, starts or {}, vain)
+    return screening.effects_to_fit(problem, none, fit_of(), [], gains, starts or {}, without_gain)
 
 
 def test_effects_within_12_of_the_largest_gain_are_fitted_at_least_four_at_most_nine(screens):
@@ -64,9 +64,9 @@ def test_an_effect_that_explained_nothing_is_fitted_again_only_where_it_should_g
     fitted = {c.names: c for c in (alone, made("b", objective=56.1), kept, made("a", "b"))}
     problem = SimpleNamespace(penalties={"b": 7.0, "c": 7.0})
     assert screening.explained_nothing(problem, fitted) == {"b"}  # it gains 0.9 of its penalty
-    assert selected({"b": -6.1, "c": -6.0}, starts=fitted, vain={"b"}) == ["c"]
-    assert selected({"b": -5.9, "c": -7.0}, starts=fitted, vain={"b"}) == ["b", "c"]
-    assert selected({"b": -6.3, "c": -6.5}, starts=fitted, vain={"b", "c"}) == ["b"]
+    assert selected({"b": -6.1, "c": -6.0}, starts=fitted, without_gain={"b"}) == ["c"]
+    assert selected({"b": -5.9, "c": -7.0}, starts=fitted, without_gain={"b"}) == ["b", "c"]
+    assert selected({"b": -6.3, "c": -6.5}, starts=fitted, without_gain={"b", "c"}) == ["b"]
 
 
 def test_six_more_are_those_that_explain_most_by_their_own_law(screens):
