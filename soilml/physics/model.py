@@ -218,9 +218,8 @@ def in_chunks_near(
     """The same, solved from an estimate of the sinkage of all rows, if there is one."""
     if estimate is None:
         return in_chunks(load_case, solve)
-    nearest = estimate.nearest
 
     def solve_near(part: LoadCase, log_sinkage: Array, slope: Array) -> Force:
-        return solve(part, SinkageEstimate(log_sinkage, slope, nearest))
+        return solve(part, replace(estimate, log_sinkage=log_sinkage, slope=slope))
 
     return in_chunks(load_case, solve_near, estimate.log_sinkage, estimate.slope)
