@@ -98,30 +98,27 @@ class DampedSteps:
         """Coordinates (..., p), moved to the bounds that they are beyond."""
         return np.clip(x, self.lower, self.upper)
 
-    def promised(self, x: Floats, residual: Floats, jacobian: Floats) -> float:
-        """Decrease of the linearised objective by an undamped step from x (p,) to its bounds.
-
-        It is zero where the bounds hold every coordinate.
-        """
-        normal = self._normal(x, jacobian.T @ jacobian)
-        descent = self._descent(x[None], (residual @ jacobian)[None])
-        (step,) = self._steps(x[None], descent, normal[None], np.full(1, LEAST_DAMPING))
-        return float(2.0 * descent[0] @ step - step @ normal @ step)
-
-    def from_point(self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats) -> Floats:
-        r"""Where damped steps lead from a point x (p,), (b, p).
+    def proposed(
+        self, x: Floats, residual: Floats, jacobian: Floats, damping: Floats
+    ) -> tuple[float, Floats]:
+        r"""What an undamped step from x (p,) promises, and where damped ones lead, (b, p).
 
         .. math:: (J^T J + P + \lambda\, \mathrm{diag}(J^T J + P))\, \Delta u
             = J^T r - P_0 x - T^T z
 
         with the deviations z from soil tests, their derivatives T, the precision P_0 of the priors,
-        and P = P_0 + T^T T. Where a step meets a bound, the others are those that belong to it.
+        and P = P_0 + T^T T. Where a step meets a bound, the others are those that belong to it. The
+        promise is the decrease of the linearised objective, up to the bounds.
 
         residual (m,), jacobian (m, p): Whitened residuals and derivatives of the readings there.
         damping (b,): Factor lambda of each step.
         """
-        points = np.tile(x, (len(damping), 1))
-        return self._moved_by(points, self._descent(points, residual @ jacobian), jacobian, damping)
+        points = np.tile(x, (1 + len(damping), 1))
+        normal = self._normal(points, jacobian.T @ jacobian)
+        descent = self._descent(points, residual @ jacobian)
+        full, *damped = self._steps(points, descent, normal, np.append(LEAST_DAMPING, damping))
+        promised = float(2.0 * descent[0] @ full - full @ normal[0] @ full)
+        return promised, self.within(self.moved(x, np.asarray(damped)))
 
     def corrected(self, last: Solution, x: Floats, residual: Floats, damping: Floats) -> Floats:
         r"""Points x (b, p) that steps led to, corrected by what of the model is not linear.
@@ -136,13 +133,8 @@ class DampedSteps:
         """
         step = np.stack([self._between(last.x, to) for to in x])
         bent = residual - last.residual + step @ last.jacobian.T
-        return self._moved_by(x, bent @ last.jacobian, last.jacobian, damping)
-
-    def _moved_by(self, x: Floats, descent: Floats, jacobian: Floats, damping: Floats) -> Floats:
-        """Where damped steps lead from points (b, p); see `_steps`."""
-        gram = jacobian.T @ jacobian
-        normal = np.stack([self._normal(point, gram) for point in x])
-        return self.within(self.moved(x, self._steps(x, descent, normal, damping)))
+        normal = self._normal(x, last.jacobian.T @ last.jacobian)
+        return self.within(self.moved(x, self._steps(x, bent @ last.jacobian, normal, damping)))
 
     def _descent(self, x: Floats, of_readings: Floats) -> Floats:
         """Half the negative gradient (b, p) at points (b, p), from that of the readings."""
@@ -167,12 +159,15 @@ class DampedSteps:
         return np.where(np.isfinite(multiple), growth, to - x)
 
     def _normal(self, x: Floats, gram: Floats) -> Floats:
-        """Half the curvature of the linearised objective, (p, p), from that of the readings."""
-        normal = gram + np.diag(self.precision)
+        """Half the curvature (b, p, p) of the linearised objective at points (b, p).
+
+        gram (p, p): That of the readings.
+        """
+        normal = np.tile(gram + np.diag(self.precision), (len(x), 1, 1))
         if self.tests.case is not None and self.tests.case.soil_tests:
-            of_tests = self.tests.rates(x)
-            normal += of_tests.T @ of_tests
-        return np.asarray(normal)
+            rates = np.stack([self.tests.rates(one) for one in x])
+            normal += rates.swapaxes(1, 2) @ rates
+        return normal
 
     def _of_tests(self, x: Floats) -> Floats | float:
         """Half the gradient of what the tests of the soil contribute, at points (b, p)."""
@@ -355,7 +350,9 @@ def descent(
     passed: deque[float] = deque(maxlen=tolerance.iterations)  # objectives before iterations
     for _ in range(MAX_ITERATIONS):
         excess = last.objective - len(last.residual)
-        promised = steps.promised(last.x, last.residual, last.jacobian)
+        factors = DAMPING_FACTORS[:1] if trusted else DAMPING_FACTORS
+        dampings = damping * np.asarray(factors)
+        promised, here = steps.proposed(last.x, last.residual, last.jacobian, dampings)
         share = tolerance.share * excess
         given = passed[0] - last.objective if len(passed) == passed.maxlen else np.inf
         least, slow = max(tolerance.enough, share), max(tolerance.creeping, share)
@@ -364,16 +361,14 @@ def descent(
             break
         passed.append(last.objective)
         if trusted:
-            factor = np.asarray([damping * DAMPING_FACTORS[0]])
-            (x,) = steps.from_point(last.x, last.residual, last.jacobian, factor)
-            new = problem.at(x, (yield at(last, x)))
+            new = problem.at(here[0], (yield at(last, here[0])))
             improvement = last.objective - new.objective
             trusted = improvement > KEPT_PROMISE * promised
             if improvement > 0.0:
-                last, damping = new, max(float(factor[0]), MIN_DAMPING)
+                last, damping = new, max(float(dampings[0]), MIN_DAMPING)
                 continue
-        dampings = damping * np.asarray(DAMPING_FACTORS)
-        here = steps.from_point(last.x, last.residual, last.jacobian, dampings)
+            dampings = damping * np.asarray(DAMPING_FACTORS)
+            _, here = steps.proposed(last.x, last.residual, last.jacobian, dampings)
         bent = problem.whitened((yield trials(last, here)))
         back = steps.corrected(last, here, bent, dampings)
         straight = problem.whitened((yield trials(last, back)))

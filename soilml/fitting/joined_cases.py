@@ -80,8 +80,10 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     varied = {path for part in parts for path in part.values}
     first, *others = known.values()
 
+    varying: dict[str, tuple[Parameter, Floats]] = {}
+
     def number(path: str, shown: str, parameter: Parameter) -> Floats:
-        """The checked value of a parameter in all rows, or of shape () where they share it."""
+        """The value of a parameter in all rows, or of shape () where they share it."""
         value = first[path]
         if path not in varied and all(own[path] == value for own in others):
             check_number(shown, parameter, value)
@@ -90,7 +92,7 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
         for part, end in zip(parts, set_ends, strict=True):
             own = known[id(part.case)][path]
             by_set[end - part.sets : end] = part.values.get(path, own)
-        check_number(shown, parameter, by_set)
+        varying[shown] = parameter, by_set
         return np.asarray(by_set[set_of_row])
 
     at = _joined_operating(parts)
@@ -108,8 +110,20 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
             numbers.append(number(name, f"soil {name}", parameter))
         else:
             numbers.append(number(path.removeprefix("effects."), path, parameter))
+    _check_together(varying)
     in_order = iter(numbers)
     return mapped(joined, lambda _: next(in_order))
+
+
+def _check_together(varying: Mapping[str, tuple[Parameter, Floats]]) -> None:
+    """Check values (sets,) of parameters, by the names of messages; see `check_number`."""
+    if not varying:
+        return
+    lower, upper = np.asarray([(own.lower, own.upper) for own, _ in varying.values()]).T[:, :, None]
+    together = np.stack([own for _, own in varying.values()])
+    if not np.all((together >= lower) & (together <= upper)):
+        for shown, (parameter, own) in varying.items():
+            check_number(shown, parameter, own)
 
 
 @cache
