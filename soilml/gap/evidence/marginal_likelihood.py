@@ -161,12 +161,11 @@ class DiscrepancyModel:
             if i in known:
                 continue
             values = np.empty_like(values)
-            _, first, group = np.unique(
-                np.delete(amplitude, i, axis=1), axis=0, return_index=True, return_inverse=True
-            )
-            for number, one in enumerate(first):
-                own = np.ravel(group) == number
-                values[own] = problem.along_each(amplitude[one], i, columns[own])
+            alike: dict[bytes, list[int]] = {}  # models with the same amplitudes of other channels
+            for model, others in enumerate(np.delete(amplitude, i, axis=1)):
+                alike.setdefault(others.tobytes(), []).append(model)
+            for own in alike.values():
+                values[own] = problem.along_each(amplitude[own[0]], i, columns[own])
             best = AMPLITUDES[values.argmin(axis=1)]
             if (best != amplitude[:, i]).any():
                 known = {}

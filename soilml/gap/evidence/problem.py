@@ -306,17 +306,21 @@ class MarginalFit:
 
 
 def fit_marginal(
-    problem: FitProblem, requests: Sequence[tuple[StartedFit, Floats]], lowest: float = float("inf")
+    problem: FitProblem,
+    requests: Sequence[tuple[StartedFit, Floats]],
+    lowest: float = float("inf"),
+    of: Sequence[Coordinate] = (),
 ) -> list[MarginalFit | None]:
     """Fits and their evidence; None where the model refuses the fit.
 
     Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
     are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
-    above the lowest so far, and `lowest`, that of an earlier fit. The fits are coarse first; those
+    above the lowest so far, and `lowest`, that of an earlier fit, which may be one of the same
+    coordinates: then they are given as `of`. The fits are coarse first; those
     near the lowest go on to a fine tolerance, of several starts of one set of coordinates the best.
     All share the calls of the model.
     """
-    values: ValuesSoFar = {((), -1): lowest}
+    values: ValuesSoFar = {(tuple(c.path for c in of), -1): lowest}
     works = [_marginal(problem, *own, number, values) for number, own in enumerate(requests)]
     return [raised(fit) for fit in in_step(works)]
 

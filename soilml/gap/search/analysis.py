@@ -17,6 +17,7 @@ from soilml.gap.search.passes import (
     begin,
     declared_covariance,
     of_readings,
+    with_singles,
 )
 from soilml.gap.search.prediction import predict_with, predictive_gains
 from soilml.gap.search.residual_test import residual_test
@@ -107,11 +108,9 @@ def _begun_beyond(
     if len(start.soil) > len(found.problem.soil):
         return begin(kept, seed, place, found.result, likeliest=True)
     begun = begin(kept, seed, place, found.result, likeliest=True, singles=False)
-    first = begun[0].result
-    if not any(explains_better(found, begun[0], c, NEARLY) for c in first.candidates):
-        return begun
-    both = replace(first, candidates=(*found.result.candidates, *first.candidates))
-    return begin(kept, seed, place, both, likeliest=True)
+    first = begun[0]
+    nearly = any(explains_better(found, first, c, NEARLY) for c in first.result.candidates)
+    return with_singles(begun, seed) if nearly else begun
 
 
 def _explained_by_soil(found: Analysis, seed: int) -> Analysis:

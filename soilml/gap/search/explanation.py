@@ -136,7 +136,8 @@ def fit_shapes(
 ) -> list[Explanation]:
     """The candidates with the shape coefficients of their effects estimated as well.
 
-    starts: Candidates of an earlier search, whose free laws are starts of these.
+    starts: Candidates of an earlier search, or those that these extend by one effect. Their free
+        laws are starts of these.
     limit: Objective from which fits under noise alone are no further starts.
     """
     started, index = [], []
@@ -154,7 +155,8 @@ def fit_shapes(
         for fit, amplitude in first if shapes else []:
             own = candidate.catalogue_law.fit
             coordinates = [*own.coordinates, *shapes]
-            started.append((StartedFit(own.case, coordinates, fit.start_values()), amplitude))
+            start = {**own.start_values(), **fit.start_values()}
+            started.append((StartedFit(own.case, coordinates, start), amplitude))
             index.append(i)
     free: dict[int, MarginalFit | None] = {}
     lowest = min((c.best.evidence.value for c in candidates), default=np.inf)

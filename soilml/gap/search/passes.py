@@ -127,6 +127,16 @@ def begin(
     return Analysis(problem, result), starts
 
 
+def with_singles(begun: Begun, seed: int) -> Begun:
+    """The same with single effects too, and the likeliest sets of all that are known."""
+    first, starts = begun
+    look = first.result
+    starts = {**starts, **{c.names: c for c in look.candidates}}
+    sets, without_gain = likeliest_sets(starts), look.without_gain
+    result = first_look(first.problem, look.soil, seed, starts, sets, without_gain=without_gain)
+    return replace(first, result=result), starts
+
+
 def search_in_passes(begun: Begun, seed: int, progress: Callable[[float], None]) -> Analysis:
     """The search, with the covariance that is estimated from what its best explanation leaves.
 

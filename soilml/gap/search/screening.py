@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.problem import FitProblem, MarginalFit, within_bounds
@@ -49,14 +50,16 @@ def predicted_gains(
 
 
 def free_law_gains(
-    problem: FitProblem, candidate: Explanation, fit: Solution, signatures: Sequence[Signature]
+    problem: FitProblem, amplitude: Floats, fit: Solution, signatures: Sequence[Signature]
 ) -> dict[str, float]:
     """Decrease of a fit's sum of squares by each effect with free shapes, linearised.
 
-    The discrepancy has the amplitudes of the candidate. The shapes have no prior, so that these
-    are upper bounds, by which effects are selected whose law is not the catalogue's.
+    The shapes have no prior, so that these are upper bounds, by which effects are selected whose
+    law is not the catalogue's.
+
+    amplitude (channels,): That of the discrepancy.
     """
-    whiten = problem.discrepancy.whiten(candidate.amplitude)
+    whiten = problem.discrepancy.whiten(amplitude)
     fit = fit.whitened_by(whiten)
     slip, load = problem.readings.log_slip_and_load
     gains = {}
@@ -114,34 +117,44 @@ def effects_to_fit(
     gains: Mapping[str, float],
     starts: Starts,
     without_gain: Set[str] = frozenset(),
-) -> list[str]:
-    """Names of the effects that are fitted in full, each alone.
+) -> dict[str, bool]:
+    """The effects that are fitted in full, each alone, and whether they start under noise too.
 
     A prediction from the soil alone is linear, while the soil has adapted to what is missing and
     the law of the cause may be another one. Several predictions are therefore made, and the best of
     each are selected, together with those that were within reach of the best in an earlier search.
     One that explained nothing there, and should not gain now, is left out, but for the first.
 
+    Beside a large discrepancy, those that no earlier search has fitted start under noise alone too,
+    if they explain most there, or by a law of their own nearly as much as the first could: others
+    rarely find a better optimum from there.
+
     soil_alone, soil: The soil alone, beside a discrepancy and under noise alone.
     gains: Predicted decrease of the objective by each effect.
     without_gain: Effects that explained nothing in an earlier search of the same soil.
     """
     selected = _largest_gains(gains)
+    amplitude = soil_alone.amplitude
     ranked = [
-        _first(free_law_gains(problem, soil_alone, f, signatures)) for f in (soil_alone.fit, soil)
+        _first(free_law_gains(problem, amplitude, f, signatures)) for f in (soil_alone.fit, soil)
     ]
-    if float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY:
+    under_noise: list[str] = []
+    if float(amplitude.max()) >= LARGE_DISCREPANCY:
         hidden = noise_only_gains(problem, soil, signatures)
-        least = HIDDEN_SHARE * max(hidden.values(), default=0.0)
-        close = sum(gain > least for gain in hidden.values())
-        ranked.append(_first(hidden, max(FITTED_HIDDEN, close)))
+        ranked.append(_first(hidden, max(FITTED_HIDDEN, len(_close(hidden)))))
+        by_own_law = free_law_gains(problem, 0.0 * amplitude, soil, signatures)
+        under_noise = ranked[-1][:FITTED_HIDDEN] + _close(by_own_law)
     lowest = min((c.objective for c in starts.values()), default=0.0)
     single = [c for names, c in starts.items() if len(names) == 1]
     ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])
     names = dict.fromkeys([*selected, *(name for own in ranked for name in own)])
     left_out = {n for n in without_gain if gains.get(n, 0.0) + problem.penalties[n] < LEAST_GAIN}
     left_out -= set(selected[:1])
-    return [name for name in names if name in gains and name not in left_out]
+    return {
+        name: name in under_noise and (name,) not in starts
+        for name in names
+        if name in gains and name not in left_out
+    }
 
 
 def explained_nothing(problem: FitProblem, fitted: Starts) -> set[str]:
@@ -166,6 +179,12 @@ def _largest_gains(gains: Mapping[str, float]) -> list[str]:
     ordered = _first(gains, len(gains))
     close = [name for name in ordered if gains[name] > gains[ordered[0]] - GAIN_MARGIN]
     return ordered[: min(MAX_FITTED, max(MIN_FITTED, len(close)))]
+
+
+def _close(gains: Mapping[str, float]) -> list[str]:
+    """The effects that gain nearly as much as the first."""
+    least = HIDDEN_SHARE * max(gains.values(), default=0.0)
+    return [name for name, gain in gains.items() if gain > least]
 
 
 def _first(gains: Mapping[str, float], number: int = FITTED_BY_OWN_LAW) -> list[str]:

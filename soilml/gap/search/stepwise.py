@@ -24,7 +24,6 @@ from soilml.gap.search.explanation import (
 from soilml.gap.search.posterior import Posterior, explanations, for_decisions, posterior
 from soilml.gap.search.residual_test import ResidualTest, residual_test
 from soilml.gap.search.screening import (
-    LARGE_DISCREPANCY,
     WITHIN_REACH,
     Starts,
     effects_to_fit,
@@ -194,7 +193,8 @@ def first_look(
         problem, soil_alone, soil, signatures, gains=gains, starts=starts, without_gain=without_gain
     )
     selected = dict.fromkeys([*sets, *((name,) for name in likely if singles)], soil_alone)
-    level = _fit_level(problem, soil, soil_alone, selected, starts)
+    under_noise = {name for name, also in likely.items() if also}
+    level = _fit_level(problem, soil, soil_alone, selected, starts, under_noise)
     again = _from_soils_of(problem, soil_alone, level)
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
@@ -253,7 +253,7 @@ def _from_soils_of(
         (StartedFit(problem.case, problem.soil, c.fit.start_values()), c.amplitude)
         for c in sorted(level, key=lambda c: c.objective)[:SOILS_AGAIN]
     ]
-    fits = fit_marginal(problem, started, soil_alone.best.evidence.value)
+    fits = fit_marginal(problem, started, soil_alone.best.evidence.value, problem.soil)
     found = [Explanation((), m) for m in fits if m is not None]
     best = min([soil_alone, *found], key=lambda c: c.objective)
     return best if best.objective < soil_alone.objective - SAME_OPTIMUM else soil_alone
@@ -265,20 +265,18 @@ def _fit_level(
     soil_alone: Explanation,
     sets: Mapping[tuple[str, ...], Explanation],
     starts: Starts,
+    under_noise: Set[str] = frozenset(),
 ) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    Beside a large discrepancy, single effects that no earlier search has fitted start under noise
-    alone too.
+    under_noise: Effects of which the sets of one start under noise alone too.
     """
-    hidden = float(soil_alone.amplitude.max()) >= LARGE_DISCREPANCY
-    single = all(not base.names for base in sets.values())
     requests = []
     for names, base in sets.items():
         base = starts.get(names, base)
         smaller = np.minimum(base.amplitude, soil_alone.amplitude)
         noise_start = None
-        if hidden and single and names not in starts:
+        if len(names) == 1 and names[0] in under_noise:
             noise_start = {path: off_bounds(x) for path, x in soil.start_values().items()}
         fit = base.catalogue_law.fit
         requests.append(
@@ -302,7 +300,8 @@ def _fit_level(
         or (c.noise_only is not None and c.noise_only.objective < notable)
         or (c.names in starts and starts[c.names].shape_supported)
     ]
-    shaped = {c.names: c for c in fit_shapes(problem, promising, starts, notable)}
+    known = {**sets, **starts}
+    shaped = {c.names: c for c in fit_shapes(problem, promising, known, notable)}
     return [shaped.get(c.names, c) for c in fitted]
 
 

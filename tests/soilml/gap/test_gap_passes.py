@@ -170,35 +170,40 @@ TEST_ALONE, LIKELIEST, SINGLES = (False, False), (True, False), (True, True)
 
 
 @pytest.mark.parametrize(
-    "rival, complete, freed, near, expected",
+    "rival, complete, near, expected",
     [
-        (("a",), True, True, False, [TEST_ALONE]),
-        (("a",), False, True, False, [SINGLES]),
-        (("a", "b"), True, True, False, [SINGLES]),
-        (("a",), False, False, False, [LIKELIEST]),
-        (("a",), False, False, True, [LIKELIEST, SINGLES]),
-        (("a",), True, False, True, [TEST_ALONE]),
+        (("a",), True, False, [TEST_ALONE]),
+        (("a",), True, True, [TEST_ALONE]),
+        (("a",), False, False, [LIKELIEST]),
+        (("a",), False, True, [LIKELIEST, SINGLES]),
+        (("a", "b"), True, True, [LIKELIEST, SINGLES]),
     ],
 )
 def test_effects_are_fitted_with_opened_priors_where_they_can_count(
-    passes, monkeypatch, rival, complete, freed, near, expected
+    passes, monkeypatch, rival, complete, near, expected
 ):
-    """None where one alone explains all; the likeliest first where no other parameter is free."""
+    """None where one alone explains all; the likeliest first, and singles where these are near."""
     given, run = passes
     given.accepted, asked = [None], []
     soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
     gap_test = SimpleNamespace(p_value=0.001)
     look = replace(module.no_result(soil), soil_test=gap_test, candidates=(None,))
-    free = free_soil_parameters(CASE, None)
-    more = (*free, free[0]) if freed else tuple(free)
-    opened = OpenedPriors(CASE, more, Remark("prior-opened", ""))
+    free = tuple(free_soil_parameters(CASE, None))
+    opened = OpenedPriors(CASE, free, Remark("prior-opened", ""))
+    begun = module.Analysis(soil.problem, look), {}
 
     def begin(*_, likeliest=False, singles=True):
         asked.append((likeliest, singles))
-        return module.Analysis(soil.problem, look), {}
+        return begun
+
+    def with_singles(same, seed):
+        assert same is begun
+        asked.append(SINGLES)
+        return begun
 
     monkeypatch.setattr(analysis, "open_priors", lambda *_: opened)
     monkeypatch.setattr(analysis, "begin", begin)
+    monkeypatch.setattr(analysis, "with_singles", with_singles)
     monkeypatch.setattr(analysis, "_rival", lambda found: SimpleNamespace(names=rival))
     monkeypatch.setattr(analysis, "is_complete", lambda *_: complete)
     monkeypatch.setattr(
@@ -225,6 +230,7 @@ def test_opened_priors_are_searched_in_full_where_the_first_look_permits_that_th
     for name, value in {
         "open_priors": lambda *_: opened,
         "begin": lambda *_, **__: (look, {}),
+        "with_singles": lambda begun, seed: begun,
         "_rival": lambda found: SimpleNamespace(names=()),
         "explains_better": lambda *_: better,
         "_explained_by_soil": lambda found, _: found,

@@ -70,7 +70,7 @@ def test_an_effect_of_a_small_size_in_its_direction_gains_by_its_own_law(dug):
         Signature(name, "soil", sign * column, side)
         for name, sign, side in (("up", 1, 1), ("down", 1, -1), ("any", 1, 0), ("turned", -1, 1))
     ]
-    gains = free_law_gains(problem, none, exact, signatures)
+    gains = free_law_gains(problem, none.amplitude, exact, signatures)
     assert gains["up"] == gains["any"] > 0.5
     assert gains["down"] == gains["turned"] == 0.0
 
@@ -85,7 +85,7 @@ def test_a_gain_by_an_own_law_is_what_columns_beside_the_fit_explain(dug):
     columns = whiten @ np.column_stack([signature * term for term in terms])
     beside = columns - white.jacobian @ np.linalg.lstsq(white.jacobian, columns)[0]
     left = white.residual - beside @ np.linalg.lstsq(beside, white.residual)[0]
-    gains = free_law_gains(problem, none, soil, [Signature("dug", "soil", signature, 0)])
+    gains = free_law_gains(problem, none.amplitude, soil, [Signature("dug", "soil", signature, 0)])
     assert gains["dug"] == pytest.approx(np.sum(white.residual**2) - np.sum(left**2), rel=1e-6)
 
 
