@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-import time
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import gap_baselines
 import numpy as np
+from core_speed import timed
 from gap_separation import separation
 
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
@@ -19,13 +19,9 @@ from soilml.fitting.operating_points import operating_points
 from soilml.gap import GapReport, gap
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, SHEAR, column
 from soilml.remarks import texts
 
-#: Solutions by which the speed of the machine is measured, and how often: the first calls after
-#: other work are slower, by half on one machine.
-SOLUTIONS, CALLS = 4000, 9
 #: The covariate of effects that follow the order of the rows.
 ORDER = "progress"
 #: The other methods are run on one set in so many.
@@ -60,12 +56,11 @@ def judged(job: tuple[int, Plan]) -> dict[str, Any]:
         case = read_model(drawn.model)
         apart = separation(case, table, drawn.truth)
         record |= {"signal": apart.signal, "snr": apart.snr, "rival": apart.rival}
-        record["solves"] = forward_speed(case)
-        started = time.process_time()
-        report = gap(case, table, seed=0)
+        analysis = timed(case, lambda: gap(case, table, seed=0))
     except Exception as error:  # a crash is a finding of the benchmark, not its end
         return record | {"status": "crash", "sentence": f"{type(error).__name__}: {error}"}
-    record |= {"seconds": time.process_time() - started} | _said(report)
+    report = analysis.result
+    record |= {"seconds": analysis.seconds, "solves": analysis.solves} | _said(report)
     if report.soil_before:
         record |= _compared(number, case, report, table, drawn, truth)
     return record
@@ -79,19 +74,6 @@ def _relatives(tier: str, cause: str, truth: tuple[str, ...]) -> list[str]:
     if tier != "L" or not families:
         return []
     return [n for n, e in EFFECTS.items() if getattr(e.about, "family", "") in families]
-
-
-def forward_speed(case: Case) -> float:
-    """Forward solutions of the case's wheel in a second of one core: the median of calls."""
-    model = next(iter(case.gears.values()), case.model)
-    rng = np.random.default_rng(0)
-    at = Operating(slip=rng.uniform(0.1, 0.6, SOLUTIONS), load=rng.uniform(40.0, 80.0, SOLUTIONS))
-    seconds = []
-    for _ in range(CALLS):
-        started = time.process_time()
-        model(case.soil, at)
-        seconds.append(time.process_time() - started)
-    return SOLUTIONS / float(np.median(seconds))
 
 
 def read_model(model: str) -> Case:

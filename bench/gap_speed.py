@@ -13,9 +13,7 @@ import argparse
 import cProfile
 import pstats
 import sys
-import time
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
 
@@ -23,13 +21,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import numpy as np
 from benchmarks_file import write_page
-from gap_case import forward_speed, read_model
+from core_speed import SOLVES, Timed, timed
+from gap_case import read_model
 from gap_records import table
-from gap_table import SOLVES
 
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.plans import benchmark_plans
-from soilml.gap import gap
+from soilml.gap import GapReport, gap
 from soilml.io.table import Table
 
 SECTION = "Seconds of an analysis"
@@ -39,19 +37,6 @@ SETS = 24  # Sets of each size
 COUNTED = 3
 #: Rows in all, design, and gates of median and longest in seconds at `SOLVES` solutions a second.
 SIZES = ((64, "sweep", 1.0, 4.0), (200, "sweep", 3.0, None), (5, "few-rows", 1.0, None))
-
-
-@dataclass(frozen=True)
-class Timed:
-    """Seconds of one core that an analysis took, and forward solutions that it makes in one."""
-
-    seconds: float
-    solves: float
-
-    @property
-    def scaled(self) -> float:
-        """Seconds of a core that makes `SOLVES` forward solutions in one."""
-        return self.seconds * self.solves / SOLVES
 
 
 def run() -> None:
@@ -111,13 +96,10 @@ def sets(rows: int, design: str) -> Iterator[BlindSet]:
                 yield drawn
 
 
-def analyse(drawn: BlindSet) -> Timed:
-    """The analysis of a set, timed, and the speed of the forward model just before it."""
+def analyse(drawn: BlindSet) -> Timed[GapReport]:
+    """The analysis of a set, timed."""
     case, rows = read_model(drawn.model), Table(dict(drawn.columns))
-    solves = forward_speed(case)
-    started = time.process_time()
-    gap(case, rows, seed=0)
-    return Timed(time.process_time() - started, solves)
+    return timed(case, lambda: gap(case, rows, seed=0))
 
 
 def _python_calls(drawn: BlindSet) -> int:

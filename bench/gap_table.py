@@ -10,6 +10,7 @@ import gap_families
 import gap_held_out
 import gap_reliability
 import numpy as np
+from core_speed import SOLVES
 from gap_records import (
     CLAIMING_STATUSES,
     SUSPECT_DESIGNS,
@@ -32,8 +33,6 @@ from gap_records import (
 SIGMAS_90 = 1.645
 #: Rows of a set, at most, of the lines on time.
 ROW_LIMITS = (24, 48, 72)
-#: Forward solutions in a second of the core that the gates in seconds are for.
-SOLVES = 500_000
 #: Distance of the soil alone from the truth, in noise, from which the region is judged: below it,
 #: nothing is left to improve.
 REGION_GAP = 2.0

@@ -12,8 +12,8 @@ from typing import Any
 
 import gap_speed
 import numpy as np
-from gap_case import forward_speed, read_model
-from gap_table import SOLVES
+from core_speed import timed
+from gap_case import read_model
 
 from datagen.recipe import read_recipe
 from soilml import Operating, identify
@@ -40,7 +40,7 @@ def text() -> str:
 
 
 def _averaged_times() -> str:
-    """Seconds of the averaged answer on the sets of `gap_speed`, and for a core of `SOLVES`."""
+    """Seconds of the averaged answer on the sets of `gap_speed`, raw and scaled."""
     lines = [
         "| averaged answer, three channels | sets | seconds: median, longest | scaled: median, "
         "longest |",
@@ -50,11 +50,9 @@ def _averaged_times() -> str:
         seconds, scaled = [], []
         for drawn in islice(gap_speed.sets(rows, design), AVERAGED_SETS):
             case, table = read_model(drawn.model), Table(dict(drawn.columns))
-            solves = forward_speed(case)
-            started = time.process_time()
-            identify(case, table)
-            seconds.append(time.process_time() - started)
-            scaled.append(seconds[-1] * solves / SOLVES)
+            answer = timed(case, partial(identify, case, table))
+            seconds.append(answer.seconds)
+            scaled.append(answer.scaled)
         lines.append(
             f"| {rows} rows | {len(seconds)} | {np.median(seconds):.2f}, {max(seconds):.2f} | "
             f"{np.median(scaled):.2f}, {max(scaled):.2f} |"
