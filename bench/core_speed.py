@@ -50,9 +50,10 @@ def timed(case: Case, work: Callable[[], T]) -> Timed[T]:
         started = time.process_time()
         speeds.append(_forward_speed(case))
         spent += time.process_time() - started
+        signal.setitimer(signal.ITIMER_PROF, EVERY)
 
     before = signal.signal(signal.SIGPROF, measure)
-    signal.setitimer(signal.ITIMER_PROF, EVERY, EVERY)
+    signal.setitimer(signal.ITIMER_PROF, EVERY)
     started = time.process_time()
     try:
         result = work()
