@@ -43,14 +43,15 @@ class Timed(Generic[T]):
 
 def timed(case: Case, work: Callable[[], T]) -> Timed[T]:
     """Do work, and time it; the speed is that of the case's wheel."""
-    speeds, spent = [_forward_speed(case)], 0.0
+    speeds, spent, working = [_forward_speed(case)], 0.0, True
 
     def measure(*_: Any) -> None:
         nonlocal spent
         started = time.process_time()
         speeds.append(_forward_speed(case))
         spent += time.process_time() - started
-        signal.setitimer(signal.ITIMER_PROF, EVERY)
+        if working:
+            signal.setitimer(signal.ITIMER_PROF, EVERY)
 
     before = signal.signal(signal.SIGPROF, measure)
     signal.setitimer(signal.ITIMER_PROF, EVERY)
@@ -58,6 +59,7 @@ def timed(case: Case, work: Callable[[], T]) -> Timed[T]:
     try:
         result = work()
     finally:
+        working = False
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
     seconds = time.process_time() - started - spent

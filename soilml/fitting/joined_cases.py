@@ -79,11 +79,10 @@ def joined_load_case(parts: Sequence[CaseSets]) -> LoadCase:
     known = {id(case): neutral | case.numbers for case in cases}
     varied = {path for part in parts for path in part.values}
     first, *others = known.values()
-
-    varying: dict[str, tuple[Parameter, Floats]] = {}
+    varying: dict[str, tuple[Parameter, Floats]] = {}  # to be checked together
 
     def number(path: str, shown: str, parameter: Parameter) -> Floats:
-        """The value of a parameter in all rows, or of shape () where they share it."""
+        """The value of a parameter in all rows; a checked one of shape () where they share it."""
         value = first[path]
         if path not in varied and all(own[path] == value for own in others):
             check_number(shown, parameter, value)

@@ -42,8 +42,8 @@ def linear_response(
 
     with the load W and the forces f of a row at the sinkage z* of its base row, the load W_0 to be
     carried, and the derivatives of the base row. Effects on readings act on the result.
-    Second-order terms are left out. At a base row the step corrects what z*, which is searched to
-    about 1e-6, is off the equilibrium by: what it leaves out is of the order of 1e-11.
+    Second-order terms are left out. From an estimate, z* is accurate to about 1e-6; the step
+    corrects this at the base rows too, to about 1e-11.
 
     load_case: Parameters of shape () or (batch,), from `soilml.physics.model.flattened`.
     base (batch,): Index of the base row of each row; that of a base row is its own.

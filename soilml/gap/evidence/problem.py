@@ -315,10 +315,11 @@ def fit_marginal(
 
     Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
     are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
-    above the lowest so far, and `lowest`, that of an earlier fit, which may be one of the same
-    coordinates: then they are given as `of`. The fits are coarse first; those
-    near the lowest go on to a fine tolerance, of several starts of one set of coordinates the best.
-    All share the calls of the model.
+    above the lowest so far. The fits are coarse first; those near the lowest go on to a fine
+    tolerance, of several starts of one set of coordinates the best. All share the calls of the
+    model.
+
+    lowest: Evidence of an earlier fit. `of` are its coordinates, where these fits have the same.
     """
     values: ValuesSoFar = {(tuple(c.path for c in of), -1): lowest}
     works = [_marginal(problem, *own, number, values) for number, own in enumerate(requests)]

@@ -128,7 +128,10 @@ def begin(
 
 
 def with_singles(begun: Begun, seed: int) -> Begun:
-    """The same with single effects too, and the likeliest sets of all that are known."""
+    """The same look with single effects too, and the likeliest sets of all that are known.
+
+    The covariance stays what it was.
+    """
     first, starts = begun
     look = first.result
     starts = {**starts, **{c.names: c for c in look.candidates}}

@@ -94,7 +94,8 @@ def noise_only_gains(
 GAIN_MARGIN, MIN_FITTED, MAX_FITTED = 12.0, 4, 9
 FITTED_BY_OWN_LAW = 6  # So many effects more: those that would explain most by a law of their own
 #: Beside a large discrepancy, so many effects more: those that explain most under noise alone, and
-#: those that explain at least this share of what the first of them does.
+#: those that explain at least this share of what the first of them does. So many start under noise
+#: alone too, and those that explain this share by a law of their own.
 FITTED_HIDDEN, HIDDEN_SHARE = 6, 0.8
 #: Amplitude, in usual ones, from which a discrepancy can hide an effect that explains it.
 LARGE_DISCREPANCY = 2.5

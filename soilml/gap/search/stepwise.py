@@ -269,7 +269,7 @@ def _fit_level(
 ) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
-    under_noise: Effects of which the sets of one start under noise alone too.
+    under_noise: Effects that start under noise alone too, where they are the only one of a set.
     """
     requests = []
     for names, base in sets.items():

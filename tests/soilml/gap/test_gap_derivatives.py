@@ -156,6 +156,16 @@ def test_effects_keep_the_order_of_each_case_when_joined(problem):
     assert names.index("slope") < names.index("load-transfer") < names.index("torque-gain")
 
 
+@pytest.mark.parametrize("value, shown", [(1.6, "1.6 rad"), (np.nan, "nan rad")])
+def test_of_joined_cases_a_value_outside_its_bounds_is_named(problem, value, shown):
+    at, soil = problem.readings.at, problem.case.soil
+    other = np.asarray([soil.cohesion, 2.0 * soil.cohesion])
+    values = {"cohesion": other, "friction_angle": np.asarray([0.5, value])}
+    parts = [CaseSets(problem.case, 1, {}, at), CaseSets(problem.case, 2, values, at)]
+    with pytest.raises(InputError, match=f"soil friction_angle is {shown}"):
+        joined_load_case(parts)
+
+
 def test_cases_with_effects_in_contrary_order_are_answered_one_by_one(problem):
     x = np.full((1, 3), 0.5)
     cases = [problem.with_effects(n) for n in (["slope", "load-gain"], ["load-gain", "slope"])]

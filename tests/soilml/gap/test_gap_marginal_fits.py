@@ -128,6 +128,21 @@ def test_a_start_that_is_worse_than_another_of_its_set_is_not_repeated(fitting, 
     assert names(asked) == ["one", "one", *["other"] * rounds]
 
 
+@pytest.mark.parametrize(
+    "value, rounds", [(49.8, "coarse, fine"), (49.95, "coarse"), (61.0, "coarse")]
+)
+def test_an_earlier_fit_of_the_same_coordinates_counts_as_one_of_several_starts(
+    fitting, value, rounds
+):
+    problem, listed, asked = fitting
+    listed["again"] = [(value, 0.2)]
+    (found,) = fit_marginal(
+        problem, [(started("again", "path"), np.zeros(1))], 50.0, [SimpleNamespace(path="path")]
+    )
+    assert found.evidence.value == value
+    assert [fine for *_, fine in asked] == [False, True][: 1 + rounds.count("fine")]
+
+
 def test_fits_that_the_model_refuses_or_that_have_no_equilibrium_are_none(fitting):
     problem, listed, _ = fitting
     listed |= {"refused": InputError("no"), "unsolved": [(np.nan, 1.0)], "good": [(1.0, 0.0)]}

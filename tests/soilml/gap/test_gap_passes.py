@@ -167,29 +167,33 @@ def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
 
 
 TEST_ALONE, LIKELIEST, SINGLES = (False, False), (True, False), (True, True)
+FURTHER = "the same look goes on"
 
 
 @pytest.mark.parametrize(
-    "rival, complete, near, expected",
+    "rival, complete, freed, near, expected",
     [
-        (("a",), True, False, [TEST_ALONE]),
-        (("a",), True, True, [TEST_ALONE]),
-        (("a",), False, False, [LIKELIEST]),
-        (("a",), False, True, [LIKELIEST, SINGLES]),
-        (("a", "b"), True, True, [LIKELIEST, SINGLES]),
+        (("a",), True, True, False, [TEST_ALONE]),
+        (("a",), True, False, True, [TEST_ALONE]),
+        (("a",), False, True, False, [SINGLES]),
+        (("a", "b"), True, True, False, [SINGLES]),
+        (("a",), False, False, False, [LIKELIEST]),
+        (("a",), False, False, True, [LIKELIEST, FURTHER]),
+        (("a", "b"), True, False, True, [LIKELIEST, FURTHER]),
     ],
 )
 def test_effects_are_fitted_with_opened_priors_where_they_can_count(
-    passes, monkeypatch, rival, complete, near, expected
+    passes, monkeypatch, rival, complete, freed, near, expected
 ):
-    """None where one alone explains all; the likeliest first, and singles where these are near."""
+    """None where one alone explains all; the likeliest first where no other parameter is free."""
     given, run = passes
     given.accepted, asked = [None], []
     soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
     gap_test = SimpleNamespace(p_value=0.001)
     look = replace(module.no_result(soil), soil_test=gap_test, candidates=(None,))
     free = tuple(free_soil_parameters(CASE, None))
-    opened = OpenedPriors(CASE, free, Remark("prior-opened", ""))
+    more = (*free, free[0]) if freed else free
+    opened = OpenedPriors(CASE, more, Remark("prior-opened", ""))
     begun = module.Analysis(soil.problem, look), {}
 
     def begin(*_, likeliest=False, singles=True):
@@ -198,7 +202,7 @@ def test_effects_are_fitted_with_opened_priors_where_they_can_count(
 
     def with_singles(same, seed):
         assert same is begun
-        asked.append(SINGLES)
+        asked.append(FURTHER)
         return begun
 
     monkeypatch.setattr(analysis, "open_priors", lambda *_: opened)

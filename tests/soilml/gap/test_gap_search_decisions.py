@@ -278,7 +278,8 @@ def searched(monkeypatch):
     )
     seen.done = []
 
-    def fit_level(problem, soil, none, sets, starts, under_noise=()):
+    def fit_level(problem, soil, none, sets, starts, under_noise=frozenset()):
+        assert under_noise == ({"a"} if none in sets.values() else set())
         seen.levels.append(sorted(sets))
         size = len(next(iter(sets), ()))
         return [made(*n, objective=seen.objective[size]) for n in sets if size in seen.objective]
@@ -290,7 +291,7 @@ def searched(monkeypatch):
         "residual_test": lambda *_, **_kw: SimpleNamespace(p_value=seen.p_value),
         "_fit_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
-        "effects_to_fit": lambda *_, **__: {"a": False},
+        "effects_to_fit": lambda *_, **__: {"a": True},
         "_from_soils_of": lambda problem, soil_alone, level: seen.again or soil_alone,
         "_fit_level": fit_level,
         "_extensions": grown,
@@ -374,13 +375,13 @@ def test_the_soil_alone_starts_from_the_soils_of_the_two_best_explanations(monke
     started = []
 
     def fit_marginal(problem, fits, lowest, of):
-        assert (lowest, of) == (50.0, ())
+        assert (lowest, of) == (50.0, ("the soil",))
         started.append(fits)
         return [made(objective=value).catalogue_law for value in objectives]
 
     monkeypatch.setattr(stepwise, "fit_marginal", fit_marginal)
     level = [made("a", objective=30.0), made("b", objective=10.0), made("c", objective=20.0)]
-    problem, own = SimpleNamespace(case=None, soil=()), made(objective=50.0)
+    problem, own = SimpleNamespace(case=None, soil=("the soil",)), made(objective=50.0)
     objectives = [49.95, 60.0]
     assert stepwise._from_soils_of(problem, own, level) is own  # the same optimum again
     assert len(started[0]) == 2

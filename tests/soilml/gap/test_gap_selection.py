@@ -1,5 +1,8 @@
 """Selection: an effect whose law is not the catalogue's is fitted in full, and named."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from gap_sets import case_of, driven, fit_problem
@@ -7,6 +10,7 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
+from soilml.gap.search import passes
 from soilml.gap.search.screening import (
     MIN_FITTED,
     effects_to_fit,
@@ -76,3 +80,17 @@ def test_an_effect_within_reach_of_an_earlier_search_is_fitted_again(moved, scre
     starts = {c.names: c for c in found.candidates}
     assert "stress-shift" not in effects_to_fit(problem, none, soil, own, gains, {})
     assert "stress-shift" in effects_to_fit(problem, none, soil, own, gains, starts)
+
+
+def test_a_look_goes_on_with_singles_from_all_that_is_known(monkeypatch):
+    made = SimpleNamespace
+    earlier, first = made(names=("a",), objective=9.0), made(names=("b",), objective=1.0)
+    replaced = made(names=("a",), objective=5.0)
+    look = replace(passes.no_result("soil"), candidates=(first, replaced), without_gain={"c"})
+    begun = passes.Analysis("problem", look), {("a",): earlier}
+    monkeypatch.setattr(passes, "first_look", lambda *given, **kw: (*given, kw))
+    found, starts = passes.with_singles(begun, 7)
+    assert starts == {("a",): replaced, ("b",): first}
+    sets = [("b",), ("a",)]  # the likeliest first
+    assert found.result == ("problem", "soil", 7, starts, sets, {"without_gain": {"c"}})
+    assert found.problem == "problem"

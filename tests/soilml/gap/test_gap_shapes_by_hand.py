@@ -137,6 +137,20 @@ def test_shapes_start_from_the_free_law_of_an_earlier_search(dug, monkeypatch):
     assert len(asked) == 2
 
 
+def test_shapes_of_a_larger_set_start_from_those_of_what_it_extends(dug, monkeypatch):
+    problem, found = dug
+    (base,) = explanation.fit_shapes(problem, [found])
+    larger = candidate(problem, ["slip-sinkage", "torque-gain"], {})
+    asked = []
+    monkeypatch.setattr(explanation, "fit_marginal", lambda _, s, low: asked.extend(s) or [None])
+    explanation.fit_shapes(problem, [larger], {larger.names: base})
+    ((start, amplitude),) = asked
+    assert amplitude is base.free_law.evidence.amplitude
+    own = larger.catalogue_law.fit.start_values()
+    (new,) = own.keys() - base.free_law.fit.start_values().keys()  # the size of torque-gain
+    assert start.start == {**base.free_law.fit.start_values(), new: own[new]}
+
+
 def test_a_candidate_keeps_its_fit_under_noise_alone(dug):
     problem, found = dug
     none = np.zeros(len(problem.readings.channels))
