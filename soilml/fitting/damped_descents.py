@@ -113,10 +113,10 @@ class DampedSteps:
         residual (m,), jacobian (m, p): Whitened residuals and derivatives of the readings there.
         damping (b,): Factor lambda of each step.
         """
-        points = np.tile(x, (1 + len(damping), 1))
-        normal = self._normal(points, jacobian.T @ jacobian)
-        descent = self._descent(points, residual @ jacobian)
-        full, *damped = self._steps(points, descent, normal, np.append(LEAST_DAMPING, damping))
+        here, factors = x[None], np.append(LEAST_DAMPING, damping)
+        normal = self._normal(here, jacobian.T @ jacobian).repeat(len(factors), axis=0)
+        descent = self._descent(here, residual @ jacobian).repeat(len(factors), axis=0)
+        full, *damped = self._steps(here.repeat(len(factors), axis=0), descent, normal, factors)
         promised = float(2.0 * descent[0] @ full - full @ normal[0] @ full)
         return promised, self.within(self.moved(x, np.asarray(damped)))
 
