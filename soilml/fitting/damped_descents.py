@@ -370,10 +370,12 @@ def descent(
             dampings = damping * np.asarray(DAMPING_FACTORS)
             _, here = steps.proposed(last.x, last.residual, last.jacobian, dampings)
         bent = problem.whitened((yield trials(last, here)))
-        back = steps.corrected(last, here, bent, dampings)
-        straight = problem.whitened((yield trials(last, back)))
-        tried = np.vstack([here, back])
-        objectives = problem.objective(np.vstack([bent, straight]), tried)
+        tried, objectives = here, problem.objective(bent, here)
+        if last.objective - float(objectives.min()) < KEPT_PROMISE * promised:
+            back = steps.corrected(last, here, bent, dampings)
+            straight = problem.whitened((yield trials(last, back)))
+            tried = np.vstack([here, back])
+            objectives = np.concatenate([objectives, problem.objective(straight, back)])
         best = int(np.argmin(objectives))
         improvement = last.objective - float(objectives[best])
         if improvement > 0.0:

@@ -55,7 +55,7 @@ def effect_signatures(
     """
     no_change = np.zeros((1, 0))
     base = raised(linearise_many([PredictionRequest(case, [], no_change, readings, estimate)])[0])
-    sinkage = replace(base.sinkage_at(no_change), nearest=True)
+    sinkage = replace(base.sinkage_at(no_change), nearest=True, rough=True)
     requests = []
     reasons: dict[str, Remark] = {}
     changes: dict[str, tuple[Coordinate, float, float]] = {}

@@ -276,7 +276,8 @@ def _answered(
     keys = join_keys([CaseSets(r.case, len(r.x), {}, r.readings.at) for r in requests])
     groups: dict[object, list[int]] = {}
     for i, (request, own) in enumerate(zip(requests, keys, strict=True)):
-        key = own, None if request.estimate is None else request.estimate.nearest
+        near = request.estimate
+        key = own, None if near is None else (near.nearest, near.rough)
         groups.setdefault(key, []).append(i)
     answers: dict[int, T | InputError] = {}
     for group in groups.values():
@@ -361,6 +362,7 @@ def _joined_estimate(requests: Sequence[PredictionRequest]) -> SinkageEstimate |
         np.concatenate([np.ravel(estimate.log_sinkage) for estimate in estimates]),
         np.concatenate([np.ravel(estimate.slope) for estimate in estimates]),
         estimates[0].nearest,
+        estimates[0].rough,
     )
 
 

@@ -30,10 +30,11 @@ SLOPES, COARSE_MAX_STEP = (0.05, 20.0), 3.0
 MAX_EVALUATIONS = 6  # Evaluations after which a row is solved by the ordinary search instead
 #: A row is solved where the logarithm of the load carried over the load is below the first figure,
 #: and its product with that of the evaluation before below the second: the error of the
-#: interpolation between the two is of the order of the product. The last two are those of searches
-#: that need be accurate to about 1e-6 only.
+#: interpolation between the two is of the order of the product. The others are those of searches
+#: that are `rough` or `nearest`.
 MAX_LOG_RATIO, MAX_PRODUCT = 1e-5, 1e-11
 ROUGH_LOG_RATIO, ROUGH_PRODUCT = 1e-2, 1e-6
+NEAREST_LOG_RATIO, NEAREST_PRODUCT = 3e-2, 1e-4
 MIN_CHANGE = 1e-9  # A change of that logarithm below this is mostly rounding and gives no slope
 #: The estimate may be off by this much in log sinkage at most; larger steps leave its vicinity.
 MAX_STEP = 2.0
@@ -47,8 +48,8 @@ class SinkageEstimate:
     need not be the first, at which a gear comes to rest. With `nearest` it is accepted, and rows
     that are not solved from the estimate stay so: trials of a descent, whose result is solved
     again, permit that. Without, the crossing is checked, and such rows are solved as in an ordinary
-    search. With either of `nearest` and `rough` the sinkage found is accurate to about 1e-6 only;
-    `rough` is for searches that a Newton step follows.
+    search. With `nearest`, what is found is accurate to about 1e-4 only, and to 1e-6 with `rough`,
+    which is for differences, and for searches that a Newton step follows.
     """
 
     log_sinkage: Array  # ln(z / m)
@@ -93,8 +94,10 @@ def forces_near(load_case: LoadCase, estimate: SinkageEstimate) -> tuple[Force, 
     xp = namespace(estimate.slope)
     first = forces_at_sinkage(load_case, xp.exp(estimate.log_sinkage))
     limits = (MAX_LOG_RATIO, MAX_PRODUCT)
-    if estimate.nearest or estimate.rough:
+    if estimate.rough:
         limits = (ROUGH_LOG_RATIO, ROUGH_PRODUCT)
+    elif estimate.nearest:
+        limits = (NEAREST_LOG_RATIO, NEAREST_PRODUCT)
     force, slope = _secant_steps(
         load_case, first, estimate.log_sinkage, estimate.slope, limits, MAX_EVALUATIONS - 1
     )

@@ -85,10 +85,10 @@ def _solve_in_turn(load_case: LoadCase, searches: Sequence[Search]) -> Force:
 def equilibrium_near(load_case: LoadCase, estimate: SinkageEstimate) -> Force:
     """Forces at the equilibrium next to an estimate of the sinkage; arrays (batch,).
 
-    They agree with those of the ordinary search to about 1e-7, and to 1e-6 from an estimate that is
-    `rough` or `nearest`. Rows that secant steps do not solve, or that may have an earlier
-    equilibrium, are solved by that search; those of an estimate with `nearest` are marked by their
-    status instead.
+    They agree with those of the ordinary search to about 1e-7, to 1e-6 from an estimate that is
+    `rough`, and to 1e-4 from one that is `nearest` alone. Rows that secant steps do not solve, or
+    that may have an earlier equilibrium, are solved by that search; those of an estimate with
+    `nearest` are marked by their status instead.
     """
     xp = namespace(estimate.slope)
     force, slope = forces_near(load_case, estimate)

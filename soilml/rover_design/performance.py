@@ -211,7 +211,7 @@ def _nearest(model: Model, soil: Soil, at: Operating) -> Force:
 
     def solve(part: LoadCase) -> Force:
         part = apply_input_effects(part)
-        found = equilibrium_near(part, replace(coarse_estimate(part), nearest=True))
+        found = equilibrium_near(part, replace(coarse_estimate(part), nearest=True, rough=True))
         return without_unsolved(found)
 
     with np.errstate(all="ignore"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,7 +115,7 @@ class LinearisedFit:
         plain = self.plain - beside.T @ beside
         explained = (shrink[:, None, :] * rotated.T) @ rotated  # (b, p + 1, p + 1)
         growth = np.log1p(square * part.value).sum(axis=1)
-        value = self._solve(plain - explained, columns)[0] + part.log_determinant + growth
+        value = self._evidence(plain - explained, columns) + part.log_determinant + growth
         return np.asarray(value + amplitude_penalty(trials))
 
     def of_columns(self, columns: Integers) -> LinearisedFit:
@@ -143,6 +144,32 @@ class LinearisedFit:
         """Products (p + 1, p + 1) of Jacobian and residual under amplitudes (channels,)."""
         reduced = self.divisions.reduce(amplitude) @ self.cross
         return np.asarray(self.plain - reduced.T @ reduced)
+
+    def _evidence(self, product: Floats, columns: Integers) -> Floats:
+        """Evidence (k, b) without ln|V|; see `_solve`.
+
+        In one Cholesky factor of curvature and gradient, those at a bound after the others, the
+        last row has the gradient divided by the factor of the curvature.
+        """
+        free = np.append(self.movable, False)[columns]  # (k, r)
+        order = np.argsort(~free[:, :-1], axis=1, kind="stable")
+        own = np.take_along_axis(columns[:, :-1], order, axis=1)
+        columns = np.column_stack([own, columns[:, -1]])
+        both = product + self._of_priors
+        try:
+            factor = np.linalg.cholesky(both[:, columns[:, :, None], columns[:, None, :]])
+        except np.linalg.LinAlgError:  # a row has no equilibrium, or columns are alike
+            return self._solve(product, columns)[0]
+        gain = (factor[..., -1, :-1] ** 2 * self.movable[own]).sum(axis=-1)
+        growth = 2.0 * np.log(factor.diagonal(axis1=-2, axis2=-1)[..., :-1]).sum(axis=-1)
+        return np.asarray((product[:, -1, -1, None] - gain + growth + self.constant).T)
+
+    @cached_property
+    def _of_priors(self) -> Floats:
+        """What priors add to products (p + 1, p + 1); the last makes them positive definite."""
+        gradient = -self.prior_gradient[:, None]
+        last = gradient.T @ np.linalg.solve(self.precision, gradient)
+        return np.block([[self.precision, gradient], [gradient.T, last]])
 
     def _solve(self, product: Floats, columns: Integers) -> tuple[Floats, Floats, Floats]:
         """Evidence (k, b) without ln|V|, steps (k, b, r - 1) and curvature (k, b, r - 1, r - 1).

@@ -177,7 +177,8 @@ class StartedFit:
     """A fit to be made to a problem's readings, and the coordinates, by path, that it starts at.
 
     `whiten`, (m, m), replaces the inverse Cholesky factor of the problem's covariance. `near` is
-    the linearisation of an earlier fit to the same readings, at its optimum.
+    the linearisation of an earlier fit to the same readings, at its optimum. `useful` is the
+    evidence, in -2 ln p, above which the fit will not count.
     """
 
     case: Case
@@ -185,6 +186,7 @@ class StartedFit:
     start: Mapping[str, float]
     whiten: Whitening | None = None
     near: Linearisation | None = None
+    useful: float = float("inf")
 
 
 def fit_many(
@@ -287,7 +289,7 @@ AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
 HOPELESS = 40.0
 #: The same below which a fit goes on to a fine tolerance: what is within reach of the best in a
 #: search is, with the prior odds that evidence is without.
-NEAR = 20.0
+NEAR = 15.0
 #: Of several starts of one set of coordinates: what a fit must have below the best of the others to
 #: go on to a fine tolerance, and above it to be repeated no more.
 BETTER, WORSE = 0.1, 10.0
@@ -309,7 +311,6 @@ def fit_marginal(
     problem: FitProblem,
     requests: Sequence[tuple[StartedFit, Floats]],
     lowest: float = float("inf"),
-    of: Sequence[Coordinate] = (),
 ) -> list[MarginalFit | None]:
     """Fits and their evidence; None where the model refuses the fit.
 
@@ -319,9 +320,9 @@ def fit_marginal(
     tolerance, of several starts of one set of coordinates the best. All share the calls of the
     model.
 
-    lowest: Evidence of an earlier fit. `of` are its coordinates, where these fits have the same.
+    lowest: Evidence of an earlier fit.
     """
-    values: ValuesSoFar = {(tuple(c.path for c in of), -1): lowest}
+    values: ValuesSoFar = {((), -1): lowest}
     works = [_marginal(problem, *own, number, values) for number, own in enumerate(requests)]
     return [raised(fit) for fit in in_step(works)]
 
@@ -355,7 +356,7 @@ def _marginal(
         best = min(values.values())
         others = [x for (own, i), x in values.items() if own == paths and i != number]
         other = min(others, default=float("inf"))
-        near = value < best + NEAR and value < other - BETTER
+        near = value < min(best + NEAR, other - BETTER, start.useful)
         hopeless = value >= best + HOPELESS or value >= other + WORSE
         changed = _changed(amplitude, evidence.amplitude)
         if hopeless or not (changed or (near and tolerance is COARSE)):

@@ -21,6 +21,7 @@ from soilml.gap.search.passes import (
 )
 from soilml.gap.search.prediction import predict_with, predictive_gains
 from soilml.gap.search.residual_test import residual_test
+from soilml.gap.search.screening import Singles
 from soilml.gap.search.stepwise import GAP_LEVEL, is_complete, without_search
 from soilml.gap.search.without_outliers import without_outliers
 from soilml.physics.effects.base import Effect
@@ -33,8 +34,7 @@ OPENED_MARGIN = 9.0
 #: The same where less than half the remainder is left. Its evidence may then be a little smaller:
 #: wider priors cost evidence, and what a large remainder takes up is not explained.
 NO_MARGIN = -6.0
-#: What may be missing of either where single effects are then fitted too, if the parameters that
-#: are fitted are the same and only their priors are wider.
+#: What may be missing of either where all likely single effects are then fitted too.
 NEARLY = 10.0
 
 
@@ -95,19 +95,18 @@ def _begun_beyond(
     """A first look with opened priors, which tells whether they can count.
 
     If no effect explains far more in it, sets of several seldom do. None explains more than one
-    alone that leaves nothing within the priors; then the soil alone is tested. Where the parameters
-    that are fitted stay the same, single effects are fitted only if one of the likeliest sets
-    nearly counts.
+    alone that leaves nothing within the priors; then the soil alone is tested. Else the likeliest
+    sets are fitted first and, where more parameters are fitted than before, the first single
+    effects. All likely ones are fitted only if one of these nearly counts.
 
     start: The problem of all readings, with opened priors.
     """
     kept = start if found.excluded is None else of_readings(start, ~found.excluded)
     rival = _rival(found)
     if len(rival.names) == 1 and is_complete(found.problem, rival, found.result, seed):
-        return begin(kept, seed, place, found.result, singles=False)
-    if len(start.soil) > len(found.problem.soil):
-        return begin(kept, seed, place, found.result, likeliest=True)
-    begun = begin(kept, seed, place, found.result, likeliest=True, singles=False)
+        return begin(kept, seed, place, found.result, singles="none")
+    singles: Singles = "first" if len(start.soil) > len(found.problem.soil) else "none"
+    begun = begin(kept, seed, place, found.result, likeliest=True, singles=singles)
     first = begun[0]
     nearly = any(explains_better(found, first, c, NEARLY) for c in first.result.candidates)
     return with_singles(begun, seed) if nearly else begun

@@ -20,6 +20,10 @@ from soilml.gap.evidence.problem import (
 )
 from soilml.numerics.subspaces import ROUNDING, column_space, project_out
 
+#: Evidence, in -2 ln p above that of the catalogue's law, from which a coarse fit of free shapes
+#: stays coarse: a fine one seldom lowers it by that much.
+NEARLY_SUPPORTED = 2.0
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -156,7 +160,9 @@ def fit_shapes(
             own = candidate.catalogue_law.fit
             coordinates = [*own.coordinates, *shapes]
             start = {**own.start_values(), **fit.start_values()}
-            started.append((StartedFit(own.case, coordinates, start), amplitude))
+            useful = candidate.catalogue_law.evidence.value + NEARLY_SUPPORTED
+            new = StartedFit(own.case, coordinates, start, near=fit.linearisation, useful=useful)
+            started.append((new, amplitude))
             index.append(i)
     free: dict[int, MarginalFit | None] = {}
     lowest = min((c.best.evidence.value for c in candidates), default=np.inf)

@@ -30,8 +30,14 @@ from soilml.gap.search.explanation import restated_candidates
 from soilml.gap.search.likelier_scatter import with_likelier_scatter
 from soilml.gap.search.prediction import Predictions
 from soilml.gap.search.residual_test import ResidualTest
-from soilml.gap.search.screening import Starts, likeliest_sets
-from soilml.gap.search.stepwise import SearchResult, first_look, search, without_search
+from soilml.gap.search.screening import Singles, Starts, likeliest_sets
+from soilml.gap.search.stepwise import (
+    SearchResult,
+    first_look,
+    look_further,
+    search,
+    without_search,
+)
 from soilml.remarks import Remark
 from soilml.row_status import Status
 
@@ -88,7 +94,7 @@ def begin(
     explained: Solution | None = None,
     *,
     likeliest: bool = False,
-    singles: bool = True,
+    singles: Singles = "all",
 ) -> Begun:
     """The covariance and a first look, from the explanations of an `earlier` search.
 
@@ -110,12 +116,15 @@ def begin(
         if status not in (Status.TOO_HEAVY, Status.NOT_CONVERGED):
             text = f"{place(row)}: {status.reason}"
         return Analysis(problem, no_result(soil), error=Remark("no-equilibrium", text)), {}
-    best = soil
+    best: Solution = soil
+    signatures: Sequence[Signature] = ()
     if explained is not None:
         (best,) = restated(problem, [explained])
     elif earlier is not None and earlier.accepted:  # it may be one that outliers have moved
         best = min(soil, starts[earlier.accepted[0].names].fit, key=lambda fit: fit.objective)
-    problem = with_estimated_covariance(problem, best, ())
+        if best is not soil:
+            signatures = earlier.final_test.signatures
+    problem = with_estimated_covariance(problem, best, signatures)
     soil = problem.fit_soil([soil.x], soil.linearisation)
     sets = likeliest_sets(starts) if likeliest else ()
     without_gain = frozenset[str]()
@@ -128,15 +137,10 @@ def begin(
 
 
 def with_singles(begun: Begun, seed: int) -> Begun:
-    """The same look with single effects too, and the likeliest sets of all that are known.
-
-    The covariance stays what it was.
-    """
+    """The same look with all likely single effects."""
     first, starts = begun
-    look = first.result
-    starts = {**starts, **{c.names: c for c in look.candidates}}
-    sets, without_gain = likeliest_sets(starts), look.without_gain
-    result = first_look(first.problem, look.soil, seed, starts, sets, without_gain=without_gain)
+    starts = {**starts, **{c.names: c for c in first.result.candidates}}
+    result = look_further(first.problem, first.result, seed, starts)
     return replace(first, result=result), starts
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from typing import Literal
 
 import numpy as np
 
@@ -106,6 +107,11 @@ WITHIN_REACH = 15.0
 #: Decrease of the objective, but for the penalty of an effect, below which it explains nothing.
 LEAST_GAIN = 1.0
 
+#: So many of each other ranking, and `MIN_FITTED` by gain, are fitted where the first will do.
+FIRST_OF_EACH = 2
+#: Which single effects a look fits: all that are likely, the first of each ranking, or none.
+Singles = Literal["all", "first", "none"]
+
 #: Candidates of an earlier search, by effect names, whose optima are starts of this one.
 Starts = Mapping[tuple[str, ...], Explanation]
 
@@ -118,6 +124,8 @@ def effects_to_fit(
     gains: Mapping[str, float],
     starts: Starts,
     without_gain: Set[str] = frozenset(),
+    *,
+    few: bool = False,
 ) -> dict[str, bool]:
     """The effects that are fitted in full, each alone, and whether they start under noise too.
 
@@ -133,6 +141,7 @@ def effects_to_fit(
     soil_alone, soil: The soil alone, beside a discrepancy and under noise alone.
     gains: Predicted decrease of the objective by each effect.
     without_gain: Effects that explained nothing in an earlier search of the same soil.
+    few: Select the first of each ranking only.
     """
     selected = _largest_gains(gains)
     amplitude = soil_alone.amplitude
@@ -148,6 +157,8 @@ def effects_to_fit(
     lowest = min((c.objective for c in starts.values()), default=0.0)
     single = [c for names, c in starts.items() if len(names) == 1]
     ranked.append([c.names[0] for c in single if c.objective < lowest + WITHIN_REACH])
+    if few:
+        selected, ranked = selected[:MIN_FITTED], [own[:FIRST_OF_EACH] for own in ranked]
     names = dict.fromkeys([*selected, *(name for own in ranked for name in own)])
     left_out = {n for n in without_gain if gains.get(n, 0.0) + problem.penalties[n] < LEAST_GAIN}
     left_out -= set(selected[:1])

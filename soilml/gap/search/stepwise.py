@@ -25,6 +25,7 @@ from soilml.gap.search.posterior import Posterior, explanations, for_decisions, 
 from soilml.gap.search.residual_test import ResidualTest, residual_test
 from soilml.gap.search.screening import (
     WITHIN_REACH,
+    Singles,
     Starts,
     effects_to_fit,
     explained_nothing,
@@ -58,6 +59,8 @@ MIN_IMPROVEMENT = 1.0
 #: Explanations whose soils the soil alone is fitted from again, and the decrease of its objective
 #: above which that is another optimum.
 SOILS_AGAIN, SAME_OPTIMUM = 2, 0.1
+#: Change of each soil parameter, as a fraction of its prior, below which two soils are the same.
+SAME_SOIL = 0.05
 
 
 @dataclass(frozen=True)
@@ -163,6 +166,8 @@ def search(
         fitted |= {c.names: c for c in level}
         if not level or min(c.objective for c in level) > best.objective - MIN_IMPROVEMENT:
             break
+    if len(fitted) == len(first.candidates):
+        return first
     return _concluded(problem, first, fitted, seed)
 
 
@@ -173,38 +178,58 @@ def first_look(
     starts: Starts,
     sets: Sequence[tuple[str, ...]] = (),
     *,
-    singles: bool = True,
+    singles: Singles = "all",
     without_gain: Set[str] = frozenset(),
 ) -> SearchResult:
     """The test for a gap, and where there is one the explanations by single effects.
 
     sets: Other sets that are fitted too.
-    singles: Fit single effects. With neither these nor sets, it is the test alone.
+    singles: Which single effects are fitted. With neither these nor sets, it is the test alone.
     without_gain: Those that explained nothing in an earlier search of this soil; they are left out.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
     soil_test = residual_test(problem, soil, signatures, seed, within_priors=True)
     found = without_search(soil, soil_test, untestable)
-    if not (singles or sets) or soil_test.p_value >= GAP_LEVEL:
+    if (singles == "none" and not sets) or soil_test.p_value >= GAP_LEVEL:
         return found
-    soil_alone = _fit_soil_alone(problem, soil, starts)
-    gains = predicted_with_and_without(problem, soil_alone, soil, signatures)
-    likely = effects_to_fit(
-        problem, soil_alone, soil, signatures, gains=gains, starts=starts, without_gain=without_gain
+    alone = _fit_soil_alone(problem, soil, starts)
+    gains = predicted_with_and_without(problem, alone, soil, signatures)
+    found = replace(
+        found, candidates=(alone,), predicted_gain=gains, without_gain=frozenset(without_gain)
     )
-    selected = dict.fromkeys([*sets, *((name,) for name in likely if singles)], soil_alone)
+    return look_further(problem, found, seed, starts, sets, singles=singles)
+
+
+def look_further(
+    problem: FitProblem,
+    look: SearchResult,
+    seed: int,
+    starts: Starts,
+    sets: Sequence[tuple[str, ...]] = (),
+    *,
+    singles: Singles = "all",
+) -> SearchResult:
+    """A look with the soil alone in it, and the sets and single effects that it lacks."""
+    fitted, soil = {c.names: c for c in look.candidates}, look.soil
+    signatures, soil_alone = look.soil_test.signatures, fitted[()]
+    gains, likely = look.predicted_gain, dict[str, bool]()
+    if singles != "none":
+        few, without_gain = singles == "first", look.without_gain
+        likely = effects_to_fit(
+            problem, soil_alone, soil, signatures, gains, starts, without_gain, few=few
+        )
+    asked = dict.fromkeys([*sets, *((name,) for name in likely)], soil_alone)
+    selected = {names: base for names, base in asked.items() if names not in fitted}
     under_noise = {name for name, also in likely.items() if also}
     level = _fit_level(problem, soil, soil_alone, selected, starts, under_noise)
-    again = _from_soils_of(problem, soil_alone, level)
+    again = _from_soils_of(problem, soil_alone, level, starts)
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
-    fitted = {c.names: c for c in [again, *level]}
-    without_gain = explained_nothing(problem, fitted) | {
-        n for n in without_gain if (n,) not in fitted
-    }
-    return _concluded(
-        problem, replace(found, predicted_gain=gains, without_gain=without_gain), fitted, seed
-    )
+    fitted |= {c.names: c for c in [again, *level]}
+    nothing = explained_nothing(problem, fitted)
+    nothing |= {n for n in look.without_gain if (n,) not in fitted}
+    look = replace(look, predicted_gain=gains, without_gain=nothing)
+    return _concluded(problem, look, fitted, seed)
 
 
 def _concluded(
@@ -214,8 +239,6 @@ def _concluded(
     seed: int,
 ) -> SearchResult:
     """The result of a search, from that of its first look and all candidates."""
-    if len(fitted) == len(first.candidates):
-        return first
     candidates = tuple(sorted(fitted.values(), key=lambda c: c.objective))
     gains, alone = first.predicted_gain, fitted[()]
     accepted = explanations(candidates, for_decisions(candidates, gains, alone))
@@ -242,21 +265,32 @@ def _fit_soil_alone(problem: FitProblem, soil: Solution, starts: Starts) -> Expl
 
 
 def _from_soils_of(
-    problem: FitProblem, soil_alone: Explanation, level: Sequence[Explanation]
+    problem: FitProblem, soil_alone: Explanation, level: Sequence[Explanation], starts: Starts
 ) -> Explanation:
     """The soil alone, fitted from the soils of the best explanations too.
 
     It is each of them without its effects. Where the soil has several optima, that of the soil
-    alone would otherwise be compared with better ones, and any effect be preferred to none.
+    alone would otherwise be compared with better ones, and any effect be preferred to none. Soils
+    that an earlier search has tried are not tried again.
     """
     started = [
         (StartedFit(problem.case, problem.soil, c.fit.start_values()), c.amplitude)
         for c in sorted(level, key=lambda c: c.objective)[:SOILS_AGAIN]
+        if c.names not in starts or not _is_same_soil(starts[c.names].fit, c.fit)
     ]
-    fits = fit_marginal(problem, started, soil_alone.best.evidence.value, problem.soil)
+    fits = fit_marginal(problem, started, soil_alone.best.evidence.value)
     found = [Explanation((), m) for m in fits if m is not None]
     best = min([soil_alone, *found], key=lambda c: c.objective)
     return best if best.objective < soil_alone.objective - SAME_OPTIMUM else soil_alone
+
+
+def _is_same_soil(one: Solution, other: Solution) -> bool:
+    values = one.start_values()
+    return all(
+        abs(x - values[c.path]) < SAME_SOIL
+        for c, x in zip(other.coordinates, other.x, strict=True)
+        if not c.effect
+    )
 
 
 def _fit_level(

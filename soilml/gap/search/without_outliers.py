@@ -161,7 +161,9 @@ def _settled(
     fit, amplitude = result.best, problem.declared_amplitude
     if result.accepted:
         amplitude = result.accepted[0].amplitude
-    signatures = problem.signatures_beside(*restated(problem, [fit]))  # fits differ little
+    signatures: Sequence[Signature] = result.final_test.signatures  # fits differ little
+    if len(fit.measured) != len(problem.readings):
+        signatures = problem.signatures_beside(*restated(problem, [fit]))
     for _ in range(SETTLING_FITS):
         if not excluded.any() or _are_many(excluded):
             break

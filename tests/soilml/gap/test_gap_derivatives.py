@@ -118,21 +118,23 @@ def test_sinkage_is_predicted_to_first_order(problem, braking):
     assert np.abs(error).max() < 1e-2 * moved
 
 
-@pytest.mark.parametrize("nearest", [False, True])
+@pytest.mark.parametrize("nearest, rough", [(False, False), (True, False), (True, True)])
 @pytest.mark.parametrize("distance", [0.0, 1e-3, 0.1, 3.0, np.nan])
 @pytest.mark.parametrize("name", ["slip-sinkage", "load-transfer", "stress-shift"])
-def test_trials_near_an_equilibrium_reach_it(problem, name, distance, nearest):
+def test_trials_near_an_equilibrium_reach_it(problem, name, distance, nearest, rough):
     case, coordinates, x = with_coordinates(problem, name)
     request = PredictionRequest(case, coordinates, x[None, :], problem.readings)
     (at,), (searched,) = linearise_many([request]), predict_many([request])
-    estimate = SinkageEstimate(at.log_sinkage[None, :] + distance, at.slope[None, :], nearest)
+    at = at.log_sinkage[None, :] + distance, at.slope[None, :]
+    estimate = SinkageEstimate(*at, nearest=nearest, rough=rough)
     (near,) = predict_many([replace(request, estimate=estimate)])
+    rtol = 1e-4 if nearest and not rough else 1e-6
+    atol = 0.1 * rtol * np.ptp(searched)
     if nearest and not distance <= 0.1:  # a trial that is too far off is left without readings
         solved = np.isfinite(near)
         assert not solved.all()
-        np.testing.assert_allclose(near[solved], searched[solved], rtol=1e-6)
-        return
-    np.testing.assert_allclose(near, searched, rtol=1e-6)
+        near, searched = near[solved], searched[solved]
+    np.testing.assert_allclose(near, searched, rtol=rtol, atol=atol)
 
 
 def test_cases_evaluated_together_predict_what_they_predict_alone(problem):

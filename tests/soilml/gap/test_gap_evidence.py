@@ -8,7 +8,7 @@ from gap_sets import case_of, driven, fit_problem
 
 from soilml.config.measurement_noise import Discrepancy
 from soilml.fitting.covariance import discrepancy_process
-from soilml.gap.evidence.linearised_fit import AMPLITUDES, amplitude_penalty
+from soilml.gap.evidence.linearised_fit import AMPLITUDES, LinearisedFit, amplitude_penalty
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, _size_prior, outside_bounds
 from soilml.gap.evidence.problem import StartedFit, fit_many
 from soilml.numerics.prior import UNIFORM_PRECISION
@@ -158,3 +158,26 @@ def test_the_prior_of_a_size_falls_beyond_usual_sizes():
     ahead = _size_prior(20.001, two_sided=False)[2]
     assert (ahead - at) / 0.001 == pytest.approx(2.0 * slope, rel=1e-3)
     assert curvature > 0.0
+
+
+@pytest.mark.parametrize("held", [[], [1], [0, 4]])
+def test_the_evidence_is_that_of_the_step_of_all_coordinates_that_are_not_at_a_bound(held):
+    rng = np.random.default_rng(4)
+    movable = ~np.isin(np.arange(6), held)
+    gradient = np.asarray([0.0, 0.0, 0.3, -2.0, 0.0, 0.0])
+    fit = LinearisedFit(None, None, None, np.diag([3.0, 3, 1, 4, 2, 1]), gradient, movable, 1.5)
+    jacobian = rng.normal(size=(2, 30, 7))
+    product = jacobian.swapaxes(1, 2) @ jacobian
+    columns = np.asarray([[0, 1, 2, 3, 6], [0, 1, 2, 4, 6]])
+    found = fit._evidence(product, columns)
+    for model, own in enumerate(columns[:, :-1]):
+        free = own[movable[own]]
+        for i, all_columns in enumerate(product):
+            h, g = all_columns + np.pad(fit.precision, (0, 1)), all_columns[:6, 6] - gradient
+            step = np.linalg.solve(h[np.ix_(free, free)], g[free])
+            left = all_columns[6, 6] - g[free] @ step
+            growth = np.linalg.slogdet(h[np.ix_(own, own)])[1]
+            assert found[model, i] == pytest.approx(left + growth + 1.5, rel=1e-10)
+    product[1] = np.nan  # a row has no equilibrium
+    again = fit._evidence(product, columns)
+    assert again[:, 0] == pytest.approx(found[:, 0], rel=1e-10) and np.isnan(again[:, 1]).all()

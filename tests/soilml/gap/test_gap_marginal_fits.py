@@ -1,6 +1,6 @@
 """Fits beside a discrepancy: when they are repeated, and amplitudes over their probability."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -31,6 +31,7 @@ class Started:
     start: dict = field(default_factory=dict)
     whiten: object = None
     near: object = None
+    useful: float = np.inf
 
 
 @pytest.fixture
@@ -100,8 +101,8 @@ def test_a_fit_far_above_the_best_is_not_repeated(fitting, above, again):
 
 def test_fits_near_the_best_go_on_to_a_fine_tolerance(fitting):
     problem, listed, asked = fitting
-    listed |= {"best": [(5.0, 0.0)], "near": [(24.9, 0.0)], "far": [(25.1, 0.0)]}
-    listed |= {"becomes-near": [(25.1, 1.0), (6.0, 1.0)]}
+    listed |= {"best": [(5.0, 0.0)], "near": [(19.9, 0.0)], "far": [(20.1, 0.0)]}
+    listed |= {"becomes-near": [(20.1, 1.0), (6.0, 1.0)]}
     fit_marginal(problem, [(started(name), np.zeros(1)) for name in listed])
     fine = {name: [fine for own, *_, fine in asked if own == name] for name in listed}
     assert fine == {
@@ -128,19 +129,13 @@ def test_a_start_that_is_worse_than_another_of_its_set_is_not_repeated(fitting, 
     assert names(asked) == ["one", "one", *["other"] * rounds]
 
 
-@pytest.mark.parametrize(
-    "value, rounds", [(49.8, "coarse, fine"), (49.95, "coarse"), (61.0, "coarse")]
-)
-def test_an_earlier_fit_of_the_same_coordinates_counts_as_one_of_several_starts(
-    fitting, value, rounds
-):
+@pytest.mark.parametrize("useful, fine", [(4.9, False), (5.1, True)])
+def test_a_fit_that_will_not_count_stays_coarse(fitting, useful, fine):
     problem, listed, asked = fitting
-    listed["again"] = [(value, 0.2)]
-    (found,) = fit_marginal(
-        problem, [(started("again", "path"), np.zeros(1))], 50.0, [SimpleNamespace(path="path")]
-    )
-    assert found.evidence.value == value
-    assert [fine for *_, fine in asked] == [False, True][: 1 + rounds.count("fine")]
+    listed["one"] = [(5.0, 0.2)]
+    request = replace(started("one"), useful=useful)
+    fit_marginal(problem, [(request, np.zeros(1))])
+    assert [fine for *_, fine in asked] == [False, True][: 1 + fine]
 
 
 def test_fits_that_the_model_refuses_or_that_have_no_equilibrium_are_none(fitting):

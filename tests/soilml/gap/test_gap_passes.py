@@ -166,7 +166,7 @@ def test_a_load_that_the_model_cannot_carry_is_bad_data(passes):
     assert isinstance(found.result, SearchResult) and not found.result.has_gap
 
 
-TEST_ALONE, LIKELIEST, SINGLES = (False, False), (True, False), (True, True)
+TEST_ALONE, LIKELIEST, FIRST = (False, "none"), (True, "none"), (True, "first")
 FURTHER = "the same look goes on"
 
 
@@ -175,8 +175,8 @@ FURTHER = "the same look goes on"
     [
         (("a",), True, True, False, [TEST_ALONE]),
         (("a",), True, False, True, [TEST_ALONE]),
-        (("a",), False, True, False, [SINGLES]),
-        (("a", "b"), True, True, False, [SINGLES]),
+        (("a",), False, True, False, [FIRST]),
+        (("a", "b"), True, True, True, [FIRST, FURTHER]),
         (("a",), False, False, False, [LIKELIEST]),
         (("a",), False, False, True, [LIKELIEST, FURTHER]),
         (("a", "b"), True, False, True, [LIKELIEST, FURTHER]),
@@ -185,7 +185,7 @@ FURTHER = "the same look goes on"
 def test_effects_are_fitted_with_opened_priors_where_they_can_count(
     passes, monkeypatch, rival, complete, freed, near, expected
 ):
-    """None where one alone explains all; the likeliest first where no other parameter is free."""
+    """None where one alone explains all; the first where more parameters are free than before."""
     given, run = passes
     given.accepted, asked = [None], []
     soil = fit_problem(CASE, driven(CASE)).fit_soil([np.full(3, 0.5)])
@@ -196,7 +196,7 @@ def test_effects_are_fitted_with_opened_priors_where_they_can_count(
     opened = OpenedPriors(CASE, more, Remark("prior-opened", ""))
     begun = module.Analysis(soil.problem, look), {}
 
-    def begin(*_, likeliest=False, singles=True):
+    def begin(*_, likeliest=False, singles="all"):
         asked.append((likeliest, singles))
         return begun
 
@@ -338,9 +338,10 @@ def test_an_excluded_reading_is_judged_alone_and_cleared_for_good_where_it_does_
     assert not again.any()
 
 
-def by_soil(fit):
+def by_soil(fit, signatures=()):
     """The result of a search whose best explanation is this fit."""
-    return SimpleNamespace(best=fit, accepted=())
+    test = SimpleNamespace(signatures=signatures)
+    return SimpleNamespace(best=fit, accepted=(), final_test=test)
 
 
 def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
@@ -350,7 +351,8 @@ def test_the_outliers_of_an_explanation_settle_without_a_search(two_outliers):
     # a lesser one strays too, but less than half as far
     stray = rounds._strays_from(problem, all_of_them, ())(~none)
     assert np.array_equal(stray, largest)
-    found, cleared, last = rounds._settled(problem, by_soil(all_of_them), largest, none)
+    result = by_soil(all_of_them, problem.signatures_beside(all_of_them))
+    found, cleared, last = rounds._settled(problem, result, largest, none)
     assert np.array_equal(found, wrong) and not cleared.any()
     assert len(last.prediction) == 94
     found, cleared, _ = rounds._settled(problem, by_soil(fit), excluded, none)

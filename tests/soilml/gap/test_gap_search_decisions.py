@@ -49,10 +49,12 @@ def screens(monkeypatch):
     return given
 
 
-def likely(gains, amplitude=(0.1, 0.0), starts=None, without_gain=frozenset()):
+def likely(gains, amplitude=(0.1, 0.0), starts=None, without_gain=frozenset(), few=False):
     none = made(objective=1.0, amplitude=amplitude)
     problem = SimpleNamespace(penalties=dict.fromkeys(gains, 7.0))
-    return screening.effects_to_fit(problem, none, fit_of(), [], gains, starts or {}, without_gain)
+    return screening.effects_to_fit(
+        problem, none, fit_of(), [], gains, starts or {}, without_gain, few=few
+    )
 
 
 def selected(gains, **given):
@@ -105,6 +107,14 @@ def test_the_first_six_of_those_start_under_noise_too_and_those_close_by_their_o
     # one that an earlier search has fitted starts where that found it
     assert {name for name, also in found.items() if also} == set("ACDEF") | set("SP")
     assert not any(likely(gains, amplitude=(2.4, 0.0)).values())
+
+
+def test_the_first_few_are_the_four_of_largest_gain_and_two_of_each_other_ranking(screens):
+    gains = {name: 50.0 - i for i, name in enumerate("abcdef")} | dict.fromkeys("ABCPQRXYZ", 0.0)
+    for ranking, names in {"none": "ABC", "soil": "PQR", "noise": "XYZ"}.items():
+        screens[ranking] = {name: 20.0 - 9.0 * i for i, name in enumerate(names)}
+    assert selected(gains, amplitude=(2.5, 0.0), few=True) == [*"abcd", *"ABPQXY"]
+    assert selected(gains, amplitude=(2.5, 0.0)) == [*"abcdef", *"ABCPQRXYZ"]
 
 
 def test_single_effects_within_15_of_the_best_of_an_earlier_search_are_fitted_again(screens):
@@ -288,11 +298,11 @@ def searched(monkeypatch):
         return {(*c.names, "abc"[len(c.names)]): c for c in level}
 
     for name, value in {
-        "residual_test": lambda *_, **_kw: SimpleNamespace(p_value=seen.p_value),
+        "residual_test": lambda *_, **_kw: SimpleNamespace(p_value=seen.p_value, signatures=()),
         "_fit_soil_alone": lambda *_: made(objective=seen.objective[0]),
         "predicted_with_and_without": lambda *_: {"a": 5.0},
         "effects_to_fit": lambda *_, **__: {"a": True},
-        "_from_soils_of": lambda problem, soil_alone, level: seen.again or soil_alone,
+        "_from_soils_of": lambda problem, soil_alone, *_: seen.again or soil_alone,
         "_fit_level": fit_level,
         "_extensions": grown,
         "is_complete": lambda problem, best, known, seed: best.names == seen.complete,
@@ -374,8 +384,8 @@ def test_a_better_optimum_of_the_soil_alone_takes_its_place(searched):
 def test_the_soil_alone_starts_from_the_soils_of_the_two_best_explanations(monkeypatch):
     started = []
 
-    def fit_marginal(problem, fits, lowest, of):
-        assert (lowest, of) == (50.0, ("the soil",))
+    def fit_marginal(problem, fits, lowest):
+        assert lowest == 50.0
         started.append(fits)
         return [made(objective=value).catalogue_law for value in objectives]
 
@@ -383,7 +393,7 @@ def test_the_soil_alone_starts_from_the_soils_of_the_two_best_explanations(monke
     level = [made("a", objective=30.0), made("b", objective=10.0), made("c", objective=20.0)]
     problem, own = SimpleNamespace(case=None, soil=("the soil",)), made(objective=50.0)
     objectives = [49.95, 60.0]
-    assert stepwise._from_soils_of(problem, own, level) is own  # the same optimum again
+    assert stepwise._from_soils_of(problem, own, level, {}) is own  # the same optimum again
     assert len(started[0]) == 2
     objectives = [60.0, 40.0]
-    assert stepwise._from_soils_of(problem, own, level).objective == 40.0
+    assert stepwise._from_soils_of(problem, own, level, {}).objective == 40.0

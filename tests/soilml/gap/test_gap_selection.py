@@ -10,7 +10,7 @@ from gap_sets import case_of, driven, fit_problem
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.gap.evidence.marginal_likelihood import Evidence
 from soilml.gap.evidence.problem import MarginalFit
-from soilml.gap.search import passes
+from soilml.gap.search import passes, stepwise
 from soilml.gap.search.screening import (
     MIN_FITTED,
     effects_to_fit,
@@ -82,15 +82,36 @@ def test_an_effect_within_reach_of_an_earlier_search_is_fitted_again(moved, scre
     assert "stress-shift" in effects_to_fit(problem, none, soil, own, gains, starts)
 
 
-def test_a_look_goes_on_with_singles_from_all_that_is_known(monkeypatch):
+def test_a_look_goes_on_from_all_that_is_known(monkeypatch):
     made = SimpleNamespace
     earlier, first = made(names=("a",), objective=9.0), made(names=("b",), objective=1.0)
     replaced = made(names=("a",), objective=5.0)
-    look = replace(passes.no_result("soil"), candidates=(first, replaced), without_gain={"c"})
+    look = replace(passes.no_result("soil"), candidates=(first, replaced))
     begun = passes.Analysis("problem", look), {("a",): earlier}
-    monkeypatch.setattr(passes, "first_look", lambda *given, **kw: (*given, kw))
+    monkeypatch.setattr(passes, "look_further", lambda *given: given)
     found, starts = passes.with_singles(begun, 7)
     assert starts == {("a",): replaced, ("b",): first}
-    sets = [("b",), ("a",)]  # the likeliest first
-    assert found.result == ("problem", "soil", 7, starts, sets, {"without_gain": {"c"}})
-    assert found.problem == "problem"
+    assert found.result == ("problem", look, 7, starts) and found.problem == "problem"
+
+
+def test_the_soil_alone_is_not_fitted_again_from_soils_that_an_earlier_search_has_tried(
+    monkeypatch,
+):
+    def explained(name, cohesion, size):
+        coordinates = SimpleNamespace(path="c", effect=""), SimpleNamespace(path=name, effect=name)
+        fit = SimpleNamespace(coordinates=coordinates, x=np.asarray([cohesion, size]))
+        fit.start_values = lambda: {"c": cohesion, name: size}
+        return SimpleNamespace(names=(name,), fit=fit, amplitude=None, objective=0.0)
+
+    asked = []
+    monkeypatch.setattr(stepwise, "fit_marginal", lambda _, fits, low: asked.extend(fits) or [])
+    problem = SimpleNamespace(case=None, soil=())
+    best = SimpleNamespace(evidence=SimpleNamespace(value=9.0))
+    alone = SimpleNamespace(best=best, objective=9.0)
+    starts = {("a",): explained("a", 0.5, 0.1), ("b",): explained("b", 0.5, 0.1)}
+    level = [explained("a", 0.54, 0.9), explained("b", 0.56, 0.1)]
+    assert stepwise._from_soils_of(problem, alone, level, starts) is alone
+    assert [fit.start["c"] for fit, _ in asked] == [0.56]  # the soil of `a` has stayed
+    asked.clear()
+    stepwise._from_soils_of(problem, alone, level, {})
+    assert len(asked) == 2

@@ -131,6 +131,8 @@ def test_shapes_start_from_the_free_law_of_an_earlier_search(dug, monkeypatch):
     ((start, amplitude),) = asked
     assert start.start == before.free_law.fit.start_values()
     assert amplitude is before.free_law.evidence.amplitude
+    assert start.near is before.free_law.fit.linearisation
+    assert start.useful == again.catalogue_law.evidence.value + 2.0
     assert [c.path for c in start.coordinates] == [c.path for c in before.free_law.fit.coordinates]
     asked.clear()
     explanation.fit_shapes(problem, [again], {found.names: found})  # it had no free law
