@@ -26,7 +26,7 @@ T = TypeVar("T")
 #: Iterations after which a descent is abandoned as not converged; typical fits need five to ten.
 MAX_ITERATIONS = 25
 #: A step that achieves this fraction of what the linearised model promises is followed by one step
-#: alone, and else by a choice of several.
+#: alone, and else by a choice of several. Where none of these does, they are corrected too.
 KEPT_PROMISE = 0.5
 #: Levenberg-Marquardt damping: the first value, the factors that are tried in each iteration, the
 #: factor after an iteration without improvement, and the bounds.
@@ -327,10 +327,10 @@ def descent(
     """One descent; see `descend_together`.
 
     As long as the linearised model keeps its promise, each iteration is one step, at the end of
-    which the model is linearised again. Else several dampings are tried first, each with and
-    without a correction by what of the model is not linear. Trials start at the sinkage that the
-    last iterate predicts. An iterate is solved by the full search; it is no improvement where that
-    finds an equilibrium before the one of the trial.
+    which the model is linearised again. Else several dampings are tried first and, where none keeps
+    the promise, each with a correction by what of the model is not linear. Trials start at the
+    sinkage that the last iterate predicts. An iterate is solved by the full search; it is no
+    improvement where that finds an equilibrium before the one of the trial.
     """
     steps = DampedSteps.of(problem)
 

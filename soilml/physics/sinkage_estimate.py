@@ -48,8 +48,7 @@ class SinkageEstimate:
     need not be the first, at which a gear comes to rest. With `nearest` it is accepted, and rows
     that are not solved from the estimate stay so: trials of a descent, whose result is solved
     again, permit that. Without, the crossing is checked, and such rows are solved as in an ordinary
-    search. With `nearest`, what is found is accurate to about 1e-4 only, and to 1e-6 with `rough`,
-    which is for differences, and for searches that a Newton step follows.
+    search. With `rough`, what is found is accurate to about 1e-6, and with `nearest` alone to 1e-4.
     """
 
     log_sinkage: Array  # ln(z / m)

@@ -151,14 +151,13 @@ class LinearisedFit:
         In one Cholesky factor of curvature and gradient, those at a bound after the others, the
         last row has the gradient divided by the factor of the curvature.
         """
-        free = np.append(self.movable, False)[columns]  # (k, r)
-        order = np.argsort(~free[:, :-1], axis=1, kind="stable")
+        order = np.argsort(~self.movable[columns[:, :-1]], axis=1, kind="stable")
         own = np.take_along_axis(columns[:, :-1], order, axis=1)
         columns = np.column_stack([own, columns[:, -1]])
         both = product + self._of_priors
         try:
             factor = np.linalg.cholesky(both[:, columns[:, :, None], columns[:, None, :]])
-        except np.linalg.LinAlgError:  # a row has no equilibrium, or columns are alike
+        except np.linalg.LinAlgError:  # not positive definite, by rounding
             return self._solve(product, columns)[0]
         gain = (factor[..., -1, :-1] ** 2 * self.movable[own]).sum(axis=-1)
         growth = 2.0 * np.log(factor.diagonal(axis1=-2, axis2=-1)[..., :-1]).sum(axis=-1)

@@ -287,8 +287,8 @@ AMPLITUDE_TOLERANCE, AMPLITUDE_RATIO = 0.3, 0.7
 #: Evidence, in -2 ln p above the best, beyond which a fit is not repeated: repetition lowers it by
 #: 35 at most, by less than 10 for most fits.
 HOPELESS = 40.0
-#: The same below which a fit goes on to a fine tolerance: what is within reach of the best in a
-#: search is, with the prior odds that evidence is without.
+#: The same below which a fit goes on to a fine tolerance: most of what is within reach of the best
+#: in a search, which has prior odds too.
 NEAR = 15.0
 #: Of several starts of one set of coordinates: what a fit must have below the best of the others to
 #: go on to a fine tolerance, and above it to be repeated no more.
@@ -316,7 +316,7 @@ def fit_marginal(
 
     Each request has the amplitudes of the discrepancy by channel to start with. Fit and amplitudes
     are repeated in turn until the amplitudes hardly change, for fits whose evidence is not far
-    above the lowest so far. The fits are coarse first; those near the lowest go on to a fine
+    above the lowest so far. The fits are coarse first; useful ones near the lowest go on to a fine
     tolerance, of several starts of one set of coordinates the best. All share the calls of the
     model.
 

@@ -91,12 +91,16 @@ class CandidateRequest:
     near: Linearisation | None = None
 
 
-def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) -> list[Explanation]:
+def fit_candidates(
+    problem: FitProblem, requests: Sequence[CandidateRequest], lowest: float = np.inf
+) -> list[Explanation]:
     """Fit sets of effects jointly with the soil, each effect by its catalogue law.
 
     With `noise_start`, a set is also fitted under noise alone, and from there beside a discrepancy:
     beside a large one, a fit can stay where the effect is not needed. Sets that the
     model refuses are left out.
+
+    lowest: Evidence of the best candidate so far.
     """
     no_discrepancy = np.zeros(len(problem.readings.channels))
     beside = [
@@ -107,7 +111,7 @@ def fit_candidates(problem: FitProblem, requests: Sequence[CandidateRequest]) ->
         for r in requests
         if r.noise_start is not None
     ]
-    marginal = iter(fit_marginal(problem, [*beside, *alone]))
+    marginal = iter(fit_marginal(problem, [*beside, *alone], lowest))
     found = [next(marginal) for _ in requests]
     from_noise = [next(marginal) if r.noise_start is not None else None for r in requests]
     candidates = []

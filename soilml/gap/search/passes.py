@@ -139,7 +139,6 @@ def begin(
 def with_singles(begun: Begun, seed: int) -> Begun:
     """The same look with all likely single effects."""
     first, starts = begun
-    starts = {**starts, **{c.names: c for c in first.result.candidates}}
     result = look_further(first.problem, first.result, seed, starts)
     return replace(first, result=result), starts
 

@@ -107,7 +107,7 @@ WITHIN_REACH = 15.0
 #: Decrease of the objective, but for the penalty of an effect, below which it explains nothing.
 LEAST_GAIN = 1.0
 
-#: So many of each other ranking, and `MIN_FITTED` by gain, are fitted where the first will do.
+#: With `few`, so many of each ranking are fitted, and `MIN_FITTED` of the largest gains.
 FIRST_OF_EACH = 2
 #: Which single effects a look fits: all that are likely, the first of each ranking, or none.
 Singles = Literal["all", "first", "none"]

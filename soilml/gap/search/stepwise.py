@@ -209,7 +209,7 @@ def look_further(
     *,
     singles: Singles = "all",
 ) -> SearchResult:
-    """A look with the soil alone in it, and the sets and single effects that it lacks."""
+    """The look, in which the soil alone is fitted, with what it lacks; see `first_look`."""
     fitted, soil = {c.names: c for c in look.candidates}, look.soil
     signatures, soil_alone = look.soil_test.signatures, fitted[()]
     gains, likely = look.predicted_gain, dict[str, bool]()
@@ -221,7 +221,8 @@ def look_further(
     asked = dict.fromkeys([*sets, *((name,) for name in likely)], soil_alone)
     selected = {names: base for names, base in asked.items() if names not in fitted}
     under_noise = {name for name, also in likely.items() if also}
-    level = _fit_level(problem, soil, soil_alone, selected, starts, under_noise)
+    others = [c for c in look.candidates if c.names]
+    level = _fit_level(problem, soil, soil_alone, selected, starts, under_noise, others)
     again = _from_soils_of(problem, soil_alone, level, starts)
     if again is not soil_alone:
         gains = predicted_with_and_without(problem, again, soil, signatures)
@@ -270,11 +271,12 @@ def _from_soils_of(
     """The soil alone, fitted from the soils of the best explanations too.
 
     It is each of them without its effects. Where the soil has several optima, that of the soil
-    alone would otherwise be compared with better ones, and any effect be preferred to none. Soils
-    that an earlier search has tried are not tried again.
+    alone would otherwise be compared with better ones, and any effect be preferred to none. It is
+    not fitted again from a soil that has stayed since an earlier search.
     """
+    useful = soil_alone.best.evidence.value + SAME_OPTIMUM
     started = [
-        (StartedFit(problem.case, problem.soil, c.fit.start_values()), c.amplitude)
+        (StartedFit(problem.case, problem.soil, c.fit.start_values(), useful=useful), c.amplitude)
         for c in sorted(level, key=lambda c: c.objective)[:SOILS_AGAIN]
         if c.names not in starts or not _is_same_soil(starts[c.names].fit, c.fit)
     ]
@@ -300,10 +302,12 @@ def _fit_level(
     sets: Mapping[tuple[str, ...], Explanation],
     starts: Starts,
     under_noise: Set[str] = frozenset(),
+    others: Sequence[Explanation] = (),
 ) -> list[Explanation]:
     """Fit sets of effects, each from the candidate that it extends, with free shapes in reach.
 
     under_noise: Effects that start under noise alone too, where they are the only one of a set.
+    others: Candidates with effects that are fitted already.
     """
     requests = []
     for names, base in sets.items():
@@ -318,10 +322,12 @@ def _fit_level(
                 names, fit.start_values(), smaller, noise_start, near=fit.linearisation
             )
         )
-    fitted = fit_candidates(problem, requests)
+    fitted = fit_candidates(
+        problem, requests, min((c.best.evidence.value for c in others), default=np.inf)
+    )
     if not fitted:
         return []
-    lowest = min(soil_alone.objective, *(c.objective for c in fitted))
+    lowest = min(c.objective for c in [soil_alone, *others, *fitted])
     least = min(
         (c.noise_only.objective for c in fitted if c.noise_only is not None), default=np.inf
     )

@@ -146,7 +146,7 @@ def fitting(monkeypatch):
     """Requests that were made, what they give, what shapes promise, and what is shaped."""
     seen = SimpleNamespace(requests=[], results={}, promise={}, shaped=[])
 
-    def fit_candidates(problem, requests):
+    def fit_candidates(problem, requests, lowest=np.inf):
         seen.requests = requests
         return [seen.results[r.names] for r in requests if r.names in seen.results]
 
@@ -288,7 +288,7 @@ def searched(monkeypatch):
     )
     seen.done = []
 
-    def fit_level(problem, soil, none, sets, starts, under_noise=frozenset()):
+    def fit_level(problem, soil, none, sets, starts, under_noise=frozenset(), others=()):
         assert under_noise == ({"a"} if none in sets.values() else set())
         seen.levels.append(sorted(sets))
         size = len(next(iter(sets), ()))
