@@ -256,3 +256,17 @@ def test_a_correction_leads_back_to_the_floor_of_a_valley_and_no_further_along_i
     assert ends[0] == pytest.approx([along, 0.0])
     back = steps.corrected(last, ends, residual(ends), dampings)
     assert back[0] == pytest.approx([along, along**2 / (1.0 + damping)])
+
+
+@pytest.mark.parametrize("gain, trials", [(0.05, 1), (0.04, 2)])  # of 0.09 that are promised
+def test_steps_are_corrected_where_none_of_them_keeps_the_promise(gain, trials):
+    slope = Slope(0.03)
+    slope.objective = lambda _, x: np.full(len(x), 2.0 - 0.03 * slope.iterates - gain)
+    work, answer, asked = descent(slope, np.full(1, 0.5)), None, []
+    with pytest.raises(StopIteration):
+        while True:
+            question = work.send(answer)
+            asked.append("linearise" if question.linearise else "predict")
+            answer = question.request
+    assert asked[:2] == ["linearise"] * 2  # the first step is trusted, and disappoints
+    assert asked[2 : 3 + trials] == ["predict"] * trials + ["linearise"]

@@ -161,7 +161,9 @@ def test_the_prior_of_a_size_falls_beyond_usual_sizes():
 
 
 @pytest.mark.parametrize("held", [[], [1], [0, 4]])
-def test_the_evidence_is_that_of_the_step_of_all_coordinates_that_are_not_at_a_bound(held):
+def test_the_evidence_is_that_of_the_step_of_all_coordinates_that_are_not_at_a_bound(
+    monkeypatch, held
+):
     rng = np.random.default_rng(4)
     movable = ~np.isin(np.arange(6), held)
     gradient = np.asarray([0.0, 0.0, 0.3, -2.0, 0.0, 0.0])
@@ -169,7 +171,9 @@ def test_the_evidence_is_that_of_the_step_of_all_coordinates_that_are_not_at_a_b
     jacobian = rng.normal(size=(2, 30, 7))
     product = jacobian.swapaxes(1, 2) @ jacobian
     columns = np.asarray([[0, 1, 2, 3, 6], [0, 1, 2, 4, 6]])
-    found = fit._evidence(product, columns)
+    with monkeypatch.context() as only_the_factor:
+        only_the_factor.setattr(LinearisedFit, "_solve", None)
+        found = fit._evidence(product, columns)
     for model, own in enumerate(columns[:, :-1]):
         free = own[movable[own]]
         for i, all_columns in enumerate(product):
@@ -181,3 +185,5 @@ def test_the_evidence_is_that_of_the_step_of_all_coordinates_that_are_not_at_a_b
     product[1] = np.nan  # a row has no equilibrium
     again = fit._evidence(product, columns)
     assert again[:, 0] == pytest.approx(found[:, 0], rel=1e-10) and np.isnan(again[:, 1]).all()
+    product[1] = -2.5 * np.eye(7)  # not positive definite
+    assert fit._evidence(product, columns) == pytest.approx(fit._solve(product, columns)[0])

@@ -115,3 +115,64 @@ def test_the_soil_alone_is_not_fitted_again_from_soils_that_an_earlier_search_ha
     asked.clear()
     stepwise._from_soils_of(problem, alone, level, {})
     assert len(asked) == 2
+
+
+def test_a_look_goes_on_with_the_sets_and_single_effects_that_it_lacks(monkeypatch):
+    def made(*names):
+        return SimpleNamespace(names=names)
+
+    def likely(*_, few):
+        asked.append("the first" if few else "all likely")
+        return {"a": True, "b": False}
+
+    def fit_level(problem, soil, alone, sets, starts, under_noise, others):
+        asked.append((sorted(sets), under_noise, [c.names for c in others]))
+        return [made(*names) for names in sets]
+
+    def concluded(problem, look, fitted, seed):
+        return replace(look, candidates=tuple(fitted.values()))
+
+    for name, value in {
+        "effects_to_fit": likely,
+        "_fit_level": fit_level,
+        "_from_soils_of": lambda problem, alone, *_: alone,
+        "explained_nothing": lambda *_: {"b"},
+        "_concluded": concluded,
+    }.items():
+        monkeypatch.setattr(stepwise, name, value)
+    asked, pair = [], ("a", "b")
+    look = replace(passes.no_result("soil"), candidates=(made(),), without_gain={"a", "c"})
+    look = stepwise.look_further(None, look, 0, {}, [pair], singles="none")
+    assert asked == [([pair], set(), [])] and look.without_gain == {"a", "b", "c"}
+    asked.clear()
+    look = stepwise.look_further(None, look, 0, {}, [pair], singles="first")
+    assert asked == ["the first", ([("a",), ("b",)], {"a"}, [pair])]
+    assert look.without_gain == {"b", "c"}
+    asked.clear()
+    look = stepwise.look_further(None, look, 0, {})
+    assert asked == ["all likely", ([], {"a"}, [pair, ("a",), ("b",)])]
+    assert [c.names for c in look.candidates] == [(), pair, ("a",), ("b",)]
+
+
+@pytest.mark.parametrize("objective, reused", [(-1.0, True), (1e9, False)])
+def test_a_further_search_takes_the_signatures_beside_the_last_explanation(
+    moved, monkeypatch, objective, reused
+):
+    problem, soil = moved
+    fit, signature = SimpleNamespace(objective=objective), SimpleNamespace(name="slope")
+    earlier = passes.no_result(soil)
+    test = replace(earlier.final_test, signatures=(signature,))
+    earlier = replace(earlier, accepted=(SimpleNamespace(names=("a",)),), final_test=test)
+    asked = []
+
+    def estimated(problem, best, signatures):
+        asked.append((best is fit, list(signatures)))
+        return problem
+
+    known = {("a",): SimpleNamespace(fit=fit)}
+    monkeypatch.setattr(passes, "restated_candidates", lambda *_: known)
+    monkeypatch.setattr(passes, "with_estimated_covariance", estimated)
+    monkeypatch.setattr(passes, "first_look", lambda *_, **__: "look")
+    begun, starts = passes.begin(problem, 0, str, earlier)
+    assert asked == [(reused, [signature] if reused else [])]
+    assert begun.result == "look" and starts == known
