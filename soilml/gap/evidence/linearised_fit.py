@@ -41,18 +41,22 @@ class ProcessDivisions:
 
     gram: Floats  # (q, q)
     channel: NDArray[np.int64]  # (q,)
+    #: those of all channels but the last, where they are known
+    but_last: ProcessDivisions | None = None
     _kept: dict[tuple[int, bytes], Division] = field(default_factory=dict)
-    _reduced: dict[bytes, Floats] = field(default_factory=dict)
+    _reduced: dict[bytes, tuple[Floats, float]] = field(default_factory=dict)
 
     def reduce(self, amplitude: Floats) -> Floats:
         """The inverse of the factor of V times the amplitudes (channels,), (q, q)."""
+        return self._reduced_at(amplitude)[0]
+
+    def _reduced_at(self, amplitude: Floats) -> tuple[Floats, float]:
+        """The same, and the logarithm of the determinant of V."""
         key = amplitude.tobytes()
         if key not in self._reduced:
             while len(self._reduced) >= KEPT:
                 self._reduced.pop(next(iter(self._reduced)))
-            t = amplitude[self.channel]
-            factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * self.gram * t)
-            self._reduced[key] = np.linalg.solve(factor, np.diag(t))
+            self._reduced[key] = _reduced(self.gram, amplitude[self.channel])
         return self._reduced[key]
 
     def at(self, amplitude: Floats, channel: int) -> Division:
@@ -67,10 +71,11 @@ class ProcessDivisions:
 
     def _divided(self, amplitude: Floats, channel: int) -> Division:
         own = self.channel == channel
-        t = amplitude[self.channel[~own]]
-        beside = self.gram[np.ix_(~own, ~own)]
-        factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * beside * t)
-        reduce = np.linalg.solve(factor, np.diag(t))
+        if self.but_last is not None and channel == len(amplitude) - 1:
+            reduce, log_determinant = self.but_last._reduced_at(amplitude[:-1])
+        else:
+            beside = self.gram[np.ix_(~own, ~own)]
+            reduce, log_determinant = _reduced(beside, amplitude[self.channel[~own]])
         across = reduce @ self.gram[np.ix_(~own, own)]
         value, vector = np.linalg.eigh(self.gram[np.ix_(own, own)] - across.T @ across)
         return Division(
@@ -79,8 +84,15 @@ class ProcessDivisions:
             across=across,
             value=np.maximum(value, 0.0),
             vector=vector,
-            log_determinant=2.0 * float(np.log(np.diag(factor)).sum()),
+            log_determinant=log_determinant,
         )
+
+
+def _reduced(gram: Floats, t: Floats) -> tuple[Floats, float]:
+    """The inverse of the factor of I + T G T, times T, and the logarithm of its determinant."""
+    factor = np.linalg.cholesky(np.eye(len(t)) + t[:, None] * gram * t)
+    inverse = np.linalg.solve(factor, np.diag(t))
+    return np.asarray(inverse), 2.0 * float(np.log(np.diag(factor)).sum())
 
 
 @dataclass(frozen=True)
@@ -105,8 +117,6 @@ class LinearisedFit:
 
         columns (k, r): Numbers of the coordinates, and that of the residual last.
         """
-        trials = np.tile(amplitude, (len(AMPLITUDES), 1))
-        trials[:, channel] = AMPLITUDES
         part = self.divisions.at(amplitude, channel)
         beside = part.reduce @ self.cross[~part.own]
         rotated = part.vector.T @ (self.cross[part.own] - part.across.T @ beside)
@@ -116,7 +126,8 @@ class LinearisedFit:
         explained = (shrink[:, None, :] * rotated.T) @ rotated  # (b, p + 1, p + 1)
         growth = np.log1p(square * part.value).sum(axis=1)
         value = self._evidence(plain - explained, columns) + part.log_determinant + growth
-        return np.asarray(value + amplitude_penalty(trials))
+        others = amplitude_penalty(np.delete(amplitude, channel))
+        return np.asarray(value + others + _AMPLITUDE_PENALTY)
 
     def of_columns(self, columns: Integers) -> LinearisedFit:
         """The model with some columns (r,), as in `along_each`."""
@@ -218,6 +229,6 @@ _AMPLITUDE_PENALTY = -2.0 * np.log(_amplitude_masses())
 
 
 def amplitude_penalty(amplitudes: Floats) -> Floats:
-    """-2 ln prior probability of amplitudes (b, channels) out of `AMPLITUDES`, by set, (b,)."""
+    """-2 ln prior probability of amplitudes (..., channels) out of `AMPLITUDES`, (...)."""
     nearest = np.abs(amplitudes[..., None] - AMPLITUDES).argmin(axis=-1)
     return np.asarray(_AMPLITUDE_PENALTY[nearest].sum(axis=-1))

@@ -184,7 +184,8 @@ def first_look(
     """The test for a gap, and where there is one the explanations by single effects.
 
     sets: Other sets that are fitted too.
-    singles: Which single effects are fitted. With neither these nor sets, it is the test alone.
+    singles: Which single effects are fitted. With neither these nor sets, it is the test alone;
+        what the best explanation leaves is tested only with all.
     without_gain: Those that explained nothing in an earlier search of this soil; they are left out.
     """
     signatures, untestable = problem.signatures_and_untestable(soil)
@@ -230,24 +231,28 @@ def look_further(
     nothing = explained_nothing(problem, fitted)
     nothing |= {n for n in look.without_gain if (n,) not in fitted}
     look = replace(look, predicted_gain=gains, without_gain=nothing)
-    return _concluded(problem, look, fitted, seed)
+    return _concluded(problem, look, fitted, seed if singles == "all" else None)
 
 
 def _concluded(
     problem: FitProblem,
     first: SearchResult,
     fitted: Mapping[tuple[str, ...], Explanation],
-    seed: int,
+    seed: int | None,
 ) -> SearchResult:
-    """The result of a search, from that of its first look and all candidates."""
+    """The result of a search, from that of its first look and all candidates.
+
+    Without a seed, what the best of them leaves is not tested.
+    """
     candidates = tuple(sorted(fitted.values(), key=lambda c: c.objective))
     gains, alone = first.predicted_gain, fitted[()]
     accepted = explanations(candidates, for_decisions(candidates, gains, alone))
+    test = first.final_test if seed is None else _test_residuals(problem, accepted[0], seed)
     return replace(
         first,
         accepted=accepted,
         candidates=candidates,
-        final_test=_test_residuals(problem, accepted[0], seed),
+        final_test=test,
         posterior=posterior(candidates, gains, alone, problem.penalties),
     )
 

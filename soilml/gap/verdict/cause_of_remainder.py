@@ -218,7 +218,7 @@ def weighed(problem: FitProblem, marginal: MarginalFit) -> tuple[float, list[Hyp
         number = np.append(base.process.channel, np.full(own.shape[1], count))
         local = replace(
             alone,
-            divisions=ProcessDivisions(gram, number),
+            divisions=ProcessDivisions(gram, number, alone.divisions),
             cross=np.vstack([alone.cross, own.T @ block]),
         )
         trials = []
