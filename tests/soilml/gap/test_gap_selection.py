@@ -94,9 +94,7 @@ def test_a_look_goes_on_from_all_that_is_known(monkeypatch):
     assert found.result == ("problem", look, 7, starts) and found.problem == "problem"
 
 
-def test_the_soil_alone_is_not_fitted_again_from_soils_that_an_earlier_search_has_tried(
-    monkeypatch,
-):
+def test_the_soil_alone_is_not_fitted_again_from_a_soil_that_has_stayed(monkeypatch):
     def explained(name, cohesion, size):
         coordinates = SimpleNamespace(path="c", effect=""), SimpleNamespace(path=name, effect=name)
         fit = SimpleNamespace(coordinates=coordinates, x=np.asarray([cohesion, size]))
