@@ -54,6 +54,7 @@ extensions = [
     "mathml",
     "page_tree",
     "python_reference",
+    "repository_files",
 ]
 include_patterns = ["CHANGELOG.md", "docs/**.md", "exported/*.md", "examples/*/README.md"]
 exclude_patterns = [".*", "build", "demo", "dist", "docs/decisions", "docs/site", "tests"]
