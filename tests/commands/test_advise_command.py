@@ -16,7 +16,7 @@ from conftest import MODEL
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.experiment_design.advice_after_results import _trained_for, advice_after_estimate
+from soilml.experiment_design.advice_after_results import advice_after_estimate
 from soilml.remarks import texts
 
 pytestmark = pytest.mark.slow
@@ -153,13 +153,6 @@ def test_an_estimate_abstains_in_words_and_keeps_its_table_clean(folder, small_m
     captured = capsys.readouterr()
     assert len(rows_of(captured.out)) == 2
     assert "a typical row: best next row for all parameters: slip" in captured.err
-
-
-def test_slips_and_loads_of_the_advice_are_those_trained_for(small_model):
-    case, ranges = _trained_for(Estimator.load(small_model))
-    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus"}
-    assert (min(ranges.slips), max(ranges.slips)) == (0.05, 0.6)
-    assert (min(ranges.loads), max(ranges.loads)) == (30.0, 120.0)
 
 
 @pytest.mark.parametrize(
