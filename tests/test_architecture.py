@@ -20,7 +20,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/arrays.py": {"torch", "array_api_compat"},
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/parquet.py": {"pyarrow"},
-    "soilml/io/spreadsheet.py": {"openpyxl"},
+    "soilml/io/spreadsheet.py": {"python_calamine"},
     "soilml/io/table.py": {"pyarrow"},
     "soilml/fitting/scipy_descents.py": {"scipy"},
     "soilml/experiment_design/simulator_runs.py": {"scipy"},

@@ -24,7 +24,7 @@ USES = {
     "onnxruntime": "estimate, pull --from: model files",
     "scipy": "identify, gap, pull, generate",
     "pyarrow": "Parquet tables; generate, train",
-    "openpyxl": "spreadsheets (.xlsx)",
+    "python-calamine": "spreadsheets (.xlsx)",
     "rich": "progress bars",
     "pint": "import",
     "h5py": "import of MATLAB 7.3",
