@@ -36,6 +36,7 @@ USES = {
     "torch": "generate --device; gradients of the forward model",
     "scikit-learn": "train",
     "array-api-compat": "the forward model on torch tensors",
+    "shtab": "completion",
     "tornado": "serve",
     "tifffile": "map",
     "threadpoolctl": "gap, generate, train",
