@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import TableError
 from soilml.io.cell_text import cell_as_text, is_number, read_numbers
+from soilml.io.csv_by_arrow import read_good_csv
 from soilml.io.spreadsheet import sheet_rows
 from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
 
@@ -39,6 +40,8 @@ def read_csv(
     UTF-8 or no table, a row with another number of cells than the header, and a cell that is not
     what its column holds.
     """
+    if (found := read_good_csv(file, columns, _LINE, progress)) is not None:
+        return found
     with file.open(encoding="utf-8-sig") as opened:
         reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)
         told = None if progress is None else lambda: progress(buffer.tell())
