@@ -16,27 +16,17 @@ ROOT = Path(__file__).parents[1]
 TOOLS = ROOT / ".venv-supply" / "bin"
 #: File with hashes, and the extras of pyproject.toml that it is for.
 LOCKED = {"onboard-hashes.txt": (), "ground-hashes.txt": ("ground", "logs")}
-#: Its build, and with it the libraries that it brings, differ by platform and are chosen by users.
-WITHOUT_HASH = ("torch",)
 
 
 def lock_command(tools: Path, name: str) -> list[str]:
     """The command that writes the file of `LOCKED`: versions of constraints.txt with hashes."""
     extras = [f"--extra={extra}" for extra in LOCKED[name]]
-    left_out = [f"--no-emit-package={package}" for package in WITHOUT_HASH] if extras else []
     return [
-        *(str(tools / "uv"), "pip", "compile", "pyproject.toml", *extras, *left_out),
+        *(str(tools / "uv"), "pip", "compile", "pyproject.toml", *extras),
         *("--constraint=constraints.txt", "--universal", "--python-version=3.11"),
         *("--generate-hashes", "--no-annotate", "--no-header", "--quiet"),
         f"--output-file={name}",
     ]
-
-
-def without_accelerators(text: str) -> str:
-    """The entries of a lock file but those that only torch needs, on accelerators."""
-    entries = text.replace(" \\\n    --hash", "\0").splitlines()
-    kept = [entry for entry in entries if not entry.startswith(("nvidia-", "cuda-", "triton"))]
-    return "\n".join(kept).replace("\0", " \\\n    --hash") + "\n"
 
 
 def locked_names(name: str) -> list[str]:
@@ -79,8 +69,6 @@ def main(task: str) -> int:
     if task == "lock":
         for name in LOCKED:
             subprocess.run(lock_command(TOOLS, name), cwd=ROOT, check=True)
-            path = ROOT / name
-            path.write_text(without_accelerators(path.read_text()))
     elif task == "sbom":
         for name in LOCKED:
             target = Path("build") / name.replace("-hashes.txt", ".cdx.json")

@@ -102,7 +102,7 @@ def read_table(
         For the first error in the file: a missing file, column or value, an unknown column, a cell
         that is not a number, or a value outside the limits of its quantity, such as a slip of 1.
     MissingLibraryError
-        For a Parquet file where pyarrow is not installed, a spreadsheet without openpyxl.
+        For a Parquet file where pyarrow is not installed, a spreadsheet without python-calamine.
 
     Examples
     --------

@@ -10,7 +10,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2] / "tools"))
 
 
-from packages import LOCKED, TOOLS, audited, licence, lock_command, without_accelerators
+from packages import LOCKED, TOOLS, audited, licence, lock_command
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,13 +31,6 @@ def test_locked_versions_are_the_tested_ones_and_all_have_hashes(name):
     entries = re.split(r"\n(?=\S)", (ROOT / name).read_text().strip())
     assert all("--hash=sha256:" in entry for entry in entries)
     assert not any(package.startswith("nvidia") or package == "torch" for package in locked)
-
-
-def test_only_entries_of_accelerators_are_left_out_of_a_lock():
-    text = "a==1 \\\n    --hash=sha256:1\nnvidia-x==2 \\\n    --hash=sha256:2\n    \n"
-    assert "a==1 \\\n    --hash=sha256:1" in without_accelerators(text)
-    assert "nvidia" not in without_accelerators(text)
-    assert "sha256:2" not in without_accelerators(text)
 
 
 def test_a_lock_asks_for_hashes_and_the_tested_versions():

@@ -5,7 +5,6 @@ import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import check_estimator
 
-from training.regressors.coupled_lssvm import CoupledLSSVM
 from training.regressors.exact_solution import KernelEigensystem
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.linear_gaussian import LinearGaussian
@@ -13,7 +12,7 @@ from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
 from training.regressors.nystrom_features import RidgeEigensystem
 from training.regressors.rbf_expansion import rbf
 
-ALL = [LSSVM(), FixedSizeLSSVM(), CoupledLSSVM(coupling=0.5), LinearGaussian(), GaussianMLP()]
+ALL = [LSSVM(), FixedSizeLSSVM(), LinearGaussian(), GaussianMLP()]
 
 
 def curve(count, seed=0, noise=0.1):
