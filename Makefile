@@ -149,7 +149,7 @@ docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/d
 release: $(VENV)/.ready ## build wheel and source archive twice, compare, install and measure them: dist/
 	@$(BIN)/python tools/release.py
 
-lock: .venv-supply/.ready ## write the packages with their hashes: onboard-hashes.txt, ground-hashes.txt
+lock: .venv-supply/.ready ## write the packages with their hashes: tools/supply/
 	@$(PYTHON) tools/packages.py lock
 
 sbom: .venv-supply/.ready ## write bills of materials (CycloneDX) into build/
