@@ -13,14 +13,15 @@ from soilml import Case, Estimator, Operating, identify, read_case
 from soilml.experiment_design import (
     advise,
     candidate_grid,
-    samples_of_moments,
     samples_of_prior,
     samples_of_rows,
 )
+from soilml.experiment_design.advice_after_results import advice_of_file
 from soilml.experiment_design.design import SLIPS
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.fit import Fit
+from soilml.identification.model_error_inputs import with_exact_model
 from soilml.io.table import Table
 
 LOADS = (30.0, 42.0, 60.0, 85.0, 120.0)
@@ -160,35 +161,67 @@ def plans(soils: int = SOILS) -> str:
     return "\n".join(lines)
 
 
-def from_file(soils: int = SOILS, seed: int = 5) -> str:
-    """What the advice of a trained file is worth by the exact posterior of the same row."""
+def promises(
+    estimator: Estimator, soils: int = SOILS, rows: int = 1, seed: int = 5, errors: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a trained file promised of its advised row, and what it answered with it, (soils, q).
+
+    Both are widths in standard deviations of the prior, in the mode in which the file answers.
+    Soils are drawn from the prior of examples/wheel, `rows` from the grid. Sensors have the noise
+    of the case, and `errors` times the usual errors that all rows share.
+    """
     case = read_case(ROOT / "examples" / "wheel" / "model.toml")
-    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    rng, free, ranges = (
-        np.random.default_rng(seed),
-        select_free(case, None),
-        candidate_grid(SLIPS, LOADS),
-    )
-    left: dict[str, list[float]] = {"the file's": [], "the posterior's": [], "any": []}
+    rng, free = np.random.default_rng(seed), select_free(case, None)
+    usual = estimator.sets.common_errors
+    promised, answered = [], []
     for _ in range(soils):
         truth = {f.path: float(f.prior.at(rng.random())) for f in free}
-        point = float(rng.choice(SLIPS)), float(rng.choice(LOADS))
-        table = _measured(case, truth, [point], rng.standard_normal(1))
-        readings = {"slip": point[0], "load": point[1], "torque": float(table["torque_Nm"][0])}
-        told = estimator(**readings)
-        moments = samples_of_moments(free, estimator.names, told.mean, told.covariance)
-        theirs = advise(case, moments, ranges, channels=("torque",)).best().candidate
-        exact = advise(
-            case,
-            samples_of_rows(case, usable_readings(case, table), free, exact_model=True),
-            ranges,
+        points = [(float(rng.choice(SLIPS)), float(rng.choice(LOADS))) for _ in range(rows)]
+        offset, load, torque = (
+            errors * usual[name] * rng.standard_normal()
+            for name in ("slip_bias", "load_gain", "torque_gain")
         )
-        torque = exact.with_channels(("torque",))
-        left["the file's"] += [c.overall for c in torque if c.candidate == theirs]
-        left["the posterior's"].append(exact.best().overall)
-        left["any"].append(_all(np.asarray([c.overall for c in torque])))
-    lines = ["| whose next row | expected to leave, all |", "|---|---:|"]
-    return "\n".join(lines + [f"| {k} | {_all(np.asarray(v)):.3f} |" for k, v in left.items()])
+        shared, normal = (offset, 1.0 + load, 1.0 + torque), rng.standard_normal(rows + 1)
+        readings = _readings(case, truth, points, normal[:rows], shared)
+        told = estimator.run(**readings)
+        if not told.in_range:
+            continue
+        best = advice_of_file(estimator, told.mean, told.covariance, readings).best()
+        points.append((best.candidate.slip, best.candidate.load))
+        after = estimator.run(**_readings(case, truth, points, normal, shared))
+        promised.append(best.remaining_fraction)
+        answered.append(after.std / estimator.prior.std)
+    return np.asarray(promised), np.asarray(answered)
+
+
+def _readings(
+    case: Case,
+    truth: dict[str, float],
+    points: list[tuple[float, float]],
+    normal: np.ndarray,
+    shared: tuple[float, float, float],
+) -> dict[str, np.ndarray]:
+    """Readings by name at slips and loads as they are read, with offset and gains of sensors."""
+    offset, load_gain, torque_gain = shared
+    true = [(slip - offset, load / load_gain) for slip, load in points]
+    slip, load = np.asarray(points).T
+    torque = torque_gain * _measured(case, truth, true, normal)["torque_Nm"]
+    return {"slip": slip, "load": load, "torque": torque}
+
+
+def from_file(soils: int = SOILS) -> str:
+    """The section of the page: promises of a trained file beside its answers."""
+    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
+    lines = [
+        "| rows first | model | promised c | φ | K | answered c | φ | K |",
+        "|---|---|" + "---:|" * 6,
+    ]
+    for rows in (1, 3, 6):
+        for name, own in (("default", estimator), ("exact", with_exact_model(estimator))):
+            parts = [np.sqrt(np.mean(x**2, axis=0)) for x in promises(own, soils, rows)]
+            cells = [f"{v:.2f}" for part in parts for v in part]
+            lines.append(f"| {rows} | {name} | {' | '.join(cells)} |")
+    return "\n".join(lines)
 
 
 def _all(parts: np.ndarray) -> float:

@@ -165,11 +165,6 @@ def _c_review(script: ModuleType) -> None:
     script.SETS, sys.argv = ("wheel_small",), ["", "memory"]
 
 
-def _coupled(script: ModuleType) -> Callable[[], object]:
-    script.SIZES, script.TEST = (30,), 300
-    return lambda: script.run(2)
-
-
 def _stream_order(script: ModuleType) -> None:
     script.CASES = ((0, 6, 3), (4, 8, 2))
 
@@ -212,7 +207,6 @@ PROBES: dict[str, Shrink] = {
     "examples/slip/compare.py": _slip_compare,
     "bench/c_review.py": _c_review,
     "bench/challenge.py": _challenge,
-    "bench/coupled.py": _coupled,
     "bench/few_rows.py": _few_rows,
     "bench/stream_order.py": _stream_order,
     "bench/streams.py": _streams,

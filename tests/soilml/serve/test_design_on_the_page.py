@@ -67,25 +67,6 @@ def test_a_figure_is_written_into_the_text(tmp_path, label, value, table, key, w
     read_study(tmp_path / "rover.toml")
 
 
-def test_a_figure_that_has_another_form_is_left_to_the_text():
-    text = design.question({})["question"].replace("width = [0.04, 0.14]", "width = {values=[0.1]}")
-    assert field(design.question({"question": text}), "Width")[1]["value"] is None
-
-
-@pytest.mark.parametrize(
-    ("request_", "said"),
-    [
-        ({"question": "[rover]\nmass ="}, "no valid TOML"),
-        ({"change": {"field": 99, "value": 1}}, "needed is the number of a figure"),
-        ({"change": {"field": 0, "value": None}}, "needed is a number"),
-        ({"change": {"field": 13, "value": []}}, "at least one soil"),
-    ],
-)
-def test_what_cannot_be_written_is_said(request_, said):
-    with pytest.raises(InputError, match=said):
-        design.question(request_)
-
-
 @pytest.mark.slow
 def test_the_answer_is_that_of_the_command(tmp_path, monkeypatch):
     from soilml import design as designed
