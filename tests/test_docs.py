@@ -28,7 +28,7 @@ RUN = (
     "docs/how-to/pull.md",
     "docs/how-to/soil-map.md",
     "docs/how-to/train.md",
-    "docs/papers/slip_models.md",
+    "docs/papers/comin2017.md",
     "docs/reference/tables.md",
     "exported/README.md",
 )
