@@ -1,7 +1,6 @@
 """Logs that state calibrations and constants, whose wheels share columns, that know only slip."""
 
 import datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -241,6 +240,6 @@ def test_a_wheel_whose_load_a_line_of_the_head_states_does_not_take_the_shared_c
     shared = {"load": {"column": "Fz", "unit": "N", "noise": "1 N"}}
     head = {"load": {"head": r"load (\d+)"}}
     assert with_shared_keys(head, shared) == {"load": {"unit": "N", "noise": "1 N", **head["load"]}}
-    settings = Settings(dict(head), "map", Path())
+    settings = Settings(dict(head), "map")
     assert shared_keys(settings, {"left": {"load": {"scale": 2.0}}}) == head
     assert "load" in settings  # it serves wheels without a load of their own as well
