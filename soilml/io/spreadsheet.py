@@ -14,16 +14,15 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from soilml.errors import MissingLibraryError, TableError
+from soilml.io.bounds import SHEET_CELLS
+from soilml.io.spreadsheet_size import check_spreadsheet_size
 
 ENDINGS = (".xlsx", ".xlsm")
-#: Most bytes of a spreadsheet once unpacked, most cells and most rows of a sheet.
-LARGEST, MOST_CELLS, MOST_ROWS = 256 << 20, 2_000_000, 1_100_000
 _SHEET = re.compile(r"(.+\.xls[xm])#([^#]+)", re.IGNORECASE | re.DOTALL)
 _MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^>]*?ref="([A-Z0-9:]{1,40})"')
 _FORMULA = re.compile(rb"<(?:\w+:)?f[\s/>]")
 _BLOCK, _OVERLAP = 1 << 20, 256
 _SHOWN = 12  # Most sheets that a message names
-_INSTEAD = "save the sheet as CSV, or the rows as Parquet"
 
 
 def split_sheet(path: str | Path) -> tuple[Path, str]:
@@ -48,7 +47,7 @@ def is_spreadsheet(path: str | Path) -> bool:
 
 def sheets_with_cells(file: Path) -> list[str]:
     """The names of the sheets of a spreadsheet that have cells; raises as `SheetRows` does."""
-    _check_size(file)
+    check_spreadsheet_size(file)
     book = _opened(file, data_only=True)
     try:
         return [sheet.title for sheet in book.worksheets if _has_cells(file, sheet)]
@@ -83,7 +82,7 @@ class SheetRows(Iterator[list[str]]):
 
 def _rows(path: Path) -> list[list[str]]:
     file, name = split_sheet(path)
-    _check_size(file)
+    check_spreadsheet_size(file)
     book = _opened(file, data_only=True)
     try:
         sheet = _chosen(file, book, name)
@@ -97,24 +96,6 @@ def _rows(path: Path) -> list[list[str]]:
         return _texts(cells)
     finally:
         book.close()
-
-
-def _check_size(file: Path) -> None:
-    """Refuse what is no packed file, and what unpacks to more than `LARGEST`."""
-    try:
-        with zipfile.ZipFile(file) as packed:
-            # a part is read to its declared size and no further
-            size = sum(part.file_size for part in packed.infolist())
-    except (zipfile.BadZipFile, ValueError, NotImplementedError):
-        raise TableError(
-            f"{file} is no .xlsx file: it is damaged, has a password, or is of the older kind .xls;"
-            " open it in a spreadsheet program and save it as .xlsx or CSV"
-        ) from None
-    if size > LARGEST:
-        raise TableError(
-            f"{file} has {size / 2**20:.0f} MB unpacked; at most {LARGEST >> 20} MB are read: "
-            f"{_INSTEAD}"
-        )
 
 
 def _opened(file: Path, data_only: bool) -> Any:
@@ -170,7 +151,7 @@ def _chosen(file: Path, book: Any, name: str) -> Any:
 def _has_cells(file: Path, sheet: Any) -> bool:
     sheet.reset_dimensions()  # what the file says of its size need not be true
     try:
-        for _, row in zip(range(MOST_ROWS), sheet.iter_rows(values_only=True), strict=False):
+        for _, row in zip(range(SHEET_CELLS.most), sheet.iter_rows(values_only=True), strict=False):
             if any(value is not None for value in row):
                 return True
     except Exception as error:
@@ -198,20 +179,12 @@ def _cells(where: str, sheet: Any) -> list[tuple[Any, ...]]:
     """All rows of cells, without blank ones at their ends."""
     sheet.reset_dimensions()
     rows: list[tuple[Any, ...]] = []
-    count = last = 0
+    last = 0
     try:
         for row in sheet.iter_rows():
-            count += max(len(row), 1)
-            if count > MOST_CELLS or len(rows) == MOST_ROWS:
-                raise TableError(
-                    f"{where}: the sheet has more than {MOST_CELLS} cells, or {MOST_ROWS} rows; "
-                    f"{_INSTEAD}"
-                )
             width = max((i + 1 for i, cell in enumerate(row) if cell.value is not None), default=0)
             rows.append(tuple(row[:width]))
             last = len(rows) if width else last
-    except TableError:
-        raise
     except Exception as error:
         _damaged(Path(where), error)
     return rows[:last]

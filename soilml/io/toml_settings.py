@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import refuse_device
+from soilml.io.bounds import SETTINGS
 from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.optional_imports import tomllib
 
@@ -18,8 +19,6 @@ from soilml.optional_imports import tomllib
 MOST_DEPTH = 20
 #: A part of a key, bare or in quotes, or another character.
 _TOKEN = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'|.""")
-#: Characters of a settings file; those of the project have some thousand.
-MOST_CHARACTERS = 4_000_000
 
 
 class Settings:
@@ -121,12 +120,8 @@ def read_settings(
     try:
         refuse_device(file)
         with file.open(encoding="utf-8-sig") as opened:  # which may be a pipe, of any length
-            text = opened.read(MOST_CHARACTERS + 1)
-        if len(text) > MOST_CHARACTERS:
-            raise InputError(
-                f"{file} has more than {MOST_CHARACTERS / 1e6:.0f} million characters; needed are "
-                "settings in TOML"
-            )
+            text = opened.read(SETTINGS.most + 1)
+        SETTINGS.check(file, len(text))
         _check_keys(text, str(file))
         content = tomllib.loads(text)
         _check_depth(content, str(file))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.io.bounds import LOG_VALUES
 from soilml.optional_imports import need
 
 MOST_CELLS = 4_000_000
@@ -159,11 +161,14 @@ def read_elevation(path: str) -> Elevation:
     try:
         with tifffile.TiffFile(Path(path)) as file:
             page: Any = file.pages[0]
+            LOG_VALUES.check(path, math.prod(page.shape))
             height = np.asarray(page.asarray(), dtype=np.float64)
             tags = {code: page.tags[code].value for code in (_SCALE, _TIEPOINT, _NODATA, _KEYS)
                     if code in page.tags}  # fmt: skip
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
+    except InputError:
+        raise
     except Exception as error:  # of whatever a damaged file raises
         first = " ".join(str(error).split())
         raise InputError(f"{path} cannot be read as GeoTIFF: {first}") from None

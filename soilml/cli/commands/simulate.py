@@ -100,13 +100,14 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
     import numpy as np
 
-    from soilml.cli.options import MAX_ROWS, available_effects, parse_numbers
+    from soilml.cli.options import available_effects, parse_numbers
     from soilml.cli.output import write_columns
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.fitting.simulation import simulate
     from soilml.fitting.uncarried_loads import missing_peak
+    from soilml.io.bounds import ROWS
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
@@ -120,7 +121,7 @@ def run(args: argparse.Namespace) -> int:
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
-    most = MOST_BALANCED if args.balance else MAX_ROWS
+    most = MOST_BALANCED if args.balance else ROWS.most
     if slips.size * loads.size > most:
         raise InputError(
             f"{slips.size} slips and {loads.size} loads are {slips.size * loads.size} rows; "
