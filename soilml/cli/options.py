@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -258,6 +259,26 @@ def number(text: str) -> float:
         return read_number(text)
     except ValueError:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a number") from None
+
+
+@dataclass(frozen=True)
+class NumberFrom:
+    """The type of an option that is a number from `lower` to `upper`, in `unit`.
+
+    Raises `ArgumentTypeError` for anything else.
+    """
+
+    lower: float
+    upper: float
+    unit: str = ""
+
+    def __call__(self, text: str) -> float:
+        value = number(text)
+        if not self.lower <= value <= self.upper:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} given; needed is {self.lower:g} to {self.upper:g} {self.unit}".rstrip()
+            )
+        return value
 
 
 def slip_limit(text: str) -> float:

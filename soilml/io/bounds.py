@@ -33,6 +33,8 @@ ROWS = Bound(10_000_000, "rows", _SPLIT)
 COLUMNS = Bound(2_000, "columns", "keep those of wheel, motion and time")
 #: Numbers of a table: 1.3 GB in memory, of which training takes data sets of this size.
 TABLE_VALUES = Bound(160_000_000, "values", _SPLIT)
+#: Rows that `estimate` answers one by one or in sets; each takes about a tenth of a millisecond.
+ESTIMATES = Bound(2_000_000, "rows to estimate", "thin it, or choose some with --where")
 #: Numbers of a log: 320 MB, some times over while it is resampled.
 LOG_VALUES = Bound(40_000_000, "values", "import it in parts")
 #: Characters of a name; every row of a column takes the memory of the longest.

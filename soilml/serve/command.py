@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from soilml.cli.options import whole_number_from
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "--port",
-        type=int,
+        type=whole_number_from(0, 65535),
         default=PORT,
         metavar="N",
         help=f"port of the page (default: {PORT}; 0 takes a free one)",
@@ -53,8 +54,6 @@ def run(args: argparse.Namespace) -> int:
 
     for library, extra in _LIBRARIES:
         need(library, "serve", extra)
-    if not 0 <= args.port <= 65535:
-        raise InputError(f"--port is {args.port}; needed is a number from 0 to 65535")
     opened = _listen(args.port)
     with tempfile.TemporaryDirectory(prefix="soilml-serve-") as folder:
         number = asyncio.run(_serve(opened, Path(folder), browser=not args.no_browser))

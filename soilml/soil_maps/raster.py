@@ -42,11 +42,11 @@ class MapGrid:
         """
         low = np.floor((place.min(axis=0) - margin) / cell)
         high = np.ceil((place.max(axis=0) + margin) / cell)
-        columns, rows = (high - low).astype(np.int64)
-        if columns * rows > MOST_CELLS:
+        columns, rows = high - low
+        if not columns * rows <= MOST_CELLS:
             raise InputError(
-                f"the map would have {columns * rows} cells of {cell:g} m; at most {MOST_CELLS} "
-                "are possible: give larger ones with --cell, or map parts of the drive"
+                f"the map would have {columns * rows:.3g} cells of {cell:g} m; at most "
+                f"{MOST_CELLS} are possible: give larger ones with --cell, or map parts of it"
             )
         return MapGrid(float(low[0] * cell), float(low[1] * cell), cell, (int(rows), int(columns)))
 

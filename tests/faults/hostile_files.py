@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import resource
 import struct
 import subprocess
 import sys
 import zipfile
 import zlib
-from tempfile import TemporaryFile
 
 import numpy as np
 
@@ -33,20 +33,22 @@ torque_Nm = "2 %"
 
 def run(words, folder, seconds=60):
     """Status, standard error and peak memory (bytes) of a command in a process of its own."""
+    own = (
+        "import re, sys; from soilml.cli import main; status = main(sys.argv[1:]);"
+        "text = open('/proc/self/status').read();"
+        "sys.stdout.write(re.search(r'VmHWM:\\s*(\\d+)', text)[1]); sys.exit(status)"
+    )
     limits = {resource.RLIMIT_AS: LIMIT, resource.RLIMIT_CPU: seconds}
-    with TemporaryFile() as said:
-        process = subprocess.Popen(
-            [sys.executable, "-m", "soilml", *map(str, words)],
-            cwd=folder,
-            env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
-            stdout=subprocess.DEVNULL,
-            stderr=said,
-            preexec_fn=lambda: [resource.setrlimit(k, (v, v)) for k, v in limits.items()],
-        )
-        _, status, usage = os.wait4(process.pid, 0)
-        process.returncode = os.waitstatus_to_exitcode(status)
-        said.seek(0)
-        return process.returncode, said.read().decode(), usage.ru_maxrss * 1024
+    done = subprocess.run(
+        [sys.executable, "-c", own, *map(str, words)],
+        cwd=folder,
+        env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        preexec_fn=lambda: [resource.setrlimit(k, (v, v)) for k, v in limits.items()],
+    )
+    peak = re.search(r"(\d+)$", done.stdout)
+    return done.returncode, done.stderr, 1024 * int(peak[1]) if peak else LIMIT
 
 
 # MATLAB files of version 5 ("MAT-File Format", The MathWorks): elements of a tag and its content
@@ -134,6 +136,12 @@ def long_text_xlsx():
     return _xlsx(f"{head}{row * 100_000}</sheetData></worksheet>", shared)
 
 
+_SHARED = (
+    '<Override PartName="/xl/sharedStrings.xml" ContentType="application/vnd.openxmlformats-'
+    'officedocument.spreadsheetml.sharedStrings+xml"/>'
+)
+
+
 def _xlsx(sheet, shared=""):
     import openpyxl
 
@@ -146,8 +154,12 @@ def _xlsx(sheet, shared=""):
         zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as new,
     ):
         for name in old.namelist():
-            own = {"xl/worksheets/sheet1.xml": sheet, "xl/sharedStrings.xml": shared}.get(name)
-            new.writestr(name, own or old.read(name))
+            text = old.read(name).decode()
+            if shared and name == "[Content_Types].xml":
+                text = text.replace("</Types>", f"{_SHARED}</Types>")
+            new.writestr(name, sheet if name == "xl/worksheets/sheet1.xml" else text)
+        if shared:
+            new.writestr("xl/sharedStrings.xml", shared)
     return changed.getvalue()
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_effects_option,
     add_gear_option,
     add_output,
     add_picture_option,
-    number,
 )
 from soilml.errors import InputError
 
@@ -55,14 +55,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--load", required=True, help="vertical loads in N")
     parser.add_argument(
-        "--speed", type=number, metavar="M_S", help="speed in m/s, below 0 in reverse"
+        "--speed",
+        type=NumberFrom(-100.0, 100.0, "m/s"),
+        metavar="M_S",
+        help="speed in m/s, below 0 in reverse",
     )
     parser.add_argument(
-        "--pass", dest="passes", type=number, help="number of the pass: 1 on undisturbed soil"
+        "--pass",
+        dest="passes",
+        type=NumberFrom(1.0, 1e4),
+        help="number of the pass: 1 on undisturbed soil",
     )
     parser.add_argument(
         "--slip-angle",
-        type=number,
+        type=NumberFrom(-1.6, 1.6, "rad"),
         metavar="RAD",
         help="angle between wheel plane and path, in rad",
     )
@@ -82,13 +88,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--hitch",
-        type=number,
+        type=NumberFrom(-10.0, 10.0, "m"),
         metavar="M",
         help="with --balance: height of the pull above the belt",
     )
     parser.add_argument(
         "--behind",
-        type=number,
+        type=NumberFrom(-10.0, 10.0, "m"),
         metavar="M",
         help="with --balance: centre of mass behind the middle of the track",
     )

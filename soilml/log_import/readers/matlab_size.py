@@ -59,12 +59,14 @@ class _Unpacked:
     """What a packed element unpacks to, block by block; it is not kept."""
 
     def __init__(self, source: _Counted, size: int) -> None:
-        self.blocks, self.kept = _blocks(source, size), b""
+        self.blocks, self.kept, self.at = _blocks(source, size), b"", 0
 
     def read(self, size: int, /) -> bytes:
-        while len(self.kept) < size and (block := next(self.blocks, b"")):
-            self.kept += block
-        found, self.kept = self.kept[:size], self.kept[size:]
+        found = self.kept[self.at : self.at + size]
+        self.at += len(found)
+        while len(found) < size and (block := next(self.blocks, b"")):
+            self.kept, self.at = block, size - len(found)
+            found += block[: self.at]
         return found
 
 
