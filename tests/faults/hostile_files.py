@@ -106,17 +106,54 @@ def far_cell_xlsx(place="XFD1048576", cells=""):
     """A sheet with a cell at its far end."""
     row = place.lstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZ")
     sheet = (
-        '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+        f'<worksheet xmlns="{_MAIN}"><sheetData>'
         '<row r="1"><c r="A1" t="inlineStr"><is><t>slip</t></is></c></row>'
         f'{cells}<row r="{row}"><c r="{place}"><v>1</v></c></row></sheetData></worksheet>'
     )
     return _xlsx(sheet)
 
 
+def small_xlsx():
+    """A sheet of numbers below their names."""
+    rows = "".join(
+        f'<row r="{i}"><c r="A{i}"><v>0.{i}</v></c><c r="B{i}"><v>60</v></c></row>'
+        for i in range(2, 12)
+    )
+    names = "".join(
+        f'<c r="{letter}1" t="inlineStr"><is><t>{name}</t></is></c>'
+        for letter, name in {"A": "slip", "B": "load_N"}.items()
+    )
+    return _xlsx(
+        f'<worksheet xmlns="{_MAIN}"><sheetData><row r="1">{names}</row>{rows}</sheetData>'
+        "</worksheet>"
+    )
+
+
+def small_mat():
+    """Two arrays of ten numbers, in a struct and beside it."""
+    numbers = np.linspace(0.1, 1.0, 10)
+    own = _matrix(6, (10, 1), "", _element(_DOUBLE, numbers.tobytes()))
+    names = _element(_INT32, struct.pack("<i", 8)) + _element(_INT8, b"torque".ljust(8, b"\0"))
+    return _mat(
+        _matrix(6, (10, 1), "time", _element(_DOUBLE, numbers.tobytes())),
+        _matrix(_STRUCT, (1, 1), "log", names + own),
+    )
+
+
+def small_hdf5():
+    """A data set of ten numbers in a group, packed."""
+    import h5py
+
+    content = io.BytesIO()
+    with h5py.File(content, "w", track_order=True) as file:
+        file.create_dataset("log/torque", data=np.linspace(0.1, 1.0, 10), compression="gzip")
+    return content.getvalue()
+
+
 def implied_cells_xlsx():
     """Rows and cells without their places, and one far to the right."""
     sheet = (
-        '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
+        f'<worksheet xmlns="{_MAIN}"><sheetData>'
         + "<row><c><v>1</v></c></row>" * 200_000
         + '<row><c r="XFD200001"><v>1</v></c></row></sheetData></worksheet>'
     )
@@ -129,38 +166,45 @@ def long_text_xlsx():
         '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData>'
     )
     row = "<row>" + '<c t="s"><v>0</v></c>' * 4 + "</row>"
-    shared = (
-        '<sst xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><si><t>'
-        f"{'a' * 32_000}</t></si></sst>"
-    )
+    shared = f'<sst xmlns="{_MAIN}"><si><t>{"a" * 32_000}</t></si></sst>'
     return _xlsx(f"{head}{row * 100_000}</sheetData></worksheet>", shared)
 
 
-_SHARED = (
-    '<Override PartName="/xl/sharedStrings.xml" ContentType="application/vnd.openxmlformats-'
-    'officedocument.spreadsheetml.sharedStrings+xml"/>'
-)
+_MAIN = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+_KIND = "application/vnd.openxmlformats-officedocument.spreadsheetml"
+_RELATIONS = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+_PACKAGE = "http://schemas.openxmlformats.org/package/2006"
 
 
 def _xlsx(sheet, shared=""):
-    import openpyxl
-
-    book = openpyxl.Workbook()
-    book.active["A1"] = "slip"
-    plain, changed = io.BytesIO(), io.BytesIO()
-    book.save(plain)
-    with (
-        zipfile.ZipFile(plain) as old,
-        zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as new,
-    ):
-        for name in old.namelist():
-            text = old.read(name).decode()
-            if shared and name == "[Content_Types].xml":
-                text = text.replace("</Types>", f"{_SHARED}</Types>")
-            new.writestr(name, sheet if name == "xl/worksheets/sheet1.xml" else text)
-        if shared:
-            new.writestr("xl/sharedStrings.xml", shared)
-    return changed.getvalue()
+    """A workbook of one sheet; ECMA-376, part 1."""
+    parts = {"workbook": "sheet.main", "worksheets/sheet1": "worksheet"}
+    parts |= {"sharedStrings": "sharedStrings"} if shared else {}
+    types = "".join(
+        f'<Override PartName="/xl/{name}.xml" ContentType="{_KIND}.{kind}+xml"/>'
+        for name, kind in parts.items()
+    )
+    inner = "".join(
+        f'<Relationship Id="r{i}" Type="{_RELATIONS}/{kind}" Target="{name}.xml"/>'
+        for i, (name, kind) in enumerate([*parts.items()][1:])
+    )
+    content = {
+        "[Content_Types].xml": f'<Types xmlns="{_PACKAGE}/content-types"><Default Extension="rels" '
+        'ContentType="application/vnd.openxmlformats-package.relationships+xml"/>'
+        f"{types}</Types>",
+        "_rels/.rels": f'<Relationships xmlns="{_PACKAGE}/relationships"><Relationship Id="r0" '
+        f'Type="{_RELATIONS}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{_PACKAGE}/relationships">{inner}'
+        "</Relationships>",
+        "xl/workbook.xml": f'<workbook xmlns="{_MAIN}" xmlns:r="{_RELATIONS}"><sheets><sheet '
+        'name="A" sheetId="1" r:id="r0"/></sheets></workbook>',
+        "xl/worksheets/sheet1.xml": sheet,
+    } | ({"xl/sharedStrings.xml": shared} if shared else {})
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
+        for name, text in content.items():
+            file.writestr(name, text)
+    return packed.getvalue()
 
 
 def _parquet(columns, **options):
@@ -224,3 +268,21 @@ def unallocated_hdf5():
 def widening_json():
     """Lines of which each has a key of its own."""
     return "\n".join(f'{{"k{i}": 1, "t": {i}}}' for i in range(60_000)).encode()
+
+
+def claimed_chunk_mcap():
+    """A chunk of MCAP that states a size of 3 TB."""
+    from zstandard import ZstdCompressor
+
+    body = ZstdCompressor().compress(bytes(1 << 20))
+    chunk = struct.pack("<QQQI", 0, 0, 3 << 40, 0) + struct.pack("<I", 4) + b"zstd"
+    chunk += struct.pack("<Q", len(body)) + body
+    return b"\x89MCAP0\r\n" + struct.pack("<BQ", 6, len(chunk)) + chunk
+
+
+def claimed_chunk_bag():
+    """A chunk of a bag of ROS 1 that states a size of 4 GB."""
+    fields = (b"op=\x05", b"compression=bz2", b"size=" + struct.pack("<I", 0xFFFFFFF0))
+    header = b"".join(struct.pack("<I", len(field)) + field for field in fields)
+    record = struct.pack("<I", len(header)) + header + struct.pack("<I", 4) + bytes(4)
+    return b"#ROSBAG V2.0\n" + record

@@ -162,6 +162,9 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     try:
         with h5py.File(path, "r") as opened:
             opened.visititems(visit)
-    except OSError as error:
-        raise InputError(f"{path} is not a complete HDF5 file: {error}") from None
+    except InputError:
+        raise
+    except Exception as error:  # h5py raises many kinds for damaged files
+        first = " ".join(str(error).split())
+        raise InputError(f"{path} is not a complete HDF5 file: {first}") from None
     return leaves, tuple(about)
