@@ -33,9 +33,9 @@ def check_spreadsheet_size(file: Path) -> None:
                 part = _Part(file, shared)
                 with packed.open(name) as opened:
                     _parse(part, opened)
-    except TableError:
+    except (TableError, OSError):
         raise
-    except (zipfile.BadZipFile, ValueError, NotImplementedError, EOFError):
+    except Exception:  # of many kinds, by the part that is damaged
         raise TableError(
             f"{file} is no .xlsx file: it is damaged, has a password, or is of the older kind .xls;"
             " open it in a spreadsheet program and save it as .xlsx or CSV"

@@ -8,8 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import whole_number_from
 from soilml.errors import InputError
+from soilml.io.cell_text import read_whole_number
 
 if TYPE_CHECKING:
     import socket
@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "--port",
-        type=whole_number_from(0, 65535),
+        type=port_number,
         default=PORT,
         metavar="N",
         help=f"port of the page (default: {PORT}; 0 takes a free one)",
@@ -43,6 +43,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-browser", action="store_true", help="print the address, and open no browser"
     )
+
+
+def port_number(text: str) -> int:
+    """The number of a port; raises `ArgumentTypeError` for anything else."""
+    try:
+        if 0 <= (port := read_whole_number(text)) <= 65535:
+            return port
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number from 0 to 65535")
 
 
 def run(args: argparse.Namespace) -> int:

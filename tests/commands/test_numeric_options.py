@@ -11,6 +11,7 @@ from conftest import THREE_CHANNEL_MODEL
 from soilml.cli import main
 from soilml.cli.main import COMMANDS, parser
 from soilml.cli.options import NumberFrom, number, slip_limit, whole_number
+from soilml.serve.command import port_number
 
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]
 #: Options whose text holds numbers, which their command reads.
@@ -49,7 +50,7 @@ NUMBERS = [
     (words, action)
     for words, action in options()
     if isinstance(action.type, NumberFrom)
-    or action.type is slip_limit
+    or action.type in (slip_limit, port_number)
     or getattr(action.type, "__qualname__", "").startswith("whole_number_from")
 ]
 
