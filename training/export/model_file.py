@@ -195,7 +195,7 @@ def _gear_in_si(entry: dict[str, Any]) -> dict[str, Any]:
     """The gear of a recipe, with numbers for values that have a unit, such as "150 mm"."""
     if not entry:
         return {}
-    made = take_gear(Settings(dict(entry), "[gear]", Path()))
+    made = take_gear(Settings(dict(entry), "[gear]"))
     return {
         name: getattr(made, name, value) if isinstance(value, str) else value
         for name, value in entry.items()
