@@ -7,6 +7,7 @@ functions, the first slip that pulls enough a sum over all slips.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -104,21 +105,23 @@ class _Step:
         sound = usable * steady
         raw = where(usable > 0.5, raw, float(least_speed) + constant(graph, np.ones(self.k)))
         torque = read["torque"] * way
-        seen = absolute(torque) < FAR
+        size, most = absolute(torque), constant(graph, self.filter.most_torque)
+        seen = size <= most
+        wild = (size > most).astype(np.float32) * (size < FAR).astype(np.float32)
         torque = where(seen, torque, 0.0)
         slope = read["slope"] * way
         load = read["load"].clip(float(self.table.load[0]), float(self.table.load[-1]))
         rim, apart, kept = self._rims(recent.take([0], 0), raw)
-        pull, own = self._curves(graph, rim, load)
+        between = self._places(graph, rim, load)
+        pull = self._pull(graph, load, between)
         sin, cos = slope.node("Sin"), slope.node("Cos")
         share = constant(graph, self.filter._share[:, None])
         found = self._balance(graph, pull, (sin + share) * self.filter.weight)
         hot, part, missing, rise, place = found
         error = cos * float(self.filter.weight * self.errors.slope_std)
-        before_at = [(values[0] * hot).sum(1, True) for values in own]
-        after_at = [(values[1] * hot).sum(1, True) for values in own]
-        risen = [b - a for a, b in zip(before_at, after_at, strict=True)]
-        model = [a + part * d for a, d in zip(before_at, risen, strict=True)]
+        ends = [self._torques(graph, i, load, between[i], hot) for i in range(self.k)]
+        risen = [b - a for a, b in ends]
+        model = [a + part * d for (a, _), d in zip(ends, risen, strict=True)]
         common = [d / rise * error for d in risen]
         step = (hot * constant(graph, np.diff(-self.ratio)[None])).sum(1, True)
         floor = constant(graph, self.table.floor[:, None].astype(float))
@@ -144,6 +147,7 @@ class _Step:
             "sound": sound, "way": way, "rim": rim, "answer": answer, "quantiles": quantiles,
             "after": after, "apart": apart, "middle": middle_raw, "misfit": misfit,
             "no_soil": no_soil, "beyond": beyond, "standing": standing, "usable": usable,
+            "wild": wild.reduce("ReduceMax", 0, True),
         }, new_mean, new_cov)  # fmt: skip
 
     def _rims(self, apart: Value, rim: Value) -> tuple[Value, Value, Value]:
@@ -155,37 +159,53 @@ class _Step:
         kept = (1.0 - float(self.errors.speed_std**2) / joined.clip(TINY)).clip(0.0)
         return middle + kept * away, joined, kept
 
-    def _curves(
-        self, graph: Graph, rim: Value, load: Value
-    ) -> tuple[Value, list[tuple[Value, Value]]]:
-        """Pull (n, m) of the rover, and for each wheel its torque at all slips but the last, and
-        at all but the first, (n, m - 1) each."""
-        table, m, levels = self.table, len(self.table.slip), len(self.table.load)
+    def _places(self, graph: Graph, rim: Value, load: Value) -> list[tuple[Value, Value]]:
+        """Weights of each wheel by which tables are read: over slip (m, m) and load (1, l)."""
+        table, levels = self.table, len(self.table.load)
         fastest = rim.reduce("ReduceMax", 0, True)
         level = (log(load) - float(np.log(table.load[0]))) * float(
             (levels - 1) / np.log(table.load[-1] / table.load[0])
         )
-        own, total = [], None
-        for i, kind in enumerate(table.kind):
+        found = []
+        for i in range(self.k):
             ratio = fastest / rim.take([i], 0) * constant(graph, self.ratio[None])  # (1, m)
             slip = slip_of(ratio.clip(*RATIO_ENDS)).clip(
                 float(table.slip[0]), float(table.slip[-1])
             )
-            between = _hats(graph, table.slip, slip)  # (m nodes, m places)
             at = absolute(level.take([i], 0) - constant(graph, np.arange(levels)[None]))
-            share = (1.0 - at).clip(0.0)  # (1, levels)
-            both = []
-            for values in (table.pull[kind], table.torque[kind]):
-                flat = constant(graph, values.reshape(levels, -1))
-                whole = (share @ flat).reshape(self.n, m)
-                soils, floors = whole.split([self.soils, self.n - self.soils], 0)
-                both.append(concat([soils @ between, floors], 0))
-            scaled = load.take([i], 0) * both[0]
-            total = scaled if total is None else total + scaled
-            torque = both[1] * (load.take([i], 0) * float(table.radius[i]))
-            own.append((_columns(torque, 0, m - 1), _columns(torque, 1, m)))
-        assert total is not None
-        return total, own
+            found.append((_hats(graph, table.slip, slip), (1.0 - at).clip(0.0)))
+        return found
+
+    def _read(self, graph: Graph, values: Floats, between: tuple[Value, Value]) -> Value:
+        """A table (levels, n, m) at the slips and the load of a wheel, (n, m)."""
+        over_slip, over_load = between
+        parts = []
+        for part in (values[:, : self.soils], values[:, self.soils :]):
+            flat = constant(graph, part.reshape(len(part), -1))
+            parts.append((over_load @ flat).reshape(-1, len(self.table.slip)))
+        soils, floors = parts  # wheels on a hard floor share its little slip
+        return concat([soils @ over_slip, floors], 0)
+
+    def _pull(self, graph: Graph, load: Value, between: Sequence[tuple[Value, Value]]) -> Value:
+        """Pull of the rover (n, m)."""
+        total: Any = 0.0
+        for i, kind in enumerate(self.table.kind):
+            total = load.take([i], 0) * self._read(graph, self.table.pull[kind], between[i]) + total
+        assert isinstance(total, Value)
+        return total
+
+    def _torques(
+        self, graph: Graph, wheel: int, load: Value, between: tuple[Value, Value], hot: Value
+    ) -> tuple[Value, Value]:
+        """Torque of a wheel at both ends of the interval that is marked in `hot`, (n, 1) each.
+
+        One wheel after the other, so that they share their working memory.
+        """
+        m, kind = len(self.table.slip), self.table.kind[wheel]
+        scale = load.take([wheel], 0) * float(self.table.radius[wheel])
+        torque = self._read(graph, self.table.torque[kind], between)
+        low, high = _columns(torque, 0, m - 1), _columns(torque, 1, m)
+        return (low * hot).sum(1, True) * scale, (high * hot).sum(1, True) * scale
 
     def _balance(
         self, graph: Graph, pull: Value, needed: Value
@@ -371,6 +391,7 @@ class _Step:
             misfit * answered,
             (beyond > LIKELY).astype(np.float32) * answered,
             (width > WIDE).astype(np.float32) * answered,
+            made["wild"] * sound,
         ]
         concat(flags, 0).reshape(len(FLAGS)).named("flags")
 
