@@ -245,7 +245,7 @@ class SlipStream:
         """Whether the rows of the probe, one after the other, have their known answers."""
         state = self.start()
         for entry in probe:
-            rows = {name: np.asarray(values, np.float64) for name, values in entry["row"].items()}
+            rows: dict[str, Any] = {n: np.asarray(v, np.float64) for n, v in entry["row"].items()}
             found, state = self.step(state, **rows)
             own = (found.speed, found.speed_std, found.no_soil, found.beyond)
             known = entry["speed"], entry["speed_std"], entry["no_soil"], entry["beyond"]

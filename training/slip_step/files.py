@@ -17,7 +17,7 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.onboard.model_file import SLIP_STEP, with_checksums
 from soilml.onboard.slip_stream import SLIP_FORMAT
-from soilml.slip_filter.filter import QUANTILES, SlipFilter
+from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import ForceTable, force_table
 from training.slip_step.c_file import write_slip_c
 from training.slip_step.graph import slip_step_model, start_of

@@ -158,7 +158,7 @@ def test_files_of_earlier_versions_and_of_other_contents_are_refused(folder, tmp
         return tmp_path / "own.onnx"
 
     assert SlipStream.load(written()).wheels[0] == "front-left"
-    with pytest.raises(ModelFileError, match="has format 1 of slip filters; .* write it again"):
+    with pytest.raises(ModelFileError, match=r"has format 1 of slip filters; .* write it again"):
         SlipStream.load(written(soilml_format=""))
     with pytest.raises(ModelFileError, match="its metadata is damaged"):
         SlipStream.load(written(rover=""))

@@ -8,11 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from soilml import read_case, read_table
 from soilml.cli import main
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.slip_stream import FLAGS, SlipStream
-from soilml.slip_filter.drive import WIDE, _after, read_drive
+from soilml.slip_filter.drive import WIDE, _after
 from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import force_table
 
