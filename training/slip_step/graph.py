@@ -7,7 +7,6 @@ functions, the first slip that pulls enough a sum over all slips.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -30,11 +29,11 @@ from soilml.slip_filter.filter import (
 )
 from training.onnx_graph.builder import FLOAT, Graph
 from training.onnx_graph.value import Value, absolute, concat, constant, exp, log, sqrt, where
+from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, columns, slip_of
 
 #: Places of the distribution function of the speed, in standard deviations about the mean.
 PLACES = np.arange(-4.0, 4.01, 0.125)
 TINY, FAR = 1e-12, 1e30  # Smallest divisor; numbers beyond are not measured
-RATIO_ENDS = (0.01, 10.0)  # Of rim speeds to each other
 
 
 def slip_step_model(filter_: SlipFilter, least_speed: float, gravity: float) -> Any:
@@ -112,14 +111,14 @@ class _Step:
         slope = read["slope"] * way
         load = read["load"].clip(float(self.table.load[0]), float(self.table.load[-1]))
         rim, apart, kept = self._rims(recent.take([0], 0), raw)
-        between = self._places(graph, rim, load)
-        pull = self._pull(graph, load, between)
+        curves = ForceCurves(graph, self.table, rim, load)
+        pull = curves.pull()
         sin, cos = slope.node("Sin"), slope.node("Cos")
         share = constant(graph, self.filter._share[:, None])
         found = self._balance(graph, pull, (sin + share) * self.filter.weight)
         hot, part, missing, rise, place = found
         error = cos * float(self.filter.weight * self.errors.slope_std)
-        ends = [self._torques(graph, i, load, between[i], hot) for i in range(self.k)]
+        ends = [curves.torques(i, hot) for i in range(self.k)]
         risen = [b - a for a, b in ends]
         model = [a + part * d for (a, _), d in zip(ends, risen, strict=True)]
         common = [d / rise * error for d in risen]
@@ -159,54 +158,6 @@ class _Step:
         kept = (1.0 - float(self.errors.speed_std**2) / joined.clip(TINY)).clip(0.0)
         return middle + kept * away, joined, kept
 
-    def _places(self, graph: Graph, rim: Value, load: Value) -> list[tuple[Value, Value]]:
-        """Weights of each wheel by which tables are read: over slip (m, m) and load (1, l)."""
-        table, levels = self.table, len(self.table.load)
-        fastest = rim.reduce("ReduceMax", 0, True)
-        level = (log(load) - float(np.log(table.load[0]))) * float(
-            (levels - 1) / np.log(table.load[-1] / table.load[0])
-        )
-        found = []
-        for i in range(self.k):
-            ratio = fastest / rim.take([i], 0) * constant(graph, self.ratio[None])  # (1, m)
-            slip = slip_of(ratio.clip(*RATIO_ENDS)).clip(
-                float(table.slip[0]), float(table.slip[-1])
-            )
-            at = absolute(level.take([i], 0) - constant(graph, np.arange(levels)[None]))
-            found.append((_hats(graph, table.slip, slip), (1.0 - at).clip(0.0)))
-        return found
-
-    def _read(self, graph: Graph, values: Floats, between: tuple[Value, Value]) -> Value:
-        """A table (levels, n, m) at the slips and the load of a wheel, (n, m)."""
-        over_slip, over_load = between
-        parts = []
-        for part in (values[:, : self.soils], values[:, self.soils :]):
-            flat = constant(graph, part.reshape(len(part), -1))
-            parts.append((over_load @ flat).reshape(-1, len(self.table.slip)))
-        soils, floors = parts  # wheels on a hard floor share its little slip
-        return concat([soils @ over_slip, floors], 0)
-
-    def _pull(self, graph: Graph, load: Value, between: Sequence[tuple[Value, Value]]) -> Value:
-        """Pull of the rover (n, m)."""
-        total: Any = 0.0
-        for i, kind in enumerate(self.table.kind):
-            total = load.take([i], 0) * self._read(graph, self.table.pull[kind], between[i]) + total
-        assert isinstance(total, Value)
-        return total
-
-    def _torques(
-        self, graph: Graph, wheel: int, load: Value, between: tuple[Value, Value], hot: Value
-    ) -> tuple[Value, Value]:
-        """Torque of a wheel at both ends of the interval that is marked in `hot`, (n, 1) each.
-
-        One wheel after the other, so that they share their working memory.
-        """
-        m, kind = len(self.table.slip), self.table.kind[wheel]
-        scale = load.take([wheel], 0) * float(self.table.radius[wheel])
-        torque = self._read(graph, self.table.torque[kind], between)
-        low, high = _columns(torque, 0, m - 1), _columns(torque, 1, m)
-        return (low * hot).sum(1, True) * scale, (high * hot).sum(1, True) * scale
-
     def _balance(
         self, graph: Graph, pull: Value, needed: Value
     ) -> tuple[Value, Value, Value, Value, Value]:
@@ -221,8 +172,8 @@ class _Step:
         hot = concat([second + begin, rest], 1)
         last = np.eye(1, m - 1, m - 2)
         hot = hot + (1.0 - known) * constant(graph, last)
-        low = (_columns(pull, 0, m - 1) * hot).sum(1, True)
-        high = (_columns(pull, 1, m) * hot).sum(1, True)
+        low = (columns(pull, 0, m - 1) * hot).sum(1, True)
+        high = (columns(pull, 1, m) * hot).sum(1, True)
         rise = (high - low).clip(1e-3 * float(self.filter.weight))
         share = where(known > 0.5, ((needed - low) / rise).clip(0.0, 1.0), 1.0)
         missing = where(known > 0.5, 0.0 * rise, needed - pull.reduce("ReduceMax", 1, True))
@@ -339,7 +290,7 @@ class _Step:
         )
         distribution = (weight * under).sum(0, True)  # (1, places)
         count = len(PLACES)
-        low, high = _columns(distribution, 0, count - 1), _columns(distribution, 1, count)
+        low, high = columns(distribution, 0, count - 1), columns(distribution, 1, count)
         found = []
         for q in QUANTILES:
             share = ((q - low) / (high - low).clip(TINY)).clip(0.0, 1.0)
@@ -399,23 +350,3 @@ class _Step:
 def d_squared(x: Value) -> Value:
     """x times itself."""
     return x * x
-
-
-def slip_of(ratio: Value) -> Value:
-    """Slip from v / (r omega), above zero."""
-    return where(ratio > 1.0, 1.0 / ratio.clip(1.0) - 1.0, 1.0 - ratio)
-
-
-def _columns(x: Value, first: int, last: int) -> Value:
-    return Value(x.graph, x.graph.columns(x.name, first, last), x.dtype)
-
-
-def _hats(graph: Graph, nodes: Floats, places: Value) -> Value:
-    """Weights (m, places) of values at nodes (m,) that interpolate linearly at places (1, .)."""
-    step = np.diff(nodes)
-    up = (places - constant(graph, nodes[1:-1, None])) / constant(graph, step[:-1, None]) + 1.0
-    down = (constant(graph, nodes[1:-1, None]) - places) / constant(graph, step[1:, None]) + 1.0
-    inner = up.node("Min", down).clip(0.0)
-    begin = ((float(nodes[1]) - places) / float(step[0])).clip(0.0)
-    end = ((places - float(nodes[-2])) / float(step[-1])).clip(0.0)
-    return concat([begin, inner, end], 0)
