@@ -30,6 +30,8 @@ ROOT = Path(__file__).parents[1]
 SKIPPED = 77  # Exit status where something that is asked for is not installed
 SETS = ("wheel", "any_wheel", "kls1_wheel", "wheel_small", "any_wheel_small")
 SINGLES = ("wheel_linear", "wheel_mlp", "wheel_lssvm", "slip_torque")
+#: Sizes that a header states.
+SIZES = r"#define \w+_(WORK|MEMORY|TRACKER|CONSTANT)_BYTES (\d+)"
 #: Rows that the emulated board steps through, and the seed of their noise.
 ROWS, SEED = 60, 8
 #: Files of the recipe's wheel, or of any: `kls1_wheel` is for another one.
@@ -73,12 +75,12 @@ def memory(folder: Path) -> str:
         sizes = {}
         for rows in (1, 32):
             header = exported(folder, name, rows).with_suffix(".h").read_text()
-            for part, size in re.findall(r"#define \w+_(WORK|MEMORY|CONSTANT)_BYTES (\d+)", header):
+            for part, size in re.findall(SIZES, header):
                 sizes[part, rows] = f"{int(size) / 1e3:.1f}"
-        parts = ("CONSTANT", 1), ("MEMORY", 1), ("WORK", 1), ("WORK", 32)
+        parts = ("CONSTANT", 1), ("MEMORY", 1), ("TRACKER", 1), ("WORK", 1), ("WORK", 32)
         lines.append((name, *(sizes[part] for part in parts)))
-    head = ("memory, kB", "constants", "state of a set", "work, --rows 1", "work, --rows 32")
-    return format_table(head, lines)
+    head = ("memory, kB", "constants", "state of a set", "tracker", "work, --rows 1")
+    return format_table((*head, "work, --rows 32"), lines)
 
 
 def stack(folder: Path) -> str:

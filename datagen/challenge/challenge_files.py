@@ -13,6 +13,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError, did_you_mean
+from soilml.io.bounds import JSON_BYTES
 from soilml.quantities import CHANNELS, column
 
 #: Written to every file, so that another kind of JSON file is refused.
@@ -37,6 +38,7 @@ def digest(content: bytes) -> str:
 def read_json(path: Path, what: str) -> tuple[dict[str, Any], bytes]:
     """A JSON object of `FORMAT`, and the bytes of its file; raises `InputError`."""
     try:
+        JSON_BYTES.check(path, path.stat().st_size)
         content = path.read_bytes()
         found = json.loads(content)
     except FileNotFoundError:

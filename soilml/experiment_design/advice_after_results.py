@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -137,7 +136,7 @@ def _trained_for(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
         recipe = json.loads(estimator.metadata["recipe"])
         if recipe.keys() - CASE_KEYS or recipe["operating"].keys() - {"slip", "load_N"}:
             return None
-        case = take_case(Settings(recipe, estimator.path, Path()))
+        case = take_case(Settings(recipe, estimator.path))
         ends = [recipe["operating"][key] for key in ("slip", "load_N")]
         pairs = [entry["range"] if isinstance(entry, dict) else entry for entry in ends]
         slips, loads = ([float(x) for x in np.linspace(a, b, GRID_SIZE)] for a, b in pairs)

@@ -6,10 +6,10 @@ import argparse
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_gear_option,
     add_output,
     add_picture_option,
-    number,
 )
 from soilml.errors import InputError, TableError
 
@@ -48,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_gear_option(parser)
     parser.add_argument(
         "--diameter",
-        type=number,
+        type=NumberFrom(1e-4, 1.0, "m"),
         metavar="M",
         help="diameter of round sensors, whose averaging over the disc is removed",
     )

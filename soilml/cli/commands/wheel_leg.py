@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_by_option,
     add_ignore_extra_option,
     add_output,
     add_picture_option,
-    number,
 )
 from soilml.errors import InputError
 
@@ -78,9 +78,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
     )
-    parser.add_argument("--torque-std", type=number, default=0.0, metavar="NM", help="std, N m")
     parser.add_argument(
-        "--vibration-std", type=number, default=0.0, metavar="M_S2", help="std, m/s^2"
+        "--torque-std", type=NumberFrom(0.0, 1e6, "N m"), default=0.0, metavar="NM", help="std, N m"
+    )
+    parser.add_argument(
+        "--vibration-std",
+        type=NumberFrom(0.0, 1e4, "m/s^2"),
+        default=0.0,
+        metavar="M_S2",
+        help="std, m/s^2",
     )
     add_by_option(parser)
     add_ignore_extra_option(parser)

@@ -281,10 +281,14 @@ def test_bad_rows_are_refused_in_one_line(rover, estimator, table, error, said):
 
 def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
     case = read_case(rover)
-    with pytest.raises(InputError, match="both must be above zero"):
-        soil_map(case, two_soils(), estimator, cell=0.0)
-    with pytest.raises(InputError, match=r"would have .* cells of 0.001 m"):
-        soil_map(case, two_soils(), estimator, cell=0.001)
+    with pytest.raises(InputError, match=r"would have .* cells of 0.01 m"):
+        soil_map(case, two_soils(), estimator, cell=0.01, reach=1000.0)
+    for size in (0.0, 1e-9, 1e9, np.nan, np.inf):
+        for sizes in ({"cell": size}, {"reach": size}):
+            with pytest.raises(InputError, match=r"needed are 0.01 to 1000 m"):
+                soil_map(case, two_soils(), estimator, **sizes)
+    with pytest.raises(InputError, match="no cell of 100 m has its middle within 2 m"):
+        soil_map(case, two_soils(60), estimator, cell=100.0)
     with pytest.raises(InputError, match="has no set posterior"):
         soil_map(case, two_soils(), Estimator.load("wheel_lssvm"))
     (tmp_path / "dem.tif").write_text("no picture")
