@@ -1,7 +1,7 @@
 """What generated C needs at most, for a reviewer: memory, stack, instructions, precision.
 
-`python bench/c_review.py [memory stack instructions precision]` prints tables for docs/how-to/deploy.md
-and docs/decisions/generated-c.md. Instructions are
+`python bench/c_review.py [memory stack instructions precision]` prints tables for docs/c-export.md
+and docs/c-review.md. Instructions are
 counted on an emulated Cortex-M4F, rows of all channels until the memory of a set is full.
 """
 

@@ -1,4 +1,4 @@
-"""Logs of a wheel-leg, simulated with the defects of real ones, to slip (docs/how-to/wheel-leg.md).
+"""Logs of a wheel-leg, simulated with the defects of real ones, to slip (docs/how-to/import.md).
 
 Each run has two files. That of the motor (100 Hz) has an encoder which starts again at 360 degrees
 and reads 12 degrees where a leg is vertical, a current that reads 0.05 A at rest, and a draw wire.

@@ -1,4 +1,4 @@
-"""The commands of docs/how-to/deploy.md, as written, from an empty folder to an emulated processor."""
+"""The commands of docs/how-to/deploy.md, as written, up to an emulated processor."""
 
 import os
 import re

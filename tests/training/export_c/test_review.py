@@ -1,4 +1,4 @@
-"""What docs/decisions/generated-c.md states of the generated code: stack, recursion, loops, state, tests."""
+"""What docs/decisions/generated-c.md states: stack, recursion, loops, state, tests."""
 
 import os
 import re
