@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     add_output,
-    add_picture_option,
     number,
 )
 from soilml.errors import InputError
@@ -49,7 +48,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--speed", type=number, metavar="RAD_S", help="default: 0.3 rad/s")
     add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw the walks, or their values against legs, stiffness or slip")
+    add_output(
+        parser,
+        "--picture",
+        "FILE.png",
+        "draw the walks, or their values against legs, stiffness or slip",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
