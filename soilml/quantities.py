@@ -126,13 +126,3 @@ WEAKLY_IDENTIFIED_ABOVE = 0.5
 def column(name: str) -> str:
     """Column name of the quantity called `name`."""
     return QUANTITIES[name].column
-
-
-#: Readings of a rover's row, with their least and largest possible value: what lies beyond is an
-#: error of a sensor, and its square may overflow.
-ROVER_READINGS: dict[str, tuple[float, float]] = {
-    "rim_speed": (-100.0, 100.0),  # m/s
-    "load": (1e-6, 1e7),  # N, of a wheel
-    "slope": (-1.6, 1.6),  # rad
-    "elapsed": (1e-6, 1e9),  # s
-}

@@ -19,7 +19,6 @@ from soilml.onboard.features import as_number, as_numbers
 from soilml.onboard.model_file import Session, open_slip_step
 from soilml.onboard.set_contract import Floats
 from soilml.onboard.state_checksum import state_checksum
-from soilml.quantities import ROVER_READINGS
 
 #: Of the weights of the grounds: ends of the 90 % interval of speed and slip, and the median.
 QUANTILES = (0.02, 0.5, 0.98)
@@ -39,6 +38,14 @@ FLAGS = (
 )
 REFUSED = FLAGS[:3]  # Flags of rows without an answer
 SLIP_FORMAT = "2"  # Version of files and states; files of version 1 have no checksum
+#: Readings of a row, with their least and largest possible value: what lies beyond is an error of a
+#: sensor, and its square may overflow. A load beyond the table's counts as that of its end.
+POSSIBLE = {
+    "rim_speed": (-100.0, 100.0),  # m/s
+    "load": (1e-6, 1e7),  # N, of a wheel
+    "slope": (-1.6, 1.6),  # rad
+    "elapsed": (1e-6, 1e9),  # s
+}
 #: Largest deviation of an answer from the file's own probe: of mean and standard deviation, in
 #: standard deviations, and of probabilities.
 PROBE_TOLERANCE = 5e-3
@@ -181,7 +188,7 @@ class SlipStream:
         elapsed: Time since the row before, s.
 
         Raises `InputError` for another number of wheels; for what is not finite or not possible
-        (`ROVER_READINGS`), but for a torque; for a state that is damaged or of another file; and
+        (`POSSIBLE`), but for a torque; for a state that is damaged or of another file; and
         for a row whose answer would not be finite. Go on with the state that was given.
         """
         self._check(state)
@@ -195,7 +202,7 @@ class SlipStream:
                 )
         feed["slope"] = np.asarray([as_number("slope", slope)])
         feed["elapsed"] = np.asarray([as_number("elapsed", elapsed)])
-        for name, (low, high) in ROVER_READINGS.items():
+        for name, (low, high) in POSSIBLE.items():
             values = feed[name]
             if not np.isfinite(values).all():
                 raise InputError(f"{name} is not finite; give the row again without it missing")

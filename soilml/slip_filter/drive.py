@@ -14,7 +14,6 @@ from soilml.errors import InputError, TableError
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.numerics.quantiles import chi_squared_quantile
-from soilml.quantities import ROVER_READINGS
 from soilml.remarks import Remark
 from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import SOILS, force_table
@@ -93,9 +92,8 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
     (the pitch), and, where known, roll_rad, load_N and commanded_speed_m_s. Without load_N, the
     loads follow from [rover].
 
-    Raises `TableError` for a missing column or cell, a value that is not possible, an unknown
-    wheel, a time without each wheel, and wheels that all stand; `InputError` for a case without
-    [rover].
+    Raises `TableError` for a missing column or cell, an unknown wheel, a time without each wheel,
+    and wheels that all stand; `InputError` for a case without [rover].
     """
     table = as_table(table)
     rover = case.rover
@@ -117,7 +115,6 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
         rim = rim * np.asarray([float(getattr(model.gear, "radius", 0.0)) for model in models])
     if not np.any(rim):
         raise TableError(f"{table.source}: all wheels stand still in every row, {speed} is 0")
-    _check_speeds(table, order, speed, rim)
     torque = each(reading)
     if not np.isfinite(torque).any():
         raise TableError(f"{table.source}: column {reading} has no value")
@@ -156,21 +153,6 @@ def _filled(table: Table, name: str) -> None:
     if blank.any():
         place = table.place(int(np.argmax(blank)))
         raise TableError(f"{place}, column {name}: the cell is blank; soilml slip needs a value")
-
-
-def _check_speeds(table: Table, order: NDArray[np.int64], column: str, speed: Floats) -> None:
-    """Raise `TableError` for rim speeds (n, k) that no rover has; the table limits the rest.
-
-    order: Rows of the table (n, k).
-    """
-    low, high = ROVER_READINGS["rim_speed"]
-    bad = ~((speed >= low) & (speed <= high))
-    if bad.any():
-        row = int(order[bad][0])
-        raise TableError(
-            f"{table.place(row)}, column {column}: {table[column][row]:g} is no speed of a rim; "
-            f"needed is {low:g} to {high:g} m/s"
-        )
 
 
 def _by_wheel(table: Table, wheels: Sequence[str]) -> NDArray[np.int64]:

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from soilml import __version__
-from soilml.onboard.slip_stream import FLAGS, QUANTILES, RECENT
-from soilml.quantities import ROVER_READINGS
+from soilml.onboard.slip_stream import FLAGS, POSSIBLE, QUANTILES, RECENT
 from soilml.slip_filter.filter import SlipFilter
 from training.export_c.c_file import BYTES, kernel_texts, template_environment
 from training.export_c.c_text import array
@@ -68,7 +67,7 @@ def write_slip_c(
         "begin": start[0, 1:].tolist(),
         "kernels": kernel_texts(shared),
         "identity": {key: metadata[key] for key in IDENTITY},
-        "possible": ROVER_READINGS,
+        "possible": POSSIBLE,
         "finite": [
             f"all_finite(out_{key}, {length})" for key, (_, length) in function.outputs.items()
         ],
