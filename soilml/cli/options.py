@@ -158,11 +158,6 @@ def add_report_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def add_picture_option(parser: argparse.ArgumentParser, text: str) -> None:
-    """Declare `--picture`."""
-    add_output(parser, "--picture", "FILE.png", text)
-
-
 def need_for_options(args: argparse.Namespace, command: str) -> None:
     """Raise `MissingLibraryError` where `--report` or `--picture` is given and lacks a library."""
     for option, libraries in (("report", ("jinja2", "matplotlib")), ("picture", ("matplotlib",))):

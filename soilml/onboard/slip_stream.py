@@ -38,11 +38,11 @@ FLAGS = (
 )
 REFUSED = FLAGS[:3]  # Flags of rows without an answer
 SLIP_FORMAT = "2"  # Version of files and states; files of version 1 have no checksum
-#: Readings of a row, with their least and largest possible value; others are refused, so that no
-#: number overflows. A load beyond those of the table counts as that of its end.
+#: Readings of a row, with their least and largest possible value: what lies beyond is an error of a
+#: sensor, and its square may overflow. A load beyond the table's counts as that of its end.
 POSSIBLE = {
     "rim_speed": (-100.0, 100.0),  # m/s
-    "load": (1e-6, 1e9),  # N
+    "load": (1e-6, 1e7),  # N, of a wheel
     "slope": (-1.6, 1.6),  # rad
     "elapsed": (1e-6, 1e9),  # s
 }
@@ -188,8 +188,8 @@ class SlipStream:
         elapsed: Time since the row before, s.
 
         Raises `InputError` for another number of wheels; for what is not finite or not possible
-        (`POSSIBLE`), but for a torque; for a state that is damaged or of another file; and for a
-        row whose answer would not be finite. Go on with the state that was given.
+        (`POSSIBLE`), but for a torque; for a state that is damaged or of another file; and
+        for a row whose answer would not be finite. Go on with the state that was given.
         """
         self._check(state)
         given = {"rim_speed": rim_speed, "torque": torque, "load": load}

@@ -22,9 +22,9 @@ from unittest import mock
 sys.path.insert(0, str(Path(__file__).parents[1] / "faults"))
 
 import files
-import hostile_files
 import numpy as np
 import onnx
+import small_files
 from hypothesis import strategies as st
 
 import soilml
@@ -304,14 +304,12 @@ TARGETS: dict[str, Target] = {
     ),
     "log": Target(_log, files.changed_text(files.LOG) | st.binary(max_size=64), 0.3),
     "spreadsheet": Target(
-        _in_file("r.xlsx", read_log), files.changed_bytes(hostile_files.small_xlsx()), 0.3
+        _in_file("r.xlsx", read_log), files.changed_bytes(small_files.small_xlsx()), 0.3
     ),
     "matlab": Target(
-        _in_file("r.mat", read_log), files.changed_bytes(hostile_files.small_mat()), 0.5
+        _in_file("r.mat", read_log), files.changed_bytes(small_files.small_mat()), 0.5
     ),
-    "hdf5": Target(
-        _in_file("r.h5", read_log), files.changed_bytes(hostile_files.small_hdf5()), 0.5
-    ),
+    "hdf5": Target(_in_file("r.h5", read_log), files.changed_bytes(small_files.small_hdf5()), 0.5),
     "page-model": Target(_page_model, files.changed_text(files.MODEL + files.SIMULATOR), 0.5),
     "python-rows": Target(_rows, as_json(python_columns), 3.0),
     "onnx": Target(

@@ -14,7 +14,6 @@ from soilml.cli.options import (
     add_gravity_options,
     add_model_and_runs,
     add_output,
-    add_picture_option,
     add_row_options,
     gravity_change,
     slip_limit,
@@ -110,7 +109,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_exact_model_option(parser)
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw maps of the expected width over slip and load")
+    add_output(
+        parser, "--picture", "FILE.png", "draw maps of the expected width over slip and load"
+    )
 
 
 def _with_noise_of_rows(case: Case, readings: Readings) -> Case:

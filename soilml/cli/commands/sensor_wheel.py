@@ -9,7 +9,6 @@ from soilml.cli.options import (
     NumberFrom,
     add_gear_option,
     add_output,
-    add_picture_option,
 )
 from soilml.errors import InputError, TableError
 
@@ -53,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="diameter of round sensors, whose averaging over the disc is removed",
     )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw k_x and pull against slip")
+    add_output(parser, "--picture", "FILE.png", "draw k_x and pull against slip")
 
 
 def run(args: argparse.Namespace) -> int:

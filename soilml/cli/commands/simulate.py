@@ -12,7 +12,6 @@ from soilml.cli.options import (
     add_effects_option,
     add_gear_option,
     add_output,
-    add_picture_option,
 )
 from soilml.errors import InputError
 
@@ -99,7 +98,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --balance: centre of mass behind the middle of the track",
     )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw the columns against slip")
+    add_output(parser, "--picture", "FILE.png", "draw the columns against slip")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from soilml.cli.options import (
     NumberFrom,
     add_output,
-    add_picture_option,
 )
 from soilml.errors import InputError
 
@@ -53,7 +52,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw the walks, or their values against legs, stiffness or slip")
+    add_output(
+        parser,
+        "--picture",
+        "FILE.png",
+        "draw the walks, or their values against legs, stiffness or slip",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

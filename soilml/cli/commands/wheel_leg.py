@@ -12,7 +12,6 @@ from soilml.cli.options import (
     add_by_option,
     add_ignore_extra_option,
     add_output,
-    add_picture_option,
 )
 from soilml.errors import InputError
 
@@ -91,7 +90,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_by_option(parser)
     add_ignore_extra_option(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw the soil by sensor, or the slip by stride")
+    add_output(parser, "--picture", "FILE.png", "draw the soil by sensor, or the slip by stride")
 
 
 def run(args: argparse.Namespace) -> int:

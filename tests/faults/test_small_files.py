@@ -7,7 +7,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-import hostile_files as files
+import small_files as files
 
 ROOT = Path(__file__).parents[2]
 IMPORT, ESTIMATE = ("import", "--init"), ("estimate", ROOT / "exported" / "wheel.onnx")
