@@ -37,6 +37,7 @@ _UNCOUNTED = re.compile(  # a formula without a value
     _CELL % b"" + rb"\s*<(?:\w+:)?f(?:\s[^>]*)?(?:/>|>[^<]*</(?:\w+:)?f>)\s*"
     rb"(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v></(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
 )
+_NUMBERS = (int, float)  # Types of cells that are numbers
 _PERCENT_FORMATS = ("9", "10")  # Numbers of the built-in formats with %
 
 Place = tuple[int, int]  # Row and column, from 0
@@ -93,7 +94,7 @@ def sheet_rows(path: Path) -> list[list[str]]:
             if row < len(rows) and column < len(rows[row]):
                 rows[row][column] = found[3].decode()
         _check_merged(where, rows, sheet.merged_cell_ranges or ())
-        if formula := _UNCOUNTED.search(xml):
+        if (b"<f" in xml or b":f" in xml) and (formula := _UNCOUNTED.search(xml)):
             raise TableError(
                 f"{where}, cell {_cell_name(_place(formula))}: a formula whose value is not in the "
                 "file; open it in a spreadsheet program and save it"
@@ -280,7 +281,7 @@ def _check_dates(where: str, rows: Cells) -> None:
     wide = [i for i, row in enumerate(rows) if sum(v != "" for v in row) > min(2, width - 1)]
     for column in range(width):
         dates = [i for i in wide if isinstance(rows[i][column], datetime.date)]
-        if dates and any(_is_number(rows[i][column]) for i in wide):
+        if dates and any(type(rows[i][column]) in _NUMBERS for i in wide):
             raise TableError(
                 f"{where}, cell {_cell_name((dates[0], column))}: a date among numbers; the "
                 "spreadsheet has taken a number such as 1.4 for it: type it anew, in cells "
@@ -297,7 +298,7 @@ def _texts(rows: Cells, percents: set[Place]) -> list[list[str]]:
         for j, value in enumerate(row):
             if isinstance(value, str) and "%" in value:
                 in_percent.add(j)
-            elif (i, j) in percents and j in in_percent and _is_number(value):
+            elif (i, j) in percents and j in in_percent and type(value) in _NUMBERS:
                 value = float(f"{100.0 * value:.15g}")
             texts.append(_text(value))
         while texts and not texts[-1]:
@@ -321,7 +322,3 @@ def _text(value: Any) -> str:
         seconds = value.total_seconds()
         return f"{int(seconds // 3600):02d}:{int(seconds % 3600 // 60):02d}:{seconds % 60:09.6f}"
     return str(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
