@@ -277,6 +277,8 @@ def _check_merged(where: str, rows: Cells, merged: Sequence[tuple[Place, Place]]
 def _check_dates(where: str, rows: Cells) -> None:
     """Refuse a date in a column of numbers: a spreadsheet takes 1.4 for the first of April."""
     width = len(rows[0]) if rows else 0
+    if not any(isinstance(value, datetime.date) for row in rows for value in row):
+        return
     # lines before a table, as `date: 2024-05-31`, have a name and a value
     wide = [i for i, row in enumerate(rows) if sum(v != "" for v in row) > min(2, width - 1)]
     for column in range(width):
@@ -291,16 +293,16 @@ def _check_dates(where: str, rows: Cells) -> None:
 
 def _texts(rows: Cells, percents: set[Place]) -> list[list[str]]:
     """The cells as texts, without blank ones at the ends of rows and without blank last rows."""
-    in_percent: set[int] = set()  # columns whose head says %
-    found: list[list[str]] = []
-    for i, row in enumerate(rows):
-        texts = []
+    heads: set[int] = set()  # columns whose head says %
+    for i, row in enumerate(rows if percents else ()):
         for j, value in enumerate(row):
             if isinstance(value, str) and "%" in value:
-                in_percent.add(j)
-            elif (i, j) in percents and j in in_percent and type(value) in _NUMBERS:
-                value = float(f"{100.0 * value:.15g}")
-            texts.append(_text(value))
+                heads.add(j)
+            elif (i, j) in percents and j in heads and type(value) in _NUMBERS:
+                row[j] = float(f"{100.0 * value:.15g}")
+    found = []
+    for row in rows:
+        texts = [str(v).removesuffix(".0") if type(v) is float else _text(v) for v in row]
         while texts and not texts[-1]:
             texts.pop()
         found.append(texts)
@@ -314,8 +316,6 @@ def _text(value: Any) -> str:
         return " ".join(value.split())  # a tab or a new line would divide the cell
     if isinstance(value, bool):
         return str(int(value))
-    if isinstance(value, float):
-        return str(value).removesuffix(".0")
     if isinstance(value, datetime.date):
         return f"{value}" if isinstance(value, datetime.datetime) else f"{value} 00:00:00"
     if isinstance(value, datetime.timedelta):
