@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from datagen.challenge.linear_entries import lasso_weights
-from datagen.challenge.process_entry import gaussian_process, process_features
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
@@ -39,7 +37,7 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
         if find_spec("pysindy"):  # of the extra `bench`
             named["STLSQ (pysindy)"] = _stlsq(g, r, labels)
         return named | {
-            "Lasso, BIC": _lasso(g, r, labels),
+            "Lasso, BIC": _largest(lasso_weights(g, r), g, labels),
             "stepwise, AIC": _stepwise(g, r, j, labels, 2.0),
             "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
             "random forest sees a gap": _forest(readings.slip, readings.load, readings.channel, r),
@@ -65,8 +63,15 @@ def _stlsq(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
     return _largest(optimizer.coef_[0] / norm, g, labels)
 
 
-def _lasso(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
-    return _largest(lasso_weights(g, r), g, labels)
+def lasso_weights(signatures: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Weights (k,) of signatures (m, k) of residuals (m,) in noise, by the Lasso with BIC."""
+    from sklearn.linear_model import LassoLarsIC
+
+    norm = np.maximum(np.linalg.norm(signatures, axis=0), 1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of steps that rounding makes too small
+        fitted = LassoLarsIC(criterion="bic", noise_variance=1.0).fit(signatures / norm, residual)
+    return np.asarray(fitted.coef_ / norm)
 
 
 def _stepwise(
@@ -91,6 +96,33 @@ def _forest(slip: np.ndarray, load: np.ndarray, channel: np.ndarray, r: np.ndarr
     x = np.column_stack([slip, np.log(load), channel])
     forest = RandomForestRegressor(100, oob_score=True, min_samples_leaf=3, random_state=0)
     return "gap" if forest.fit(x, r).oob_score_ > 0.0 else ""
+
+
+#: Columns that a process uses where they vary.
+COVARIATES = ("speed_m_s", "pass", "slip_angle_rad", "time_s")
+
+
+def process_features(table: Table) -> Callable[[Table], np.ndarray]:
+    """A function that gives slip, load and what varies in a table as features (rows, q)."""
+    varied = [name for name in COVARIATES if name in table and np.ptp(table[name]) > 0.0]
+
+    def features(rows: Table) -> np.ndarray:
+        columns: list[Any] = [rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4]
+        columns += [rows[name] / np.ptp(table[name]) for name in varied]
+        if "gear" in rows:
+            columns.append(np.unique(rows["gear"], return_inverse=True)[1])
+        return np.column_stack(columns)
+
+    return features
+
+
+def gaussian_process(dimensions: int) -> Any:
+    """A regressor of scikit-learn for readings in units of their noise."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+    kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0] * dimensions, (0.2, 20.0))
+    return GaussianProcessRegressor(kernel + WhiteKernel(1.0), random_state=0)
 
 
 #: Regressions of the residuals of a soil-only fit; the others are of the readings themselves.
