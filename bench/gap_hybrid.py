@@ -1,4 +1,4 @@
-"""What the model file of a gap analysis predicts with its remainder: of rows kept back at random."""
+"""What the model file of a gap analysis predicts, with its remainder, of rows kept back."""
 
 from __future__ import annotations
 

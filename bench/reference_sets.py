@@ -1,27 +1,30 @@
-"""Reference sets: fixed simulated sets whose exact posteriors are stored beside this file."""
+"""Reference sets: fixed simulated sets whose exact posteriors are stored beside this file.
+
+`python bench/reference_sets.py` computes these posteriors again, seven minutes on two cores.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from exact_sets import RankedPosterior, exact_set_posterior, si_values
+from exact_sets import exact_set_posterior, si_values
 
 from datagen.recipe import read_recipe
+from soilml.cli.progress import progress_bar
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel
 from soilml.processes import process_map
 from soilml.quantities import SHEAR
+from training.benchmark.bayes_limit_file import PosteriorSummary, save_limit
 from training.benchmark.designs import HASHED_DIGITS
 from training.set_posterior.families.dimensionless_sets import TORQUE_NOISE
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.spec import read_any_wheel_spec
-
-Progress = Callable[[str, int, int], None]
 
 #: Rows per set, number of sets of each size, and a seed that no training or tuning uses.
 SIZES = (1, 3, 6, 8, 16, 32)
@@ -136,23 +139,9 @@ def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
     return all(ends[name][0] <= value <= ends[name][1] for name, value in context.items())
 
 
-def compute_reference_posteriors(
-    references: Sequence[ReferenceSet], progress: Progress
-) -> Iterator[RankedPosterior]:
-    """The exact posterior of each set, in order, computed on all cores."""
-    with process_map(_exact, references) as found:
-        for done, summary in enumerate(found, 1):
-            progress("exact posteriors", done, len(references))
-            yield summary
-
-
 def packaged_posteriors() -> Path:
     """The file with the exact posteriors of the reference sets."""
     return Path(__file__).with_name("sets_limit.parquet")
-
-
-def _exact(reference: ReferenceSet) -> RankedPosterior:
-    return exact_set_posterior(reference.family, reference.sets, 0)
 
 
 def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
@@ -202,3 +191,27 @@ def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceS
             readings[key] = np.where(readings[key] < ABSENT_STD, std, ABSENT_STD)
         converted.append(replace(reference, sets=replace(sets, readings=readings)))
     return converted
+
+
+def _exact(reference: ReferenceSet) -> PosteriorSummary:
+    return exact_set_posterior(reference.family, reference.sets, 0)
+
+
+def store_posteriors() -> None:
+    """Compute and store the exact posteriors of all reference sets."""
+    references = [*generate_reference_sets(), *constant_noise_sets()]
+    with (
+        process_map(_exact, references) as found,
+        progress_bar("exact posteriors", len(references)) as done,
+    ):
+        summaries = []
+        for summary in found:
+            summaries.append(summary)
+            done(len(summaries))
+    save_limit(packaged_posteriors(), references, summaries)
+    flagged = sum(summary.flagged for summary in summaries)
+    print(f"written: {packaged_posteriors()}, {len(summaries)} sets, {flagged} flagged")
+
+
+if __name__ == "__main__":
+    store_posteriors()

@@ -1,19 +1,38 @@
-"""All benches: `python bench/run.py NAME ...`; see `runner.py` for what a run keeps and writes."""
+"""All benches: `python bench/run.py NAME ...`; `runner.py` says what a run keeps and writes."""
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-sys.path[:0] = [str(ROOT / "bench"), str(ROOT), str(ROOT / "tests"), str(ROOT / "tools")]
-
-from gap_bench import GAP
-from gap_hybrid import GAP_HYBRID
-from gap_speed import GAP_SPEED
-from runner import main
-
-BENCHES = (GAP, GAP_HYBRID, GAP_SPEED)
+sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "tests")]
+#: Modules that declare benches, in the order in which they run.
+MODULES = (
+    "forward_model",
+    "training_bench",
+    "sets",
+    "flags",
+    "model_errors",
+    "streams",
+    "slip_unknown",
+    "soil_maps",
+    "board",
+    "c_files",
+    "pull_bands",
+    "climbing",
+    "advice",
+    "wheel_leg_slip",
+    "adapt",
+    "gap_bench",
+    "gap_hybrid",
+    "gap_speed",
+    "challenge",
+)
 
 if __name__ == "__main__":
-    main(BENCHES)
+    from runner import Bench, main
+
+    found = [own for name in MODULES for own in vars(import_module(name)).values()]
+    main([own for own in found if isinstance(own, Bench)])

@@ -143,7 +143,7 @@ def write(bench: Bench, records: list[Row], command: str, folder: Path = RESULTS
         "machine": machine(),
     }
     lines = ",\n".join(json.dumps(record) for record in records)
-    text = f"{json.dumps(head, indent=1)[:-2]},\n \"records\": [\n{lines}\n]}}\n"
+    text = f'{json.dumps(head, indent=1)[:-2]},\n "records": [\n{lines}\n]}}\n'
     save_text(folder / f"{bench.name}.json", text)
     render(bench, head, rows_of(records), folder)
 
