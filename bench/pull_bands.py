@@ -122,7 +122,7 @@ def tables(rows: list[Row]) -> str:
         for k, s in enumerate(SLIPS)
     }
     columns |= {
-        "steepest": percent("steepest"),
+        "steepest, %": percent("steepest"),
         "width": each("width", ".1f", np.median),
         "error": lambda own: f"{np.quantile(np.abs([r['error'] for r in own]), 0.9):.1f}",
         "bias": each("error", "+.1f"),
