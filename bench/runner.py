@@ -157,9 +157,11 @@ def render(bench: Bench, head: Row, rows: list[Row], folder: Path = RESULTS) -> 
 
 def page(bench: Bench, head: Row, rows: list[Row]) -> str:
     """The page of a bench in `bench/results`."""
+    picture = f"![{bench.name}]({bench.name}.png)\n\n" if bench.draw else ""
     return (
         f"# {bench.title}\n\n**Measured** by `{head['command']}` on {head['date']}, "
-        f"{head['version']}. {head['machine']}\n\n{bench.about}\n\n{bench.tables(rows).strip()}\n"
+        f"{head['version']}. {head['machine']}\n\n{bench.about}\n\n"
+        f"{picture}{bench.tables(rows).strip()}\n"
     )
 
 
