@@ -80,7 +80,7 @@ bench: $(VENV)/.ready ## measure speed and accuracy, and write bench/results; go
 bench-gap: $(VENV)/.ready ## 739 sets with hidden effects against gates and baselines; goes on where it was ended
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
 	  --disable-pip-version-check --editable '.[bench]'
-	@$(BIN)/python bench/run.py gap gap-hybrid gap-speed
+	@$(BIN)/python bench/run.py gap gap-speed
 
 bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of a seed to tune on: nothing is written
 	@$(BIN)/python bench/run.py gap --quick

@@ -1,38 +1,25 @@
-"""On board: latency of an estimate, time from import to the first estimate, memory."""
+"""On board: latency of an estimate, size and parity of the released files."""
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import time
 from functools import cache
 from typing import Any
 
 import numpy as np
-from runner import ROOT, Bench, Row, Sample, markdown, one_case
+from runner import ROOT, Bench, Row, Sample, markdown
 
 from datagen.recipe import read_recipe
 from soilml import Estimator, Model, Operating, Wheel, soil
 from soilml.identification.trained_estimator import for_simulated_case
-from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import MEMORY_OUTPUTS, SET_OUTPUTS, SET_PREFIX
 
 CALLS, QUICK_CALLS = 4000, 80
-#: Readings before a step that is timed.
-STEPS = (8, 24, 200, 2000)
 OUTPUTS = ("mean", "std", "covariance", "in_range")
 READING = {"slip": 0.3, "torque": 3.0, "load": 60.0}
-COLD = """
-import time; t = time.perf_counter()
-from soilml.onboard.estimator import Estimator
-e = Estimator.load({path!r}); e(slip=0.3, torque=3.0, load=60.0)
-t = time.perf_counter() - t
-status = dict(line.split(":", 1) for line in open("/proc/self/status"))
-print(t, int(status["VmRSS"].split()[0]) / 1024)
-"""
 ABOUT = (
     "Median and 99th percentile (p99) in microseconds, one thread. Goals: 60 us for one reading, "
-    "150 us for a set of 16 (`any_wheel.onnx`: 350 us), 0.2 s to the first estimate, 0.5 MB per "
+    "150 us for a set of 16 (`any_wheel.onnx`: 350 us), 0.5 MB per "
     "file. *Parity*: largest difference between the float32 file and the float64 estimator, over "
     "the standard deviation of the prior; goal: 1e-4."
 )
@@ -56,7 +43,9 @@ def estimator_of(name: str) -> Estimator:
 def timed(call: Any, count: int = CALLS) -> tuple[float, float]:
     """Median and p99 (us) of a call."""
     taken = np.empty(count)
-    for i in range(-50, count):
+    for _ in range(50):
+        call()
+    for i in range(count):
         started = time.perf_counter()
         call()
         taken[i] = time.perf_counter() - started
@@ -136,79 +125,6 @@ def latency_table(rows: list[Row]) -> str:
     return markdown(head, lines)
 
 
-def processor_times(calls: list[Any], count: int) -> list[float]:
-    """Median processor time (us) of each of several calls, which are made in turn."""
-    taken = np.empty((len(calls), count))
-    for i in range(-20, count):
-        for k, call in enumerate(calls):
-            started = time.thread_time()
-            call()
-            taken[k, i] = time.thread_time() - started
-    return [float(us) for us in np.median(taken, axis=1) * 1e6]
-
-
-def memory_of(estimator: Estimator, count: int) -> Memory:
-    """The memory of readings of one soil, in steps of eight."""
-    rng, memory = np.random.default_rng(0), estimator.start()
-    slip, load = rng.uniform(0.08, 0.55, count), rng.uniform(40.0, 110.0, count)
-    at = Operating(slip=slip, load=load)
-    force = Model(Wheel(radius=0.15, width=0.12))(soil("wong1989/dry_sand"), at)
-    torque = force.torque * (1.0 + 0.02 * rng.standard_normal(count))
-    for first in range(0, count, 8):
-        part = slice(first, first + 8)
-        rows = {"slip": slip[part], "load": load[part], "torque": torque[part]}
-        _, memory = estimator.step(memory, **rows)
-    return memory
-
-
-def steps(case: Row) -> list[Row]:
-    """Time (us) of one more torque reading, by the readings before it; the first start."""
-    found: list[Row] = []
-    for name in ("wheel", "any_wheel"):
-        estimator = estimator_of(name)
-        memories = [memory_of(estimator, count) for count in STEPS]
-        calls = [lambda e=estimator, m=m: e.step(m, **READING) for m in memories]
-        taken = processor_times(calls, QUICK_CALLS if case["quick"] else CALLS // 8)
-        found += [
-            {"file": name, "before": count, "memory": len(memory.system), "us": us}
-            for count, memory, us in zip(STEPS, memories, taken, strict=True)
-        ]
-    command = [sys.executable, "-c", COLD.format(path=str(ROOT / "exported" / "wheel.onnx"))]
-    done = [
-        subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-        for _ in range(5)
-    ]
-    seconds, megabytes = np.min(np.asarray(done, float), axis=0)
-    return [*found, {"file": "", "seconds": seconds, "MB": megabytes}]
-
-
-def steps_table(rows: list[Row]) -> str:
-    """A line for each file and number of readings; the first start."""
-    *timed_rows, cold = rows
-    at_8 = {r["file"]: r["us"] for r in timed_rows if r["before"] == STEPS[0]}
-    lines = [
-        (f"{r['file']}.onnx", r["before"], r["memory"], f"{us:.0f}", f"{us / at_8[r['file']]:.2f}")
-        for r in timed_rows
-        for us in [r["us"]]
-    ]
-    head = ("file", "readings before", "rows of the memory", "us", "over that at 8")
-    return (
-        f"{markdown(head, lines)}\n\nFrom import to the first estimate, load, checksums and "
-        f"self-test included: {cold['seconds']:.3f} s (best of 5); resident memory "
-        f"{cold['MB']:.0f} MB."
-    )
-
-
 LATENCY = Bench(
     "board", "Latency on board", ABOUT, latency_cases, latency, latency_table, timed=True
-)
-STEP = Bench(
-    "board-steps",
-    "One more reading, and the first",
-    "One more reading by `step`, by the readings before it: median processor time, all in turn. "
-    "Goal: at 200 within 20 % of 8.",
-    one_case,
-    steps,
-    steps_table,
-    timed=True,
 )

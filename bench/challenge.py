@@ -1,4 +1,4 @@
-"""A challenge of blind sets: the gap workflow beside regressions, on rows that were kept back.
+"""A challenge of blind sets: the gap workflow beside a process, on rows that were kept back.
 
     python bench/run.py challenge                              methods of the house
     python bench/challenge.py make FOLDER TRUTH.json           sets for others, and their truth
@@ -52,10 +52,9 @@ ABOUT = (
     "Scores over blind sets, mean and 90 % interval by resampling of sets: the logarithm of the "
     "probability of the right cause (higher is better; equal probabilities "
     f"{-np.log(len(CAUSES)):.2f}), and the continuous ranked probability score of readings kept "
-    "back in units of the noise (lower is better). Differences are paired by set. `stepwise` and "
-    "`lasso` linearise soil and effects about a fit of the soil; `gp` is a Gaussian process of "
-    "slip, load and covariates, without physics. All methods divide 5 % of the probability equally "
-    "among all causes, because they may be wrong themselves."
+    "back in units of the noise (lower is better). Differences are paired by set. `gp` is a "
+    "Gaussian process of slip, load and covariates, without physics. Both methods divide 5 % of "
+    "the probability equally among all causes, because they may be wrong themselves."
 )
 
 
@@ -251,7 +250,7 @@ def checked(told: Mapping[str, Any], truth: Row, where: str) -> tuple[Any, Any]:
 
 
 CHALLENGE = Bench(
-    "challenge", "The gap workflow beside regressions", ABOUT, cases, entered, tables, long=True
+    "challenge", "The gap workflow beside a process", ABOUT, cases, entered, tables, long=True
 )
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Methods that enter the challenge: the gap workflow, stepwise regression, the Lasso, a process."""
+"""Methods that enter the challenge: the gap workflow, and a Gaussian process without physics."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from gap_baselines import gaussian_process, lasso_weights, process_features
+from gap_baselines import gaussian_process, process_features
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
@@ -16,18 +16,15 @@ from soilml.config.case import Case, read_case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.covariance import discrepancy_process
-from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import forces, linearise
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.gap import gap
 from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, run_effect_columns
 from soilml.gap.report.results import GapReport
-from soilml.identification import identify
 from soilml.io.csv_file import read_csv
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
-from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import AFTER_CAMPAIGN, FROM_ORDER
 from soilml.quantities import CHANNELS, column
 
@@ -40,12 +37,6 @@ DRAWS = 100
 #: wrong itself; and that methods which do not know of `unknown` leave to it. As large as what the
 #: gap workflow leaves to causes outside its catalogue.
 OTHER_CAUSE = 0.05
-
-
-#: Prior standard deviation of the size of an effect, in reference sizes.
-WIDE = 3.0
-#: Most effects that stepwise regression takes in, and resamples of the rows by the Lasso.
-MOST_EFFECTS, RESAMPLES = 3, 50
 
 
 @dataclass(frozen=True)
@@ -105,14 +96,6 @@ def stated(weights: Mapping[str, float], causes: tuple[str, ...]) -> Floats:
     share = np.asarray([weights.get(cause, 0.0) for cause in causes])
     share = share / share.sum() if share.sum() > 0.0 else equal
     return np.asarray((1.0 - OTHER_CAUSE) * share + OTHER_CAUSE * equal)
-
-
-def with_other_cause(weights: Mapping[str, float]) -> dict[str, float]:
-    """The weights of named causes and `none`, normalised, with `OTHER_CAUSE` for `unknown`."""
-    total = sum(weights.values())
-    if not total > 0.0:
-        return {NONE: 1.0 - OTHER_CAUSE, UNKNOWN: OTHER_CAUSE}
-    return {n: (1.0 - OTHER_CAUSE) * w / total for n, w in weights.items()} | {UNKNOWN: OTHER_CAUSE}
 
 
 def regression_draws(
@@ -197,118 +180,6 @@ def gap_probabilities(report: GapReport) -> dict[str, float]:
     return {n: shrunk * p for n, p in report.probabilities.items()} | rest
 
 
-@dataclass(frozen=True)
-class LinearModel:
-    """A soil-only fit, linearised: readings are `expected` + soil and effects, in noise.
-
-    All are divided by the declared noise: `expected` and `measured` (m,), the columns `soil`
-    (m, p), by prior standard deviations, and `effects` (m, k), by reference sizes.
-    """
-
-    readings: Readings
-    runs: NDArray[np.bool_]
-    names: tuple[str, ...]
-    expected: Floats
-    measured: Floats
-    soil: Floats
-    effects: Floats
-
-    @staticmethod
-    def of(data: SetData) -> LinearModel:
-        """Fit the soil to the runs, and linearise soil and effects there."""
-        fit = identify(data.case, data.runs, method="nonlinear")
-        case = data.case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
-        readings, runs = data.joined(case)
-        soil, expected = _linear_soil(case, readings)
-        effects = {name: EFFECTS[name] for name in data.causes if name in EFFECTS}
-        known, _ = effect_signatures(case, readings, effects)
-        columns = np.column_stack([s.column for s in known])
-        std = readings.std
-        return LinearModel(
-            readings,
-            runs,
-            tuple(s.name for s in known),
-            expected / std,
-            readings.measured / std,
-            soil / std[:, None],
-            columns / std[:, None],
-        )
-
-    @property
-    def residual(self) -> Floats:
-        """What the soil leaves, (m,)."""
-        return self.measured - self.expected
-
-    def in_units(self, data: SetData, draws: Floats) -> Floats:
-        """Draws (d, m_h) over the noise as draws (d, rows, channels) of readings."""
-        return data.by_row((self.expected[~self.runs] + draws) * self.readings.std[~self.runs])
-
-
-def stepwise_entry(data: SetData, seed: int) -> Answer:
-    r"""Stepwise least squares over soil and effects by BIC, with an unknown scale of the noise.
-
-    The probability of a cause is that of the model with it alone, and of `none` that without one,
-    by their BIC, :math:`p \propto e^{-\mathrm{BIC} / 2}`. Rows kept back are predicted by the model
-    that stepwise selection reaches, with the scale that it leaves.
-
-    References: Schwarz, Annals of Statistics 6, 1978; Kass and Raftery, JASA 90, 1995, section 4.1.
-    """
-    linear = LinearModel.of(data)
-    r, soil, effects = (x[linear.runs] for x in (linear.residual, linear.soil, linear.effects))
-    chosen: list[int] = []
-    best, single = _bic(r, soil), {}
-    while len(chosen) < MOST_EFFECTS:
-        costs = [
-            _bic(r, np.column_stack([soil, effects[:, [*chosen, i]]]))
-            for i in range(len(linear.names))
-        ]
-        if not chosen:
-            single = dict(zip((NONE, *linear.names), (best, *costs), strict=True))
-        if min(costs) >= best:
-            break
-        best = min(costs)
-        chosen.append(int(np.argmin(costs)))
-    least = min(single.values())
-    weights = {name: float(np.exp(-0.5 * (bic - least))) for name, bic in single.items()}
-    columns = np.column_stack([linear.soil, WIDE * linear.effects[:, chosen]])
-    scale = np.full(len(linear.runs), _scale(r, columns[linear.runs]))
-    rng = np.random.default_rng(seed)
-    draws = regression_draws(columns, linear.residual, scale, linear.runs, DRAWS, rng)
-    return Answer(with_other_cause(weights), linear.in_units(data, draws))
-
-
-def lasso_entry(data: SetData, seed: int) -> Answer:
-    """The Lasso on signatures of effects, beside the soil, on resamples of the readings.
-
-    The probability of a cause is the share of the resamples in which it explains most, and of
-    `none` that in which no effect is taken in. Each resample predicts the rows kept back.
-
-    References: Tibshirani, J. R. Statist. Soc. B 58, 1996; Bach, Bolasso, ICML 2008.
-    """
-    linear = LinearModel.of(data)
-    rng = np.random.default_rng(seed)
-    every = [x[linear.runs] for x in (linear.residual, linear.soil, linear.effects)]
-    prior = np.eye(linear.soil.shape[1])  # further rows: the soil is where its prior is
-    counts: dict[str, float] = {}
-    draws = []
-    for _ in range(RESAMPLES):
-        drawn = rng.integers(len(every[0]), size=len(every[0]))
-        more = (np.zeros(len(prior)), prior, np.zeros((len(prior), len(linear.names))))
-        r, soil, effects = (np.concatenate([x[drawn], o]) for x, o in zip(every, more, strict=True))
-        basis = np.linalg.qr(soil)[0]
-        left = [x - basis @ (basis.T @ x) for x in (effects, r)]
-        weights = lasso_weights(*left)
-        share = np.abs(weights) * np.linalg.norm(left[0], axis=0)
-        name = linear.names[int(np.argmax(share))] if share.max() > 0.0 else NONE
-        counts[name] = counts.get(name, 0.0) + 1.0
-        of_soil = np.linalg.lstsq(soil, r - effects @ weights, rcond=None)[0]
-        scale = max(1.0, float(np.std(r - effects @ weights - soil @ of_soil)))
-        mean = linear.soil[~linear.runs] @ of_soil + linear.effects[~linear.runs] @ weights
-        each = DRAWS // RESAMPLES
-        draws.append(mean + scale * rng.standard_normal((each, len(mean))))
-    return Answer(with_other_cause(counts), linear.in_units(data, np.concatenate(draws)))
-
-
 def _linear_soil(case: Case, readings: Readings) -> tuple[Floats, Floats]:
     """Columns (m, p) of the free parameters by prior standard deviations, and predictions (m,)."""
     free = select_free(case, None)
@@ -316,18 +187,6 @@ def _linear_soil(case: Case, readings: Readings) -> tuple[Floats, Floats]:
     found = linearise(case, free, np.clip(at, 0.0, 1.0), readings)
     std = np.asarray([c.fraction_precision for c in free]) ** -0.5
     return found.jacobian * std, found.prediction
-
-
-def _left(r: Floats, columns: Floats) -> float:
-    return float(np.sum((r - columns @ np.linalg.lstsq(columns, r, rcond=None)[0]) ** 2))
-
-
-def _bic(r: Floats, columns: Floats) -> float:
-    return float(len(r) * np.log(_left(r, columns) / len(r)) + columns.shape[1] * np.log(len(r)))
-
-
-def _scale(r: Floats, columns: Floats) -> float:
-    return float(np.sqrt(_left(r, columns) / max(len(r) - columns.shape[1], 1)))
 
 
 def process_entry(data: SetData, seed: int) -> Answer:
@@ -352,7 +211,5 @@ def process_entry(data: SetData, seed: int) -> Answer:
 #: What each method answers for a set, with a seed.
 METHODS: dict[str, Callable[[SetData, int], Answer]] = {
     "gap": gap_entry,
-    "stepwise": stepwise_entry,
-    "lasso": lasso_entry,
     "gp": process_entry,
 }

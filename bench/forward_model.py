@@ -15,7 +15,7 @@ import board
 import numpy as np
 from conftest import input_box, solved
 from reference import equilibrium
-from runner import Bench, Row, Sample, markdown, member, one_case, table
+from runner import ROOT, Bench, Row, Sample, markdown, member, one_case, table
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
@@ -41,6 +41,14 @@ from soilml.systems.tracked_robot.robot import WANG2018
 #: Operating points of a call, of the input box, and of the scalar loop; runs of each.
 ROWS, BOX_ROWS, BASELINE_ROWS, REPEATS = 200_000, 16_384, 40, 3
 ACCURACY_ROWS, QUICK_ROWS = 1024, 96
+COLD = """
+import time; t = time.perf_counter()
+from soilml.onboard.estimator import Estimator
+e = Estimator.load({path!r}); e(slip=0.3, torque=3.0, load=60.0)
+t = time.perf_counter() - t
+status = dict(line.split(":", 1) for line in open("/proc/self/status"))
+print(t, int(status["VmRSS"].split()[0]) / 1024)
+"""
 READINGS = 64  # Rows that commands analyse
 ABOUT_ACCURACY = (
     "Relative error against adaptive quadrature and bracketing (`tests/reference.py`). Goal: 1e-6. "
@@ -183,6 +191,17 @@ def _start(*arguments: str) -> str:
     return f"{seconds:.2f} s"
 
 
+def _first_estimate() -> str:
+    """From import to the first estimate, load, checksums and self-test included."""
+    command = [sys.executable, "-c", COLD.format(path=str(ROOT / "exported" / "wheel.onnx"))]
+    done = [
+        subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+        for _ in range(5)
+    ]
+    seconds, megabytes = np.min(np.asarray(done, float), axis=0)
+    return f"{seconds:.3f} s, {megabytes:.0f} MB resident"
+
+
 @cache
 def measured_rows() -> tuple[Case, Table]:
     """The case of the recipe `wheel`, and readings of torque and sinkage on one soil."""
@@ -218,6 +237,7 @@ CALLS: dict[str, tuple[str, Callable[[], str]]] = {
     "`identify` 64 rows, nonlinear least squares": ("50 ms", lambda: _identified("nonlinear")),
     "`identify` 64 rows, posterior": ("1000 ms", lambda: _identified("posterior")),
     "`gap` 64 rows of 2 channels, nothing hidden": ("1 s", _gap),
+    "from import to the first estimate": ("0.2 s", _first_estimate),
     "one reading on board, onnxruntime, `wheel.onnx`": ("60 us", board.one_reading),
     "set of 16 on board, onnxruntime, `wheel.onnx`": ("150 us", lambda: board.set_of_16("wheel")),
     "set of 16 on board, onnxruntime, `any_wheel.onnx`": (

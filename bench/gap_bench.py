@@ -146,7 +146,7 @@ def judged(asked: Row) -> Row:
     report = analysis.result
     record |= {"seconds": analysis.seconds, "solves": analysis.solves} | _said(report)
     if report.soil_before:
-        record |= _compared(asked["number"], case, report, table, drawn, truth)
+        record |= _compared(asked["number"], case, report, table, drawn)
     return record
 
 
@@ -178,9 +178,7 @@ def _said(report: GapReport) -> Row:
     }
 
 
-def _compared(
-    number: int, case: Case, report: GapReport, table: Table, drawn: BlindSet, truth: Sequence[str]
-) -> Row:
+def _compared(number: int, case: Case, report: GapReport, table: Table, drawn: BlindSet) -> Row:
     """Soil and held-out rows beside the truth, and the other methods on some sets."""
     soil = drawn.truth["soil"]
     measured = tuple(n for n in CHANNELS if np.isfinite(table[column(n)]).any())
@@ -201,9 +199,6 @@ def _compared(
     plain_design = len(measured) == len(CHANNELS) and "gear" not in table
     if number % OTHERS_EVERY == 0 and plain_design:
         compared["naming"] = gap_baselines.names(soil_only, table, case)
-        if truth and set(truth) <= set(EFFECTS):
-            own = {name: EFFECTS[name] for name in truth}
-            models["oracle"] = gap(case, table, effects=own, seed=0).model
     parts = {"region": drawn.region, "between": drawn.between}
     rows = [
         Table(dict(columns) | {ORDER: np.asarray(drawn.truth[f"{part}_elapsed"])})

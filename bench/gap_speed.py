@@ -21,9 +21,16 @@ SEED = 1  # Of the plans: sets to tune on
 SETS, QUICK_SETS = 24, 2  # Of each size
 #: Sets of each size in which calls of Python functions are counted, which takes three times as long
 COUNTED = 3
-#: Rows in all, design, and gates of median and longest in scaled seconds of a gap analysis.
-SIZES = ((64, "sweep", 1.0, 4.0), (200, "sweep", 3.0, None), (5, "few-rows", 1.0, None))
+#: Rows in all, and design; those that `identify` is timed on; gates of median and longest in
+#: scaled seconds.
+SIZES = {64: "sweep", 200: "sweep", 5: "few-rows"}
 IDENTIFIED = (64, 5)
+GATES = {
+    ("gap", 64): (1.0, 4.0),
+    ("gap", 200): (3.0, None),
+    ("gap", 5): (1.0, None),
+    ("identify", 64): (2.0, None),
+}
 ABOUT = (
     "Seconds of one core, raw and for a core that makes "
     f"{SOLVES:,} forward solutions of the wheel in a second. The sets are those of the blind "
@@ -35,11 +42,10 @@ ABOUT = (
 def cases(sample: Sample) -> list[Row]:
     """Analyses of the sets of each size, numbered."""
     count = QUICK_SETS if sample.quick else SETS
-    sizes = [("gap", size[:2]) for size in SIZES]
-    sizes += [("identify", size[:2]) for size in SIZES if size[0] in IDENTIFIED]
+    calls = [("gap", size) for size in SIZES] + [("identify", size) for size in IDENTIFIED]
     return [
-        {"of": of, "size": size, "design": design, "sets": count, "call": f"{of}, {size} rows"}
-        for of, (size, design) in sizes
+        {"of": of, "size": n, "design": SIZES[n], "sets": count, "call": f"{of}, {n} rows"}
+        for of, n in calls
     ]
 
 
@@ -86,16 +92,18 @@ def tables(rows: list[Row]) -> str:
 
         return cell
 
-    def gate(own: list[Row]) -> tuple[float, float | None]:
-        found = {size[0]: size[2:] for size in SIZES if own[0]["of"] == "gap"}
-        return found.get(own[0]["size"], (2.0, None))
+    def gate(own: list[Row]) -> tuple[float | None, float | None]:
+        return GATES.get((own[0]["of"], own[0]["size"]), (None, None))
 
     def gate_text(own: list[Row]) -> str:
         median, longest = gate(own)
-        return f"<= {median:g}" + (f", longest <= {longest:g}" if longest else "")
+        text = f"<= {median:g}" if median else ""
+        return text + (f", longest <= {longest:g}" if longest else "")
 
     def met(own: list[Row]) -> str:
         (median, longest), scaled = gate(own), [row["scaled"] for row in own]
+        if median is None:
+            return ""
         fine = float(np.median(scaled)) <= median and (longest is None or max(scaled) <= longest)
         return "yes" if fine else "**no**"
 

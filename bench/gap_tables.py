@@ -79,10 +79,9 @@ PARTS = {
 def tables(every: Sequence[Judged]) -> str:
     """All sections."""
     sets = gf.sampled(every)
-    usual = [s for s in sets if not gf.own_figures(s)]
     parts = [_head(every, sets), _gates(every), _statuses(sets), _held_out(sets), _families(sets)]
-    parts += [_reliability(sets), _naming(sets), _snr(sets), _causes(sets), _region(usual)]
-    return "\n\n".join(part for part in (*parts, _soil(usual), _designs(sets)) if part)
+    parts += [_reliability(sets), _naming(sets), _snr(sets), _causes(sets)]
+    return "\n\n".join(part for part in (*parts, _designs(sets)) if part)
 
 
 def _head(every: Sequence[Judged], sets: Sequence[Judged]) -> str:
@@ -274,38 +273,6 @@ def _causes(sets: Sequence[Judged]) -> str:
         "## Weakest cells of the confusion matrix\n\nTruth outside the cause set, separating SNR "
         f"of 3 or more.\n\n{markdown(('truth', 'said instead', 'sets'), rows, 3)}\n\n"
         f"## By cause\n\n{table(own, {'truth': 'hidden'}, columns)}"
-    )
-
-
-def _region(sets: Sequence[Judged]) -> str:
-    own = [s for s in sets if s["status"] in ("named", "partly-named")]
-    levels = sorted({s["discrepancy"] for s in own})
-    rows = []
-    for label in ("named", "oracle", "Gaussian process", "quadratic"):
-        at = [gf.median_ratio([s for s in own if s["discrepancy"] == d], label) for d in levels]
-        rows.append((label, *[f"{ratio:.3f}" for ratio in at]))
-    return (
-        "## Held-out region: 1.3 to 1.6 times the heaviest load\n\nRMS distance to the noise-free "
-        "readings relative to the soil alone, by discrepancy: median over sets that are named or "
-        "partly named. In these sets the soil alone is more than twice the noise away.\n\n"
-        + markdown(("explanation", *[f"{d:.0%}" for d in levels]), rows)
-    )
-
-
-def _soil(sets: Sequence[Judged]) -> str:
-    own = [s for s in sets if s["status"] in ("named", "partly-named") and "soil" in s]
-    rows = []
-    for name, unit, scale in (
-        ("cohesion", "Pa", 1.0),
-        ("friction_angle", "deg", float(np.degrees(1.0))),
-        ("shear_modulus", "mm", 1000.0),
-    ):
-        values = [s["soil"][name] for s in own if name in s["soil"]]
-        if values:
-            off = [[abs(v[k] - v["true"]) * scale for v in values] for k in ("before", "after")]
-            rows.append((name.replace("_", " "), *(f"{np.median(x):.3g} {unit}" for x in off)))
-    return "## Error of the soil, before and after the effect is named (median)\n\n" + markdown(
-        ("parameter", "before", "after"), rows
     )
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from runner import ROOT, Bench, Row, Sample, each, markdown, percent, table
+from runner import ROOT, Bench, Row, Sample, each, percent, table
 from scipy.stats import binom
 from wrong_worlds import LAW_WORLDS, NOISE_OF_LOAD, NOISE_OF_SLIP, WORLDS, simulate, unlisted_worlds
 
@@ -44,8 +44,8 @@ PARTS = {
     "Mechanisms of the blind sets that no error describes": unlisted_worlds(),
 }
 KNOWN = {world.name: world for worlds in PARTS.values() for world in worlds}
-#: Nominal coverage, coverage that is asked for in every world, and factor on widths that is told.
-COVERAGE, TO_COVER, NOTABLE = 0.9, 0.8, 2.0
+#: Nominal coverage.
+COVERAGE = 0.9
 #: Width of the central 90 % of a uniform prior, in its standard deviations.
 PRIOR_WIDTH = 0.9 * np.sqrt(12.0)
 ABOUT = (
@@ -198,8 +198,7 @@ def identify_cases(sample: Sample) -> list[Row]:
 def identified(case: Row) -> list[Row]:
     """Each set: the averaged answer, and that of the exact model.
 
-    `flagged` says whether a warning tells of excess residuals. `needed` is the factor by which an
-    interval would have to be wider to reach the truth.
+    `flagged` says whether a warning tells of excess residuals.
     """
     model, found = read_recipe("wheel").case, []
     std = np.asarray([model.prior[name].std for name in SHEAR])
@@ -218,7 +217,6 @@ def identified(case: Row) -> list[Row]:
                     | own
                     | {"score": own["score"].mean(), "relative": own["width"].mean() / PRIOR_WIDTH}
                     | {"flagged": any(r.code == "excess-residuals" for r in answer.warnings)}
-                    | {"needed": np.abs(truth - 0.5 * (low + high)) / (0.5 * (high - low))}
                 )
     return found
 
@@ -238,7 +236,7 @@ def identify_tables(rows: list[Row]) -> str:
         f"By chance alone, 95 of 100 cells of {count} sets lie between {low:.0f} and {high:.0f} "
         f"where the coverage is {100 * COVERAGE:.0f}."
     )
-    return "\n\n".join([chance, table(every, by, columns), *notes(rows), hidden(rows)])
+    return "\n\n".join([chance, table(every, by, columns), *notes(rows)])
 
 
 def notes(rows: list[Row]) -> list[str]:
@@ -263,28 +261,6 @@ def notes(rows: list[Row]) -> list[str]:
             f"{held} where nothing is flagged."
         )
     return texts
-
-
-def hidden(rows: list[Row]) -> str:
-    """Worlds that the readings hardly tell from a sound one, and the width that they demand."""
-    lines = []
-    for world in dict.fromkeys(r["world"] for r in rows):
-        cells: list[str] = []
-        for name in CHANNELS:
-            own = [r for r in rows if r["world"] == world and r["channels"] == name]
-            exact = [r for r in own if r["answer"] == "exact_model"]
-            shown = np.mean([r["flagged"] for r in exact]) > 0.5
-            factor = np.quantile([r["needed"] for r in exact], TO_COVER, axis=0)
-            cells += ["" if shown or f <= NOTABLE else f"{f:.1f}" for f in factor]
-        if any(cells):
-            lines.append((world, *cells))
-    head = [f"{c}: {symbol}" for c in CHANNELS for symbol in ("c", "phi", "K")]
-    return (
-        "Worlds in which the residuals of exact_model exceed the noise in at most half of the "
-        f"sets. To cover {100 * TO_COVER:.0f} % there, its intervals would have to be wider by "
-        f"these factors, on sound sets too.\n\n{markdown(('world', *head), lines)}\n\nFactors up "
-        f"to {NOTABLE:.0f}, and worlds that residuals show, are blank."
-    )
 
 
 MODEL_ERRORS = Bench(

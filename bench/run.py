@@ -26,7 +26,6 @@ MODULES = (
     "wheel_leg_slip",
     "adapt",
     "gap_bench",
-    "gap_hybrid",
     "gap_speed",
     "challenge",
 )

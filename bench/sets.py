@@ -1,13 +1,12 @@
 """Set posteriors of the released files beside the exact posteriors of the same simulated sets.
 
-The simulated noise is a share of the true value, or constant. A file is fed standard deviations
+The simulated noise is a share of the true value. A file is fed standard deviations
 that are computed from the readings, as a rover's are.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from functools import cache
 from typing import Any
 
@@ -15,12 +14,10 @@ import numpy as np
 from exact_sets import posterior_of_memory
 from reference_sets import (
     ANY_WHEEL,
-    CONSTANT,
     COUNT,
     ONE_WHEEL,
     ReferenceSet,
     as_any_wheel_sets,
-    constant_noise_sets,
     generate_reference_sets,
     packaged_posteriors,
     with_noise_of_reading,
@@ -56,41 +53,25 @@ ABOUT = (
     "sets. `any_wheel` is measured on the reference wheel, as `wheel` is, and over its whole range "
     "of wheels, loads, soils, bearing parameters, noise and bias. The noise is a share of the true "
     "value. A file is fed standard deviations that are this share of the reading, as a rover "
-    "computes them. In sets of *constant noise*, of 32 rows, the torque noise is 1 to 8 % of the "
-    "median torque, and equal in all rows of a set. It is declared by `on(noise=...)`. In lines "
-    "labelled *fed by row*, the file is fed this standard deviation with each row instead. It "
-    "takes it as a share of the reading, and reads torque too high. A standard deviation at the "
-    "true value, which no rover knows, acts in the same way. Goals of the files for a "
-    "microcontroller are those of the full files."
+    "computes them. Goals of the files for a microcontroller are those of the full files."
 )
 
 
-def _declared(sets: Sequence[ReferenceSet]) -> list[ReferenceSet]:
-    return [replace(one, declares_noise=True) for one in sets]
-
-
-def _as_they_are(sets: Sequence[ReferenceSet]) -> list[ReferenceSet]:
-    return list(sets)
-
-
-#: File, its reference sets, and how it is fed.
-FED: dict[str, tuple[str, str, Callable[[Sequence[ReferenceSet]], list[ReferenceSet]]]] = {
-    f"wheel, {ONE_WHEEL}": ("wheel", ONE_WHEEL, _as_they_are),
-    f"any_wheel, {ONE_WHEEL}": ("any_wheel", ONE_WHEEL, as_any_wheel_sets),
-    f"any_wheel, {ANY_WHEEL}": ("any_wheel", ANY_WHEEL, _as_they_are),
-    f"wheel_small, {ONE_WHEEL}": ("wheel_small", ONE_WHEEL, _as_they_are),
-    f"any_wheel_small, {ANY_WHEEL}": ("any_wheel_small", ANY_WHEEL, _as_they_are),
+#: File and its reference sets; those of the reference wheel are given to any wheel's file too.
+FED = {
+    f"wheel, {ONE_WHEEL}": ("wheel", ONE_WHEEL),
+    f"any_wheel, {ONE_WHEEL}": ("any_wheel", ONE_WHEEL),
+    f"any_wheel, {ANY_WHEEL}": ("any_wheel", ANY_WHEEL),
+    f"wheel_small, {ONE_WHEEL}": ("wheel_small", ONE_WHEEL),
+    f"any_wheel_small, {ANY_WHEEL}": ("any_wheel_small", ANY_WHEEL),
 }
-for _file, _label in (("wheel", ONE_WHEEL + CONSTANT), ("any_wheel", ANY_WHEEL + CONSTANT)):
-    FED[f"{_file}, {_label}"] = (_file, _label, _declared)
-    FED[f"{_file}, {_label} fed by row"] = (_file, _label, _as_they_are)
 
 
 @cache
 def references(count: int) -> dict[tuple[str, int], list[ReferenceSet]]:
     """Reference sets, the first so many of each design, by label and number of rows."""
     found: dict[tuple[str, int], list[ReferenceSet]] = {}
-    for one in (*generate_reference_sets(count), *constant_noise_sets(count)):
+    for one in generate_reference_sets(count):
         found.setdefault((one.label, one.rows), []).append(one)
     return found
 
@@ -100,7 +81,7 @@ def cases(sample: Sample) -> list[Row]:
     count = QUICK_SETS if sample.quick else COUNT
     return [
         {"name": name, "rows": rows, "count": count}
-        for name, (_, label, _) in FED.items()
+        for name, (_, label) in FED.items()
         for own, rows in references(count)
         if own == label
     ]
@@ -110,18 +91,20 @@ def measured(case: Row) -> list[Row]:
     """Each set: errors, coverage and ranks of a file and of the exact posterior.
 
     The *file posterior* is the one that the file's likelihood defines, sampled with many draws; the
-    file itself reports mean, covariance and 90 % interval. The sensors of reference sets have no
+    file itself reports mean, covariance and 90 % interval, which alone are compared for the files
+    of a microcontroller. The sensors of reference sets have no
     common errors but the bias of torque.
     """
-    file, label, fed = FED[case["name"]]
+    file, label = FED[case["name"]]
     plain = references(case["count"])[label, case["rows"]]
     limit = load_limit(packaged_posteriors(), plain, HINT)
     estimator = Estimator.load(ROOT / "exported" / f"{file}.onnx")
-    found = []
-    for i, reference in enumerate(fed(with_noise_of_reading(plain))):
+    found, given = [], with_noise_of_reading(plain)
+    if (file, label) == ("any_wheel", ONE_WHEEL):
+        given = as_any_wheel_sets(given)
+    for i, reference in enumerate(given):
         estimate, system = run_file(estimator, reference)
         sets = reference.sets
-        posterior = posterior_of_memory(reference.family, system, sets, 0)
         truth, (lower, upper, std) = sets.truth[0], prior_of(reference)
         exact, ends = limit.quantiles[i], np.stack([estimate.low, estimate.high])
         moments = (
@@ -135,16 +118,21 @@ def measured(case: Row) -> list[Row]:
                 "third": np.minimum(3.0 * (truth - lower) / (upper - lower), 2.0).astype(int),
                 "error": [(mean - truth) / std for mean, _ in moments],
                 "held90": [(low <= truth) & (truth <= high) for low, high in (ends, exact[[0, 3]])],
-                "held50": [(q[1] <= truth) & (truth <= q[2]) for q in (posterior.quantiles, exact)],
                 "joint90": [in_ellipsoid(*own, truth, std) for own in moments],
-                "log_density": [posterior.log_density, limit.log_densities[i]],
-                "ranks": posterior.rank,
                 "interval": binned_rank(truth, ends, EDGES["interval"]),
                 "exact": binned_rank(truth, exact, EDGES["exact"]),
                 "noise": np.median(noise / np.abs(torque)),
                 "conditions": conditions(reference),
             }
         )
+        if not file.endswith("small"):  # those have other monomials than the family
+            posterior = posterior_of_memory(reference.family, system, sets, 0)
+            both = posterior.quantiles, exact
+            found[-1] |= {
+                "held50": [(q[1] <= truth) & (truth <= q[2]) for q in both],
+                "log_density": [posterior.log_density, limit.log_densities[i]],
+                "ranks": posterior.rank,
+            }
     return found
 
 
@@ -154,13 +142,8 @@ def run_file(estimator: Estimator, reference: ReferenceSet) -> tuple[Any, Floats
     rows = sets.rows(0)
     for name in ("sinkage", "drawbar_pull"):
         rows[name] = np.where(rows[f"{name}_std"] < ABSENT_STD, rows[name], np.nan)
-    noise = {}
-    if reference.declares_noise:
-        del rows["torque_std"]
-        constant, share = sets.origin.noise["torque"]
-        noise = {"torque": (constant[0, 0], share[0, 0])}
     exact = dict.fromkeys(COMMON_ERROR_INPUTS, 0.0)
-    configured = estimator.on(noise, **sets.context_of(0), **exact)
+    configured = estimator.on(None, **sets.context_of(0), **exact)
     estimate, memory = configured.step(configured.start(), **rows)
     return estimate, memory.system.astype(np.float64)
 
@@ -238,9 +221,10 @@ def result(met: bool, near: bool = False) -> str:
     return "met" if met else f"missed, within {STANDARD_ERRORS:g} s.e." if near else "MISSED"
 
 
-def by_name(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """Rows of each file on its sets."""
-    return {name: own for name in FED if (own := [r for r in rows if r["name"] == name])}
+def by_name(rows: Sequence[Row], member: str = "error") -> dict[str, list[Row]]:
+    """Rows of each file on its sets that have a member."""
+    found = {name: [r for r in rows if r["name"] == name and member in r] for name in FED}
+    return {name: own for name, own in found.items() if own}
 
 
 def by_size(rows: Sequence[Row]) -> dict[int, list[Row]]:
@@ -285,7 +269,7 @@ def rmse_table(rows: list[Row]) -> str:
 def log_density_table(rows: list[Row]) -> str:
     """Log posterior density at the truth"""
     lines = []
-    for name, whole in by_name(rows).items():
+    for name, whole in by_name(rows, "log_density").items():
         for own, label in subsets(whole):
             density = stacked(own, "log_density")
             gap = (density[:, 1] - density[:, 0])[stacked(own, "answered")]
@@ -315,7 +299,7 @@ def coverage_table(rows: list[Row]) -> str:
             joint = stacked([r for r in own if r["answered"]], "joint90").mean(axis=0)
             goal = result(bool(inside), bool(near))
             lines.append((name, label, len(own), *_pairs(both), *_pairs(joint[:, None]), goal))
-        further = {"all, 50 %": coverage(whole, "held50")}
+        further = {"all, 50 %": coverage(whole, "held50")} if "held50" in whole[0] else {}
         for k, third in enumerate(("lower", "middle", "upper")):
             further[f"truth in {third} third"] = coverage(whole, "held90", k)
         lines += [(name, label, len(whole), *_pairs(b), "", "") for label, b in further.items()]
@@ -338,7 +322,7 @@ def _pairs(both: Floats) -> list[str]:
 def calibration_table(rows: list[Row]) -> str:
     """Simulation-based calibration"""
     lines = []
-    for name, whole in by_name(rows).items():
+    for name, whole in by_name(rows, "ranks").items():
         answered = [r for r in whole if r["answered"]]
         for test, edges in EDGES.items():
             p_values = uniformity_p_values(stacked(answered, test), edges)

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from board import estimator_of
-from runner import Bench, Row, Sample, markdown, one_case
+from runner import Bench, Row, Sample, each, one_case, table
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
@@ -48,28 +48,6 @@ def comparison_table(rows: list[Row]) -> str:
     return f"{legend}\n\n```\n{rows[0]['text']}\n```"
 
 
-class Stopwatch:
-    """Wall and processor time of each stage, those of worker processes included."""
-
-    def __init__(self, stage: str) -> None:
-        self.stage, self.seconds = stage, {stage: (0.0, 0.0)}
-        self.since = _now()
-
-    def __call__(self, stage: str, done: int, total: int) -> None:
-        """Count the time since the last call for the stage before, and go on with this one."""
-        now, (wall, processor) = _now(), self.seconds[self.stage]
-        spent = wall + now[0] - self.since[0], processor + now[1] - self.since[1]
-        self.seconds[self.stage] = spent
-        self.since, self.stage = now, stage.partition(" (")[0]
-        self.seconds.setdefault(self.stage, (0.0, 0.0))
-
-
-def _now() -> tuple[float, float]:
-    times = os.times()
-    own, children = times.user + times.system, times.children_user + times.children_system
-    return time.perf_counter(), own + children
-
-
 def time_cases(sample: Sample) -> list[Row]:
     """`fused` for each number of rows, and `any_wheel`."""
     rows = (QUICK_ROWS,) if sample.quick else ROWS
@@ -77,35 +55,25 @@ def time_cases(sample: Sample) -> list[Row]:
 
 
 def training_time(case: Row) -> Row:
-    """Wall and processor time of each stage."""
-    watch = Stopwatch("reading the data")
-    if not case["rows"]:
-        train_any_wheel(read_any_wheel_spec("any_wheel"), watch)
-        name = "any_wheel"
-    else:
-        spec, name = read_spec("fused"), f"fused, {case['rows']:,} rows"
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "data.parquet"
+    """Wall and processor time of a training, those of worker processes included."""
+    name = f"fused, {case['rows']:,} rows" if case["rows"] else "any_wheel"
+    with tempfile.TemporaryDirectory() as folder:
+        if case["rows"]:
+            spec, file = read_spec("fused"), Path(folder) / "data.parquet"
             generate(read_recipe("wheel").sized(case["rows"]), file)
-            watch = Stopwatch("reading the data")
-            data = read_dataset(file, spec.features, spec.targets)
-            train(spec, data, watch)
-    watch("all", 0, 0)
-    stages = {stage: own for stage, own in watch.seconds.items() if stage != "all" and any(own)}
-    return {"name": name, "stages": stages}
+        begun, began = time.perf_counter(), os.times()
+        if case["rows"]:
+            train(spec, read_dataset(file, spec.features, spec.targets))
+        else:
+            train_any_wheel(read_any_wheel_spec("any_wheel"))
+        spent, ended = time.perf_counter() - begun, os.times()
+    return {"name": name, "wall": spent, "processor": sum(ended[:4]) - sum(began[:4])}
 
 
 def time_table(rows: list[Row]) -> str:
-    """Stages in rows, trainings in columns."""
-
-    def cell(seconds: list[float] | None) -> str:
-        return "" if seconds is None else f"{seconds[0]:.1f} ({seconds[1]:.1f})"
-
-    stages = dict.fromkeys(stage for row in rows for stage in row["stages"])
-    lines = [(stage, *(cell(row["stages"].get(stage)) for row in rows)) for stage in stages]
-    totals = [[sum(part) for part in zip(*row["stages"].values(), strict=True)] for row in rows]
-    lines.append(("all", *map(cell, totals)))
-    return markdown(("wall time (processor time), s", *(row["name"] for row in rows)), lines)
+    """A line for each training."""
+    columns = {"wall time, s": each("wall", ".1f"), "processor time, s": each("processor", ".1f")}
+    return table(rows, {"training": "name"}, columns)
 
 
 COMPARISON = Bench(

@@ -106,12 +106,12 @@ def sets_table() -> str:
     covered = {x["file, sets"]: x for x in lines_of("sets", "joint") if x["subset"] == "all"}
     rows = []
     for name in dict.fromkeys(line["file, sets"] for line in ratios):
-        if name not in gaps or name not in covered:
+        if name not in covered:
             continue
         own = [float(x[s]) for x in ratios if x["file, sets"] == name for s in ("c", "phi", "K")]
         held = ", ".join(covered[name][s].split(" / ")[0] for s in ("c", "phi", "K"))
         ends = f"{min(own):.3f} to {max(own):.3f}"
-        rows.append((name, ends, gaps[name]["gap, nat"], held))
+        rows.append((name, ends, gaps.get(name, {}).get("gap, nat", ""), held))
     head = ("file, sets of 1 to 32 rows", "RMSE over exact", "log density below, nat", "coverage")
     return f"Sets beside the Bayes limit\n\n{format_table(head, rows)}"
 

@@ -18,7 +18,6 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import gap_bench
 import gap_figures
-import gap_hybrid
 import gap_reliability
 import gap_tables
 from gap_separation import separation
@@ -344,15 +343,6 @@ def test_few_rows_and_torque_alone_have_figures_of_their_own():
     assert figure([*sets, more], name).measured.endswith("1/3")
     torque = [held(design="torque-alone", status="no-gap"), held(design="torque-alone")]
     assert figure(torque, "torque alone, signature").measured.endswith("1/2")
-
-
-def test_how_often_a_model_is_no_worse_than_the_better_of_two_is_said():
-    usual = {"soil": 4.0, "effect": 2.0, "hybrid": 2.0, "process": 8.0, "soil + process": 3.0}
-    other = (usual, usual | {"hybrid": 2.4}, usual | {"hybrid": 9.0, "process": 2.0})
-    sets = [{"discrepancy": 0.02, "kept": usual, "heavier": own} for own in other]
-    said = gap_hybrid.tables(sets)
-    words = "The hybrid is no worse in 33%, at most 5% worse in 33%, at most 25% worse in 67%."
-    assert said.endswith(words) and "The better one is 0.25 times" in said
 
 
 def test_a_quick_look_is_at_a_seed_to_tune_on():
