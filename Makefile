@@ -78,8 +78,6 @@ bench: $(VENV)/.ready ## measure speed and accuracy, and write bench/results; go
 	@$(BIN)/python bench/run.py
 
 bench-gap: $(VENV)/.ready ## 739 sets with hidden effects against gates and baselines; goes on where it was ended
-	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[bench]'
 	@$(BIN)/python bench/run.py gap gap-speed
 
 bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of a seed to tune on: nothing is written

@@ -292,8 +292,6 @@ def _probabilities(sets: Sequence[Judged]) -> Iterator[Figure]:
         worst, (usual, seldom) = gap_reliability.largest(bins), gap_reliability.chance(bins)
         text = f"{worst:.3f}; by chance alone {usual:.3f} (95 %: {seldom:.3f})"
         yield number(f"{start}, largest deviation, {name}", worst, text, gate)
-    mixed = gap_reliability.largest(gap_reliability.at_expected_mix(sets))
-    yield number(f"{start}, the same at the mix that the prior expects", mixed, f"{mixed:.3f}")
     as_much = gap_reliability.chance_of_as_much(stated, true)
     name = f"{start}, share of exact ones that deviate as much in all wide bins"
     yield number(name, as_much, f"{as_much:.3f}", ">= 0.05")

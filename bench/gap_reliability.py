@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from soilml.gap.evidence.prior_odds import EXPECTED_CAUSES
-
 Judged = dict[str, Any]
 
 #: Statements in a bin.
@@ -157,31 +155,6 @@ def calibration_error(
     low, high = np.quantile(again, (0.025, 0.975))
     usual, seldom = np.quantile(exact, (0.5, 0.95))
     return error(stated, true), (float(low), float(high)), (float(usual), float(seldom))
-
-
-def at_expected_mix(sets: Sequence[Judged]) -> list[Bin]:
-    """The wide bins, where as many sets lack a cause of the catalogue as the analyst expects.
-
-    The prior expects `EXPECTED_CAUSES` causes, so that a share of exp(-1) of all sets has none. The
-    benchmark has fewer of these; they are weighted. Empty without bins or without such sets.
-    """
-    stated, _ = statements(sets)
-    cuts = _wide_cuts(stated)
-    without = [not s["catalogued"] for s in sets]
-    share = float(np.mean(without)) if sets else 0.0
-    if cuts is None or not 0.0 < share < 1.0:
-        return []
-    expected = float(np.exp(-EXPECTED_CAUSES))
-    weight = expected / (1.0 - expected) * (1.0 - share) / share
-    parts = [(*_pairs([s]), weight if bare else 1.0) for s, bare in zip(sets, without, strict=True)]
-    p = np.concatenate([own for own, _, _ in parts])
-    true = np.concatenate([own for _, own, _ in parts])
-    weights = np.concatenate([np.full(len(own), w) for own, _, w in parts])
-    at = np.searchsorted(stated[cuts], p, side="right")
-    total = np.bincount(at, weights)
-    means = [np.bincount(at, weights * values) / total for values in (p, true)]
-    count = np.bincount(at)
-    return [Bin(float(m), float(f), int(n)) for m, f, n in zip(*means, count, strict=True)]
 
 
 def _bin(stated: np.ndarray, true: np.ndarray) -> Bin:

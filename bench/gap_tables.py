@@ -201,25 +201,20 @@ def _reliability(sets: Sequence[Judged]) -> str:
     bins = gap_reliability.wide_bins(stated, true)
     if not bins:
         return ""
-    mixed = gap_reliability.at_expected_mix(sets) or [None] * len(bins)
     rows = [
         (
             f"{b.stated:.3f}",
             rate(round(b.frequency * b.count), b.count),
             f"{b.frequency - b.stated:+.3f}",
-            f"{m.frequency - m.stated:+.3f}" if m else "-",
         )
-        for b, m in zip(bins, mixed, strict=True)
+        for b in bins
     ]
-    head = ("stated, mean", "hidden", "difference", "at the mix that is expected")
     return (
         "## Reliability of stated probabilities\n\n"
         f"{len(stated)} statements, one for each effect that a set could test. A statement is true "
         "if the effect was hidden in that set. A bin of 50 statements deviates by more than 0.05 "
-        "by chance alone: its figure has no gate. Two figures judge all wide bins together. The "
-        "prior expects one cause that the model "
-        "lacks, and none in 37 % of sets; fewer sets here lack a cause of the catalogue. The last "
-        "column weights them to that share.\n\n" + markdown(head, rows, 4)
+        "by chance alone: its figure has no gate. Two figures judge all wide bins together.\n\n"
+        + markdown(("stated, mean", "hidden", "difference"), rows, 3)
     )
 
 
@@ -236,8 +231,7 @@ def _naming(sets: Sequence[Judged]) -> str:
     for label in own[0]["naming"]:
         hits = sum([s["naming"].get(label)] == s["truth"] for s in single)
         false = sum(s["naming"].get(label, "") != "" for s in null)
-        name = "-" if "sees a gap" in label else rate(hits, len(single))
-        rows.append((label, name, rate(false, len(null))))
+        rows.append((label, rate(hits, len(single)), rate(false, len(null))))
     return (
         "## Names, side by side\n\nThe first name is the truth (one hidden effect of the "
         "catalogue), and false alarms (tiers N).\n\n"

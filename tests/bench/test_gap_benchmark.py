@@ -143,19 +143,6 @@ def test_probabilities_are_judged_by_all_their_bins_and_by_what_chance_does():
     assert np.isnan(gap_reliability.calibration_error([record()])[0])
 
 
-def test_the_mix_that_the_prior_expects_has_more_sets_without_a_cause():
-    hidden = [record(probabilities={"slip-sinkage": 0.6, "slope": 0.1}) for _ in range(90)]
-    empty = [null(probabilities={"slip-sinkage": 0.5, "slope": 0.1}) for _ in range(10)]
-    low, high = gap_reliability.wide_bins(*gap_reliability.statements([*hidden, *empty]))
-    assert high.frequency == pytest.approx(0.9) and low.frequency == 0.0
-    _, mixed = gap_reliability.at_expected_mix([*hidden, *empty])
-    assert mixed.frequency == pytest.approx(1.0 - np.exp(-1.0)) and mixed.count == 100
-    assert mixed.stated == pytest.approx(0.6 - 0.1 * np.exp(-1.0))
-    assert gap_reliability.at_expected_mix(hidden) == []
-    name = "stated probabilities, the same at the mix"
-    assert figure([*hidden, *empty], name).measured == "0.100"
-
-
 def test_sets_that_were_added_count_in_the_figures_of_their_group_alone():
     large, one_load = gap_figures.LARGE, gap_figures.ONE_LOAD
     more = [record(discrepancy=0.04, added_to=large) for _ in range(3)]
