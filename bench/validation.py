@@ -179,8 +179,8 @@ def adapt_line() -> str:
     """What a board gains by an adaptation."""
     (_, *rows), (_, own, right) = tables_of("adapt")[:2]
     return (
-        f"Adaptations.\n{len(rows)} campaigns with a hidden effect. The error on other soils, after "
-        f"over before, has the\nmedian {own[1]}; it is larger in {own[3]}. Over that with the old "
+        f"Adaptations.\n{len(rows)} campaigns with a hidden effect. The error on other soils, "
+        f"after over before, has the\nmedian {own[1]}; it is larger in {own[3]}. Over that with the old "
         f"model taken as right: {right[1]}; {right[3]}."
     )
 
