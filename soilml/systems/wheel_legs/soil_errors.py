@@ -45,8 +45,8 @@ def correlation_of(sensors: list[SoilErrors], name: int) -> Floats:
 
 
 #: By relation. The table has no row for torque by "terramechanics", for which EMPIRICAL stands.
-EMPIRICAL = SoilErrors((-1, 4, 27, 28), (29, -2, -134, 28), (14, 49))
-SIMPLIFIED = SoilErrors((-7, -9, 21, 4), (36, -6, -92, -11), (14, 54))
-PLANAR = SoilErrors((6, -5, 20, 18), (59, -25, -36, -46), (9, 24))
-LINEAR = SoilErrors((1, 3, 5, 23), (-27, -50, -4, -78), (14, 27))
-SINKAGE = SoilErrors((-17, -8, 4, 2), (30, 24, -5, -17), (9, 24))
+EMPIRICAL = SoilErrors((-1, 4, 27, 28), (29, -2, -134, 28), (14.0, 49.0))
+SIMPLIFIED = SoilErrors((-7, -9, 21, 4), (36, -6, -92, -11), (14.0, 54.0))
+PLANAR = SoilErrors((6, -5, 20, 18), (59, -25, -36, -46), (9.0, 24.0))
+LINEAR = SoilErrors((1, 3, 5, 23), (-27, -50, -4, -78), (14.0, 27.0))
+SINKAGE = SoilErrors((-17, -8, 4, 2), (30, 24, -5, -17), (9.0, 24.0))

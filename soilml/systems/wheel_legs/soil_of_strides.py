@@ -135,7 +135,7 @@ def _fused(
     """Mean and std (2,) by the weights of eq. 30, whose variances are those of table VIII."""
     known = [one for one in errors if one is not None]
     values = np.asarray([(e.friction_angle, e.normal_stiffness) for e in estimates])
-    weights = pairwise(values, np.asarray([one.scatter for one in known], dtype=float)).weights
+    weights = pairwise(values, np.asarray([one.scatter for one in known])).weights
     variance = np.empty(2)
     for k in range(2):
         total = np.asarray([e.covariance[k, k] for e in estimates])
