@@ -65,6 +65,7 @@ def test_ground_that_carries_nothing_is_said(capsys):
         (["--ground", "mud"], "no ground 'MUD'; there are: SSC-1"),
         (["--legs", "2.5"], "needed are whole numbers"),
         (["--legs", "9"], "9 legs; the model is for 1 to 6"),
+        (["--slip", "0,50"], "--slip is 50; needed is 1 - v/(r omega)"),
         (["--mass", "-1"], "a mass of -1 kg"),
         (["--stiffness", "1e6", "--offset"], "has no stress at the surface"),
         (["--stiffness", "1e5:1e6:200", "--legs", "3:6:4"], "800 walks; at most 400"),

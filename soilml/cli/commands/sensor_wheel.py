@@ -35,6 +35,8 @@ removes what a round sensor averages over its disc (0.0095 m in the source):
 uncorrected, the arc appears longer and k_x too large. A whole rover with two
 such wheels: soilml climb.
 """
+#: Ratio of true to measured stress, or its inverse, that no loss of sensors explains.
+MOST_MAGNIFICATION = 30.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,6 +63,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Solve the balances and write the table."""
     from dataclasses import replace
+
+    import numpy as np
 
     from soilml.cli.output import tell, write_columns
     from soilml.config.case import read_case_of_one_gear
@@ -118,6 +122,12 @@ def run(args: argparse.Namespace) -> int:
     }
     panels = [("shear_modulus_m",), ("drawbar_pull_N", "pull_on_slope_N")]
     write_columns(columns, args.out, args.picture, ColumnPanels(columns, "slip", panels))
+    middle = float(np.nanmedian(found.magnification))
+    if not 1.0 / MOST_MAGNIFICATION < middle < MOST_MAGNIFICATION:
+        tell(
+            f"! the true stress is {middle:.3g} times the measured one: probably normal_Pa is in "
+            f"{'kPa' if middle > 1.0 else 'another unit'}, or load_N is"
+        )
     if discs is None:
         tell(
             "the stress is taken as given: where round sensors averaged it over their disc, k_x is "
