@@ -111,6 +111,7 @@ def write_c(
         "NAME": name.upper(),
         "origin": origin,
         "version": __version__,
+        "model_version": metadata["soilml_version"],
         "identity": {key: metadata[key] for key in IDENTITY if key in metadata},
         "noise": fields["sets"].noise if fields["sets"] else {},
         "sha": metadata["graph_sha256"],
