@@ -74,6 +74,8 @@ class SetPosterior:
         constant part, and in a file for any wheel.
     constant_noise: Constant part of the noise of torque that a user has set, N m; the graph takes
         the noise as a share of the reading.
+    misfit_limits: Numbers of readings, and the misfit that 99 of 100 sound sets of an exact model
+        stay below.
     """
 
     terms: int
@@ -86,6 +88,7 @@ class SetPosterior:
     least_share_in_range: float = FORMER_SHARE_IN_RANGE
     log_torque: bool = True
     constant_noise: float = 0.0
+    misfit_limits: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
@@ -103,6 +106,7 @@ class SetPosterior:
             sets_only=bool(metadata["alone"]),
             least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
             log_torque=metadata.get("kind") == "any wheel" or not constant,
+            misfit_limits=read_misfit_limits(metadata),
         )
 
     @property
@@ -225,6 +229,16 @@ class SetPosterior:
         return feed | dict(zip(MEMORY_INPUTS, kept, strict=True))
 
     @cached_property
+    def exact(self) -> SetPosterior:
+        """The same of sensors and a model without errors that rows share."""
+        return replace(self, common_errors=dict.fromkeys(self.common_errors, 0.0))
+
+    @cached_property
+    def no_rows(self) -> dict[str, Floats]:
+        """Row inputs of the graph without a row."""
+        return self.rows({name: [] for name in REQUIRED_READINGS})
+
+    @cached_property
     def _feed_of_set(self) -> Feed:
         """Inputs of the graph that hold for a whole set."""
         of_set = self.context_values | self.common_errors
@@ -309,6 +323,14 @@ def read_common_errors(metadata: Mapping[str, Any]) -> dict[str, float]:
     return {name: float(errors[name]) for name in COMMON_ERROR_INPUTS if name in errors}
 
 
+def read_misfit_limits(
+    metadata: Mapping[str, Any],
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Limits of the misfit from the entry `set` of a file's metadata; none where it has none."""
+    limits = metadata.get("misfit", {"readings": (), "most": ()})
+    return tuple(map(float, limits["readings"])), tuple(map(float, limits["most"]))
+
+
 def error_columns(metadata: Mapping[str, Any]) -> int:
     """Columns of errors in a file's residual system, from the entry `set` of its metadata.
 
@@ -378,11 +400,11 @@ def estimate_of_set(
         misfit=np.asarray(float(outputs[6][0])),
         rows_used=np.asarray(int(rows_used)),
         rows_set_aside=np.asarray(int(rows - rows_used)),
-        reason=np.asarray(int(_reason(in_range, memory, least_share))),
+        reason=np.asarray(int(of_reason(in_range, memory, least_share))),
     )
 
 
-def _reason(in_range: bool, memory: Memory, least_share: float) -> Reason:
+def of_reason(in_range: bool, memory: Memory, least_share: float) -> Reason:
     """Why a set has the estimate that it has, as its graph decides."""
     if in_range:
         return Reason.ESTIMATED
