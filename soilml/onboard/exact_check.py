@@ -16,7 +16,6 @@ from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.memory import Memory
 from soilml.onboard.model_file import Session
 from soilml.onboard.set_contract import (
-    COMMON_ERROR_INPUTS,
     MODEL_ERROR_INPUT,
     SENSOR_ERROR_COLUMNS,
     SET_PREFIX,
@@ -101,8 +100,8 @@ def misfit_limit(limits: tuple[Sequence[float], Sequence[float]], readings: floa
 def exact_probability(misfit: float, readings: float, limit: float) -> float:
     r"""Share of sound sets with a larger misfit; NaN without a reading.
 
-    The cube root of a chi-squared variable with n degrees of freedom is nearly normal, with the
-    standard deviation :math:`\sqrt{2 / (9 n)}` over its mean. Its place is given by the limit, which
+    The cube root of a chi-squared variable with n degrees of freedom, over n, is nearly normal
+    with the standard deviation :math:`\sqrt{2 / (9 n)}`. Its place is given by the limit, which
     1 % of sound sets exceed.
 
     References: Wilson and Hilferty, Proc. Natl. Acad. Sci. 17, 1931.
@@ -123,7 +122,7 @@ def with_exact_check(
     memory: Memory,
     answer: Estimate | None = None,
 ) -> Estimate:
-    """The estimate with the check of the rows of a memory, whose answer is another if one is given."""
+    """The estimate with the check of the rows of a memory; `answer` is theirs if it is another."""
     found = check_exact(sets, session, memory, answer or estimate)
     return replace(
         estimate,

@@ -100,9 +100,9 @@ class SoilTracker:
     next rows agree with those before, it was a glitch. Rows that differ from earlier ones only
     taken together are a drift, or a small change; the earlier ones are forgotten. Of the others,
     the last `length` are remembered. Memory and time per row are bounded: at most five calls of the
-    graph, one for the fault detector, and one more where rows are forgotten. Rows are judged with a model that is right but for
-    more noise; the estimate has the errors of the estimator's model, and noise as large as the rows
-    show.
+    graph, one more for the fault detector, and one where rows are forgotten. Rows are judged with a
+    model that is right but for more noise; the estimate has the errors of the estimator's model,
+    and noise as large as the rows show.
 
     Parameters
     ----------
