@@ -7,7 +7,7 @@ compared with the same model without errors; sensors keep the errors that are de
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +17,7 @@ from soilml.onboard.memory import Memory
 from soilml.onboard.model_file import Session
 from soilml.onboard.set_contract import (
     MODEL_ERROR_INPUT,
+    REQUIRED_READINGS,
     SENSOR_ERROR_COLUMNS,
     SET_PREFIX,
     Floats,
@@ -28,6 +29,7 @@ FALSE_ALARM_RATE, ALARM_QUANTILE = 0.01, 2.326
 #: Beyond the largest calibrated number of readings n the limit grows by 1 + 3 / sqrt(n) a reading,
 #: as in the graph (`training.set_posterior.misfit_test`).
 MARGIN = 3.0
+NO_ROWS: dict[str, list[float]] = {name: [] for name in REQUIRED_READINGS}
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def check_exact(
         system = without_errors(memory.system, sets.terms)
         padded = np.zeros((len(system), sets.columns))
         padded[:, : sets.terms] = system
-        fed = exact.feed(exact.no_rows, Memory(padded, memory.counts))
+        fed = exact.feed(exact.rows(NO_ROWS), Memory(padded, memory.counts))
         misfit, in_range = (one[0] for one in session.run(outputs, fed))
         reason = of_reason(bool(in_range), memory, sets.least_share_in_range)
     else:
@@ -87,14 +89,14 @@ def without_errors(system: Floats, terms: int) -> Floats:
     return whole[:, :terms]
 
 
-def misfit_limit(limits: tuple[Sequence[float], Sequence[float]], readings: float) -> float:
-    """The limit of a file for so many readings; NaN where the file states none."""
-    numbers, most = limits
-    if not len(numbers):
+def misfit_limit(limits: Mapping[str, Sequence[float]], readings: float) -> float:
+    """The limit `most` of a file for so many readings; NaN where the file states none."""
+    if not limits:
         return math.nan
-    last = numbers[-1]
-    inside = np.interp(math.log(min(max(readings, numbers[0]), last)), np.log(numbers), most)
-    return float(inside) + max(readings - last, 0.0) * (1.0 + MARGIN / math.sqrt(last))
+    numbers, last = limits["readings"], limits["readings"][-1]
+    place = math.log(min(max(readings, numbers[0]), last))
+    inside = float(np.interp(place, np.log(numbers), limits["most"]))
+    return inside + max(readings - last, 0.0) * (1.0 + MARGIN / math.sqrt(last))
 
 
 def exact_probability(misfit: float, readings: float, limit: float) -> float:

@@ -74,8 +74,7 @@ class SetPosterior:
         constant part, and in a file for any wheel.
     constant_noise: Constant part of the noise of torque that a user has set, N m; the graph takes
         the noise as a share of the reading.
-    misfit_limits: Numbers of readings, and the misfit that 99 of 100 sound sets of an exact model
-        stay below.
+    misfit_limits: `most`, which 99 of 100 sound sets of an exact model stay below, by `readings`.
     """
 
     terms: int
@@ -88,7 +87,7 @@ class SetPosterior:
     least_share_in_range: float = FORMER_SHARE_IN_RANGE
     log_torque: bool = True
     constant_noise: float = 0.0
-    misfit_limits: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())
+    misfit_limits: Mapping[str, Any] = field(default_factory=dict)
 
     @staticmethod
     def of(metadata: Mapping[str, Any]) -> SetPosterior:
@@ -106,7 +105,7 @@ class SetPosterior:
             sets_only=bool(metadata["alone"]),
             least_share_in_range=float(metadata.get("least_share_in_range", FORMER_SHARE_IN_RANGE)),
             log_torque=metadata.get("kind") == "any wheel" or not constant,
-            misfit_limits=read_misfit_limits(metadata),
+            misfit_limits=metadata.get("misfit", {}),
         )
 
     @property
@@ -234,11 +233,6 @@ class SetPosterior:
         return replace(self, common_errors=dict.fromkeys(self.common_errors, 0.0))
 
     @cached_property
-    def no_rows(self) -> dict[str, Floats]:
-        """Row inputs of the graph without a row."""
-        return self.rows({name: [] for name in REQUIRED_READINGS})
-
-    @cached_property
     def _feed_of_set(self) -> Feed:
         """Inputs of the graph that hold for a whole set."""
         of_set = self.context_values | self.common_errors
@@ -321,14 +315,6 @@ def read_common_errors(metadata: Mapping[str, Any]) -> dict[str, float]:
         return {}
     errors = metadata["errors"]
     return {name: float(errors[name]) for name in COMMON_ERROR_INPUTS if name in errors}
-
-
-def read_misfit_limits(
-    metadata: Mapping[str, Any],
-) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Limits of the misfit from the entry `set` of a file's metadata; none where it has none."""
-    limits = metadata.get("misfit", {"readings": (), "most": ()})
-    return tuple(map(float, limits["readings"])), tuple(map(float, limits["most"]))
 
 
 def error_columns(metadata: Mapping[str, Any]) -> int:

@@ -181,7 +181,7 @@ def _sizes(
     work = sum(BYTES[kind] * length for kind, length in _arrays(functions).values())
     if interface.sets:
         work += len(interface.rows) * rows * BYTES["float"]
-        work += interface.columns * BYTES[interface.precision] + 16  # rows that were added last
+        work += interface.columns * BYTES[interface.precision] + 24  # rows that were added last
     triangle = interface.columns * (interface.columns + 1) // 2
     precision, shared = BYTES[interface.precision], 4 + len(interface.context)
     memory = triangle * precision + shared * BYTES["float"] + 16
