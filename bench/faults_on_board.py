@@ -1,4 +1,4 @@
-"""Faults that a released file flags as flown: `python bench/faults_on_board.py [FILE]`.
+"""Faults that a released file flags as flown.
 
 Beside the flag of the answer, whose model has errors, the fault detector `Estimate.disagrees`, with
 sensors of usual errors and with exact ones.
@@ -6,18 +6,14 @@ sensors of usual errors and with exact ones.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 from faults import Fault, Readings, definitions, faults, simulate
 from flags import LOAD, SLIP, add_noise, select_rows, shuffled_conditions
+from runner import Bench, Row, Sample, markdown
 from wrong_worlds import World
 from wrong_worlds import simulate as simulate_world
 
@@ -31,7 +27,7 @@ from soilml.quantities import SHEAR
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Soils of each line, rows of each set, and the seed of both.
-SETS, ROWS, SEED = 100, 16, 31
+SETS, QUICK_SETS, ROWS, SEED = 100, 6, 16, 31
 #: What no flag of the answer shows, simulated by the reference wheel of the blind sets.
 WORLDS = (
     World("radius 0.18 m for 0.15 m", radius=1.2),
@@ -56,11 +52,11 @@ def with_usual_sensor_errors(r: Readings, estimator: Estimator, seed: int) -> Re
     }
 
 
-def lines(case: Case, estimator: Estimator) -> Iterator[tuple[str, Readings, Floats]]:
+def lines(case: Case, estimator: Estimator, sets: int) -> Iterator[tuple[str, Readings, Floats]]:
     """Name, readings (sets, rows) and soils (sets, 3) of each line; the soils are the same."""
     rng = np.random.default_rng(SEED)
-    truth = np.stack([case.prior[name].at(rng.random(SETS)) for name in SHEAR], axis=1)
-    order = shuffled_conditions(SETS, SEED)[:, :ROWS]
+    truth = np.stack([case.prior[name].at(rng.random(sets)) for name in SHEAR], axis=1)
+    order = shuffled_conditions(sets, SEED)[:, :ROWS]
     for fault in (Fault("-", "no fault"), *definitions(), *faults(case)):
         true = simulate(fault.case(case), truth, SLIP, LOAD)
         read = select_rows(fault.report(add_noise(true, case, SEED)), fault, order)
@@ -71,14 +67,30 @@ def lines(case: Case, estimator: Estimator) -> Iterator[tuple[str, Readings, Flo
         else:
             yield fault.name, read, truth
     for world in WORLDS:
-        drives = simulate_world(world, SETS, ROWS, SEED)
+        drives = simulate_world(world, sets, ROWS, SEED)
         yield world.name, drives.readings, drives.truth
+
+
+def cases(sample: Sample) -> list[Row]:
+    """One file, with torque only and with all channels."""
+    sets = QUICK_SETS if sample.quick else SETS
+    return [{"file": "wheel", "channels": n, "sets": sets} for n in (3, 5)]
+
+
+def flagged(asked: Row) -> list[Row]:
+    """Each line: shares flagged by the answer and by both detectors; coverage of the answer."""
+    case, estimator = read_recipe("wheel").case, Estimator.load(asked["file"])
+    exact = estimator.on(**dict.fromkeys(SENSOR_ERROR_INPUTS, 0.0))
+    return [
+        {"fault": name, **rates((estimator, exact), readings, truth, asked["channels"])}
+        for name, readings, truth in lines(case, estimator, asked["sets"])
+    ]
 
 
 def rates(
     estimators: tuple[Estimator, Estimator], r: Readings, truth: Floats, channels: int
-) -> str:
-    """Cells of a line: flagged by the answer, by both detectors; coverage of the answer."""
+) -> Row:
+    """Shares of the sets that are flagged; of those that are answered, in which intervals hold."""
     found = []
     for i in range(len(truth)):
         rows = {name: r[name][i] for name in CHANNELS[:channels]}
@@ -90,27 +102,39 @@ def rates(
         covered = np.where((truth[i] >= answer.low) & (truth[i] <= answer.high), 1.0, 0.0)
         found.append((not answer.in_range, bool(answer.disagrees), bool(exact.disagrees), *covered))
     values = np.asarray(found, float)
-    shares = [f"{100.0 * share:.0f}" for share in values[:, :3].mean(axis=0)]
-    known = values[~np.isnan(values[:, 3])]
-    covered = " ".join(f"{100.0 * c:.0f}" for c in known[:, 3:].mean(axis=0)) if len(known) else "-"
-    return f"{' | '.join(shares)} | {covered}"
+    known = values[~np.isnan(values[:, 3])][:, 3:]
+    covered = known.mean(axis=0).tolist() if len(known) else None
+    return {"flagged": values[:, :3].mean(axis=0).tolist(), "covered": covered}
 
 
-def table(name: str) -> str:
-    """Markdown of all faults, with torque only and with all channels."""
-    case, estimator = read_recipe("wheel").case, Estimator.load(name)
-    exact = estimator.on(**dict.fromkeys(SENSOR_ERROR_INPUTS, 0.0))
-    head = "answer | detector | exact sensors | covered c phi K"
-    found = [f"| fault, {ROWS} rows | {head} | {head} |", f"|---{'|---:' * 8}|"]
-    for fault, readings, truth in lines(case, estimator):
-        torque, every = (rates((estimator, exact), readings, truth, n) for n in (3, 5))
-        found.append(f"| {fault} | {torque} | {every} |")
-    return "\n".join(found)
+def tables(rows: list[Row]) -> str:
+    """Faults by what flags them, with torque only and with all channels."""
+    texts = []
+    for n, what in ((3, "torque only"), (5, "all channels")):
+        body = []
+        for row in (r for r in rows if r["channels"] == n):
+            covered = row["covered"]
+            held = "-" if covered is None else " ".join(f"{100.0 * c:.0f}" for c in covered)
+            body.append([row["fault"], *(f"{100.0 * f:.0f}" for f in row["flagged"]), held])
+        head = [
+            f"fault, {ROWS} rows, {what}",
+            "answer",
+            "detector",
+            "exact sensors",
+            "covered c phi K",
+        ]
+        texts.append(markdown(head, body))
+    return "\n\n".join(texts)
 
 
-def cost(name: str) -> str:
-    """Least times of a call with and without the detector, measured in turn, and their ratio."""
-    estimator, times = Estimator.load(name), np.zeros((TIMED, 2))
+def cost_cases(sample: Sample) -> list[Row]:
+    """Files with a detector."""
+    return [{"file": name} for name in ("wheel", "wheel_small")]
+
+
+def cost(asked: Row) -> Row:
+    """Least times of a call with and without the detector, measured in turn, ms."""
+    estimator, times = Estimator.load(asked["file"]), np.zeros((TIMED, 2))
     sets = estimator.sets
     assert sets is not None
     rng = np.random.default_rng(SEED)
@@ -123,12 +147,34 @@ def cost(name: str) -> str:
         estimator.run(**rows)
         times[i] = middle - start, time.perf_counter() - middle
     without, both = 1e3 * times.min(axis=0)
-    ratio = both / without
-    return f"{name}: {without:.2f} ms without the detector, {both:.2f} ms with it, x {ratio:.2f}"
+    return {"without": without, "with": both}
 
 
-if __name__ == "__main__":
-    for file in sys.argv[1:] or ["wheel"]:
-        print(table(file))
-        print()
-        print(cost(file))
+def cost_tables(rows: list[Row]) -> str:
+    """Times and their ratio."""
+    body = [
+        [r["file"], f"{r['without']:.2f}", f"{r['with']:.2f}", f"{r['with'] / r['without']:.2f}"]
+        for r in rows
+    ]
+    return markdown(["file", "ms without the detector", "ms with it", "ratio"], body)
+
+
+ON_BOARD = Bench(
+    "faults_on_board",
+    "Faults that a file flags as flown",
+    f"{SETS} sets of {ROWS} rows of the reference wheel with 2 % torque noise; shares in %. "
+    "*Answer*: the flag of the estimate, whose model has errors; *detector*: `disagrees`, with "
+    "usual errors of sensors; *exact sensors*: with none. Covered: 90 % intervals of the answer.",
+    cases,
+    flagged,
+    tables,
+)
+DETECTOR_COST = Bench(
+    "detector_cost",
+    "What the fault detector costs",
+    f"Least of {TIMED} calls of {ROWS} rows, with and without it in turn.",
+    cost_cases,
+    cost,
+    cost_tables,
+    timed=True,
+)
