@@ -180,8 +180,8 @@ def adapt_line() -> str:
     (_, *rows), (_, own, right) = tables_of("adapt")[:2]
     return (
         f"Adaptations.\n{len(rows)} campaigns with a hidden effect. The error on other soils, "
-        f"after over before, has the\nmedian {own[1]}; it is larger in {own[3]}. Over that with the old "
-        f"model taken as right: {right[1]}; {right[3]}."
+        f"after over before, has the\nmedian {own[1]}; it is larger in {own[3]}. Over that with "
+        f"the old model taken as right: {right[1]}; {right[3]}."
     )
 
 
