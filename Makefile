@@ -22,7 +22,7 @@ $(VENV)/.ready: pyproject.toml constraints.txt
 	@echo "making the environment in $(VENV) (about a minute) ..."
 	@$(PYTHON) -m venv $(VENV)
 	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[ground,logs,map,serve,dev]'
+	  --disable-pip-version-check --editable '.[ground,logs,map,serve,torch,dev]'
 	@touch $@
 
 demo: $(VENV)/.ready ## the story of README: data, training, comparison, a gap, a better board; one picture
@@ -105,7 +105,7 @@ mutation: $(VENV)/.ready ## change the source at random places and see whether a
 	@$(BIN)/python tools/mutation.py --mutants $(or $(MUTANTS),12)
 
 # what the tests need beside the libraries that users install, and the tests that tell versions apart
-TEST_LIBRARIES := '.[ground,logs,map,cluster,serve]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
+TEST_LIBRARIES := '.[ground,logs,map,cluster,serve,torch]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
 TEST_VERSIONS := -m pytest -q -n auto -p no:cacheprovider \
 	  -m "not slow and not network and not long and not browser" tests/soilml tests/training tests/datagen
 
@@ -143,7 +143,7 @@ docs: $(VENV)/.ready ## the documentation site, with executed tutorials: build/d
 release: $(VENV)/.ready ## build wheel and source archive twice, compare, install and measure them: dist/
 	@$(BIN)/python tools/release.py
 
-lock: .venv-supply/.ready ## write the packages with their hashes: onboard-hashes.txt, ground-hashes.txt
+lock: .venv-supply/.ready ## write the packages with their hashes: tools/supply/
 	@$(PYTHON) tools/packages.py lock
 
 sbom: .venv-supply/.ready ## write bills of materials (CycloneDX) into build/

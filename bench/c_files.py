@@ -62,6 +62,9 @@ ABOUT_MEMORY = (
     "two cycles an instruction, 2 million take 24 ms."
 )
 
+#: Sizes that a header states.
+SIZES = r"#define \w+_(WORK|MEMORY|TRACKER|CONSTANT)_BYTES (\d+)"
+
 
 @cache
 def folder() -> Path:
@@ -240,9 +243,10 @@ def memory(case: Row) -> Row:
         sizes = {}
         for rows in (1, 32):
             header = generated(name, rows).with_suffix(".h").read_text()
-            for part, size in re.findall(r"#define \w+_(WORK|MEMORY|CONSTANT)_BYTES (\d+)", header):
+            for part, size in re.findall(SIZES, header):
                 sizes[part, rows] = f"{int(size) / 1e3:.1f}"
         found = {"constants": sizes["CONSTANT", 1], "state": sizes["MEMORY", 1]}
+        found["tracker"] = sizes["TRACKER", 1]
         found |= {"work 1": sizes["WORK", 1], "work 32": sizes["WORK", 32]}
     if COMPILERS:
         size, path = call_graph(generated(name), folder() / f"{name}.o").deepest_of_all()
@@ -268,6 +272,7 @@ def memory(case: Row) -> Row:
 MEMORY_COLUMNS = {
     "constants, kB": "constants",
     "state of a set": "state",
+    "tracker": "tracker",
     "work, --rows 1": "work 1",
     "work, --rows 32": "work 32",
     "stack here, bytes": "stack",

@@ -23,6 +23,7 @@ MODULES = (
     "pull_bands",
     "climbing",
     "advice",
+    "promises",
     "wheel_leg_slip",
     "adapt",
     "gap_bench",

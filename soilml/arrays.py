@@ -13,6 +13,8 @@ from typing import Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from soilml.errors import MissingLibraryError
+
 
 class NumericArray(Protocol):
     """An array of any library that follows the array API standard, such as numpy or torch.
@@ -80,8 +82,12 @@ def namespace(*values: Real) -> Any:
         if isinstance(value, (float, int, np.ndarray, np.generic)):
             continue
         if type(value).__module__.split(".")[0] == "torch":
-            from array_api_compat import torch
-
+            try:
+                from array_api_compat import torch
+            except ImportError:
+                raise MissingLibraryError(
+                    "torch tensors need array-api-compat: pip install 'soilml[torch]'"
+                ) from None
             return torch
         if hasattr(value, "__array_namespace__"):
             return value.__array_namespace__()

@@ -17,7 +17,6 @@ from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.set_contract import RESPONSE_CHANNELS, SENSOR_ERROR_INPUTS
 from soilml.quantities import SHEAR, column
 from training.dataset import PER_ROW, check_targets
-from training.regressors.coupled_lssvm import CoupledLSSVM
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import FeatureSubset, GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
@@ -28,7 +27,7 @@ from training.set_posterior.response_surface import ResponseSettings
 
 #: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
 REGRESSORS: dict[str, type[GaussianRegressor]] = {
-    cls.type_name: cls for cls in (LSSVM, FixedSizeLSSVM, CoupledLSSVM, GaussianMLP, LinearGaussian)
+    cls.type_name: cls for cls in (LSSVM, FixedSizeLSSVM, GaussianMLP, LinearGaussian)
 }
 
 #: Allowed seeds: those of the random generators of all libraries.

@@ -54,7 +54,8 @@ friction angle and shear modulus, each with its uncertainty.
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 
 #: The commands of this distribution, in the order of the help text; they are present where the
-#: packages can be imported, installed or not. Others come by the entry point `soilml.commands`.
+#: packages can be imported, installed or not. Those of others have an entry point in the group
+#: `soilml.commands`.
 COMMANDS = {
     "init": "soilml.cli.commands.init",
     "models": "soilml.cli.commands.models",

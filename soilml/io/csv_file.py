@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
+from soilml.io.bounds import COLUMNS, ROWS, TEXT_BYTES
 from soilml.io.cell_text import cell_as_text, is_number, read_numbers
-from soilml.io.spreadsheet import SheetRows
-from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
+from soilml.io.csv_by_arrow import read_good_csv
+from soilml.io.spreadsheet import sheet_rows
+from soilml.io.table import TEXT, Column, text_column
 
 BLOCK = 8192  # Rows whose cells are held as text at a time
 _LINE = 1_000_000  # Characters of a line; a longer one is not of a table
@@ -39,6 +41,8 @@ def read_csv(
     UTF-8 or no table, a row with another number of cells than the header, and a cell that is not
     what its column holds.
     """
+    if (found := read_good_csv(file, columns, _LINE, progress)) is not None:
+        return found
     with file.open(encoding="utf-8-sig") as opened:
         reader, buffer = csv.reader(_lines(file, opened), strict=True), cast(Any, opened.buffer)
         told = None if progress is None else lambda: progress(buffer.tell())
@@ -55,26 +59,23 @@ def read_sheet(
 ) -> tuple[dict[str, Column], NDArray[np.int64]]:
     """What `read_csv` gives, of a sheet of a spreadsheet, a line being a row of the sheet.
 
-    Raises as `read_csv` and `SheetRows` do.
+    Raises as `read_csv` and `sheet_rows` do.
     """
-    return _columns(file, _Padded(SheetRows(file)), columns, header_hint, None)
+    return _columns(file, _SheetReader(sheet_rows(file)), columns, header_hint, None)
 
 
-class _Padded(Iterator[list[str]]):
+class _SheetReader(Iterator[list[str]]):
     """Rows of a sheet from its first one that is not blank, none shorter than that."""
 
-    def __init__(self, rows: SheetRows) -> None:
-        self._rows, self._width = rows, 0
-
-    @property
-    def line_num(self) -> int:
-        return self._rows.line_num
+    def __init__(self, rows: list[list[str]]) -> None:
+        self.line_num = next((i for i, row in enumerate(rows) if row), len(rows))
+        self._rows, self._width = rows, len(rows[self.line_num]) if self.line_num < len(rows) else 0
 
     def __next__(self) -> list[str]:
-        row = next(self._rows)
-        while not self._width and not row:
-            row = next(self._rows)
-        self._width = self._width or len(row)
+        if self.line_num == len(self._rows):
+            raise StopIteration
+        self.line_num += 1
+        row = self._rows[self.line_num - 1]
         return row + [""] * (self._width - len(row))
 
 
@@ -89,6 +90,7 @@ def _columns(
     header = [name.strip() for name in next(reader, [])]
     if not header:
         raise TableError(f"{file} is empty; needed is a header: {header_hint}")
+    COLUMNS.check(file, len(header))
     kept = list(columns(header))
     places = [header.index(name) for name in kept]
     blocks: list[list[Column]] = [[] for _ in kept]
@@ -100,6 +102,9 @@ def _columns(
             filled.append(_column(file, name, cells, numbers))
         if progress is not None:
             progress()
+    for name, filled in zip(kept, blocks, strict=True):
+        longest = max((part.itemsize for part in filled), default=0)
+        TEXT_BYTES.check(f"{file}, column {name}", longest * sum(map(len, filled)) * (name in TEXT))
     empty = {name: np.zeros(0, np.str_ if name in TEXT else np.float64) for name in kept}
     found = {
         name: np.concatenate([empty[name], *filled])
@@ -141,8 +146,7 @@ def _blocks(
         rows.append(row)
         lines.append(reader.line_num)
         total += 1
-        if total > MOST_ROWS:
-            raise TableError(f"{file} has more than {MOST_ROWS} rows; split it, or thin it")
+        ROWS.check(file, total)
         if len(rows) == BLOCK:
             yield np.asarray(lines, dtype=np.int64), rows
             rows, lines = [], []

@@ -6,24 +6,39 @@
 from __future__ import annotations
 
 import datetime
+import posixpath
 import re
-import warnings
 import zipfile
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
+from xml.etree import ElementTree
 
 from soilml.errors import MissingLibraryError, TableError
+from soilml.io.spreadsheet_size import check_spreadsheet_size
 
 ENDINGS = (".xlsx", ".xlsm")
-#: Most bytes of a spreadsheet once unpacked, most cells and most rows of a sheet.
-LARGEST, MOST_CELLS, MOST_ROWS = 256 << 20, 2_000_000, 1_100_000
 _SHEET = re.compile(r"(.+\.xls[xm])#([^#]+)", re.IGNORECASE | re.DOTALL)
-_MERGED = re.compile(rb'<(?:\w+:)?mergeCell\s[^>]*?ref="([A-Z0-9:]{1,40})"')
-_FORMULA = re.compile(rb"<(?:\w+:)?f[\s/>]")
-_BLOCK, _OVERLAP = 1 << 20, 256
 _SHOWN = 12  # Most sheets that a message names
-_INSTEAD = "save the sheet as CSV, or the rows as Parquet"
+#: A cell in the XML of a sheet that has some attribute, and the place that it states.
+_CELL = rb"""<(?:\w+:)?c(?=\s)%s[^>]*?\sr=["']([A-Z]{1,3})(\d{1,7})["'][^>]*>"""
+_ANY_CELL = re.compile(rb"<(?:\w+:)?c[\s/>]")
+_PLACED = re.compile(_CELL % b"")
+_ERROR = re.compile(
+    _CELL % rb"""(?=[^>]*\st=["']e["'])""" + rb"(?<!/>)(?:(?!</(?:\w+:)?c>).)*?<(?:\w+:)?v>([^<]*)",
+    re.DOTALL,
+)
+_UNCOUNTED = re.compile(  # a formula without a value
+    _CELL % b"" + rb"\s*<(?:\w+:)?f(?:\s[^>]*)?(?:/>|>[^<]*</(?:\w+:)?f>)\s*"
+    rb"(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v></(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
+)
+_NUMBERS = (int, float)  # Types of cells that are numbers
+_PERCENT_FORMATS = ("9", "10")  # Numbers of the built-in formats with %
+
+Place = tuple[int, int]  # Row and column, from 0
+Cells = list[list[Any]]
 
 
 def split_sheet(path: str | Path) -> tuple[Path, str]:
@@ -47,17 +62,13 @@ def is_spreadsheet(path: str | Path) -> bool:
 
 
 def sheets_with_cells(file: Path) -> list[str]:
-    """The names of the sheets of a spreadsheet that have cells; raises as `SheetRows` does."""
-    _check_size(file)
-    book = _opened(file, data_only=True)
-    try:
-        return [sheet.title for sheet in book.worksheets if _has_cells(file, sheet)]
-    finally:
-        book.close()
+    """The names of the sheets of a spreadsheet that have cells; raises as `sheet_rows` does."""
+    with _opened(file) as book:
+        return book.filled()
 
 
-class SheetRows(Iterator[list[str]]):
-    """The rows of a sheet as texts, like `csv.reader`: `line_num` is the row that came last.
+def sheet_rows(path: Path) -> list[list[str]]:
+    """The rows of a sheet as texts, from the first row on.
 
     Rows have no blank cells at their end; a row without any is an empty list. Dates are written as
     2024-05-31 12:00:00, what is shown in per cent below a head with % is a hundred times its value.
@@ -67,71 +78,43 @@ class SheetRows(Iterator[list[str]]):
     Raises `TableError` where the file is no spreadsheet, damaged or too large; where several
     sheets have cells and none is named; where cells are merged, a formula has no value, or a date
     stands among numbers. `OSError` where the file cannot be read, and `MissingLibraryError`
-    without openpyxl.
+    without python-calamine.
     """
-
-    def __init__(self, path: Path) -> None:
-        self.line_num = 0
-        self._rows = _rows(path)
-
-    def __next__(self) -> list[str]:
-        if self.line_num == len(self._rows):
-            raise StopIteration
-        self.line_num += 1
-        return self._rows[self.line_num - 1]
-
-
-def _rows(path: Path) -> list[list[str]]:
     file, name = split_sheet(path)
-    _check_size(file)
-    book = _opened(file, data_only=True)
+    with _opened(file) as book:
+        title = book.chosen(name)
+        where = f"{file}, sheet {title!r}"
+        xml, sheet = book.sheet(title)
+        rows: Cells = sheet.to_python(skip_empty_area=False)
+        for found in _ERROR.finditer(xml):  # such as #N/A, which calamine leaves blank
+            row, column = _place(found)
+            if row < len(rows) and column < len(rows[row]):
+                rows[row][column] = found[3].decode()
+        _check_merged(where, rows, sheet.merged_cell_ranges or ())
+        if (b"<f" in xml or b":f" in xml) and (formula := _UNCOUNTED.search(xml)):
+            raise TableError(
+                f"{where}, cell {_cell_name(_place(formula))}: a formula whose value is not in the "
+                "file; open it in a spreadsheet program and save it"
+            )
+        _check_dates(where, rows)
+        return _texts(rows, book.in_percent(xml))
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[_Book]:
+    """A spreadsheet, closed at the end; what fails within is a damaged part of it."""
+    check_spreadsheet_size(file)
     try:
-        sheet = _chosen(file, book, name)
-        where = f"{file}, sheet {sheet.title!r}"
-        merged, has_formulas = _merged_and_formulas(file, sheet)
-        cells = _cells(where, sheet)
-        _check_merged(where, cells, merged)
-        if has_formulas:
-            _check_formulas(file, where, sheet.title, cells)
-        _check_dates(where, cells)
-        return _texts(cells)
-    finally:
-        book.close()
-
-
-def _check_size(file: Path) -> None:
-    """Refuse what is no packed file, and what unpacks to more than `LARGEST`."""
-    try:
-        with zipfile.ZipFile(file) as packed:
-            # a part is read to its declared size and no further
-            size = sum(part.file_size for part in packed.infolist())
-    except (zipfile.BadZipFile, ValueError, NotImplementedError):
-        raise TableError(
-            f"{file} is no .xlsx file: it is damaged, has a password, or is of the older kind .xls;"
-            " open it in a spreadsheet program and save it as .xlsx or CSV"
-        ) from None
-    if size > LARGEST:
-        raise TableError(
-            f"{file} has {size / 2**20:.0f} MB unpacked; at most {LARGEST >> 20} MB are read: "
-            f"{_INSTEAD}"
-        )
-
-
-def _opened(file: Path, data_only: bool) -> Any:
-    try:
-        import openpyxl
+        from python_calamine import CalamineWorkbook
     except ImportError:
         raise MissingLibraryError(
-            f"{file}: reading spreadsheets needs openpyxl: pip install 'soilml[logs]'; or save the "
-            "sheet as CSV"
+            f"{file}: reading spreadsheets needs python-calamine: pip install 'soilml[logs]'; or "
+            "save the sheet as CSV"
         ) from None
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of formats and extensions, which are not read
-            return openpyxl.load_workbook(
-                file, read_only=True, data_only=data_only, keep_links=False
-            )
-    except OSError:
+        with zipfile.ZipFile(file) as packed, CalamineWorkbook.from_path(file) as cells_of:
+            yield _Book(file, packed, cells_of, _parts(packed), _percent_styles(packed))
+    except (OSError, TableError):
         raise
     except Exception as error:  # of many kinds, by the part that is damaged
         _damaged(file, error)
@@ -145,153 +128,164 @@ def _damaged(file: Path, error: Exception) -> NoReturn:
     ) from None
 
 
-def _chosen(file: Path, book: Any, name: str) -> Any:
-    """The named sheet, or the one that has cells."""
-    sheets = {sheet.title: sheet for sheet in book.worksheets}
-    listed = ", ".join(map(repr, list(sheets)[:_SHOWN])) + ", ..." * (len(sheets) > _SHOWN)
-    if name:
-        by_case = {title.casefold(): title for title in sheets}
-        if name.casefold() not in by_case:
-            raise TableError(f"{file} has no sheet {name!r}; there are: {listed}")
-        return sheets[by_case[name.casefold()]]
-    filled = list(sheets)
-    if len(sheets) > 1:
-        filled = [title for title, sheet in sheets.items() if _has_cells(file, sheet)]
-    if len(filled) == 1:
-        return sheets[filled[0]]
-    if not filled:
-        raise TableError(f"{file} has no sheet with cells")
-    raise TableError(
-        f"{file} has {len(filled)} sheets: {', '.join(map(repr, filled[:_SHOWN]))}; needed is the "
-        f"name of one, as {file.name}#{filled[0]}"
-    )
+def _parts(packed: zipfile.ZipFile) -> dict[str, str]:
+    """The sheets that can have cells, and the part of each."""
+    relations = ElementTree.fromstring(packed.read("xl/_rels/workbook.xml.rels"))
+    targets = {relation.get("Id"): relation.get("Target", "") for relation in relations}
+    parts = {}
+    for sheet in ElementTree.fromstring(packed.read("xl/workbook.xml")).iterfind(".//{*}sheet"):
+        target = targets[next(value for key, value in sheet.items() if key.endswith("}id"))]
+        if "worksheets/" in target:
+            parts[sheet.get("name", "")] = posixpath.join("/xl", target)[1:]
+    return parts
 
 
-def _has_cells(file: Path, sheet: Any) -> bool:
-    sheet.reset_dimensions()  # what the file says of its size need not be true
-    try:
-        for _, row in zip(range(MOST_ROWS), sheet.iter_rows(values_only=True), strict=False):
-            if any(value is not None for value in row):
-                return True
-    except Exception as error:
-        _damaged(file, error)
-    return False
+def _percent_styles(packed: zipfile.ZipFile) -> set[bytes]:
+    """The numbers of the styles that show per cent."""
+    if "xl/styles.xml" not in packed.namelist():
+        return set()
+    root = ElementTree.fromstring(packed.read("xl/styles.xml"))
+    shown = {
+        *_PERCENT_FORMATS,
+        *(
+            f.get("numFmtId")
+            for f in root.iterfind(".//{*}numFmt")
+            if "%" in f.get("formatCode", "")
+        ),
+    }
+    styles = root.find("{*}cellXfs")
+    found = enumerate(() if styles is None else styles)
+    return {str(i).encode() for i, style in found if style.get("numFmtId") in shown}
 
 
-def _merged_and_formulas(file: Path, sheet: Any) -> tuple[list[str], bool]:
-    """The ranges of merged cells, and whether there are formulas: openpyxl reads neither here."""
-    merged: dict[str, None] = {}
-    formulas, kept = False, b""
-    with zipfile.ZipFile(file) as packed, packed.open(sheet._worksheet_path) as part:
-        try:
-            while block := part.read(_BLOCK):
-                text = kept + block
-                merged.update(dict.fromkeys(found.decode() for found in _MERGED.findall(text)))
-                formulas = formulas or bool(_FORMULA.search(text))
-                kept = text[-_OVERLAP:]
-        except (zipfile.BadZipFile, EOFError) as error:
-            _damaged(file, error)
-    return list(merged), formulas
+@dataclass(frozen=True)
+class _Book:
+    """An open spreadsheet, and what calamine does not tell of it."""
+
+    file: Path
+    packed: zipfile.ZipFile
+    cells_of: Any  # the workbook as calamine opens it
+    parts: dict[str, str]  # of its sheets
+    percent_styles: set[bytes]
+
+    def sheet(self, title: str) -> tuple[bytes, Any]:
+        """The XML of a sheet, and its cells."""
+        xml = self.packed.read(self.parts[title])
+        if len(_PLACED.findall(xml)) < len(_ANY_CELL.findall(xml)):
+            raise ValueError(f"sheet {title!r} has cells without their places")
+        return xml, self.cells_of.get_sheet_by_name(title)
+
+    def in_percent(self, xml: bytes) -> set[Place]:
+        """The cells that are shown in per cent."""
+        if not self.percent_styles:
+            return set()
+        style = rb"""(?=[^>]*\ss=["'](?:%s)["'])""" % b"|".join(self.percent_styles)
+        return {_place(found) for found in re.finditer(_CELL % style, xml)}
+
+    def filled(self) -> list[str]:
+        """The sheets that have cells."""
+        return [title for title in self.parts if self.sheet(title)[1].end is not None]
+
+    def chosen(self, name: str) -> str:
+        """The named sheet, or the one that has cells."""
+        file, sheets = self.file, list(self.parts)
+        if name:
+            by_case = {title.casefold(): title for title in sheets}
+            if name.casefold() not in by_case:
+                raise TableError(f"{file} has no sheet {name!r}; there are: {_listed(sheets)}")
+            return by_case[name.casefold()]
+        filled = sheets if len(sheets) == 1 else self.filled()
+        if len(filled) > 1:
+            raise TableError(
+                f"{file} has {len(filled)} sheets: {_listed(filled)}; needed is the name of one, "
+                f"as {file.name}#{filled[0]}"
+            )
+        if not filled:
+            raise TableError(f"{file} has no sheet with cells")
+        return filled[0]
 
 
-def _cells(where: str, sheet: Any) -> list[tuple[Any, ...]]:
-    """All rows of cells, without blank ones at their ends."""
-    sheet.reset_dimensions()
-    rows: list[tuple[Any, ...]] = []
-    count = last = 0
-    try:
-        for row in sheet.iter_rows():
-            count += max(len(row), 1)
-            if count > MOST_CELLS or len(rows) == MOST_ROWS:
-                raise TableError(
-                    f"{where}: the sheet has more than {MOST_CELLS} cells, or {MOST_ROWS} rows; "
-                    f"{_INSTEAD}"
-                )
-            width = max((i + 1 for i, cell in enumerate(row) if cell.value is not None), default=0)
-            rows.append(tuple(row[:width]))
-            last = len(rows) if width else last
-    except TableError:
-        raise
-    except Exception as error:
-        _damaged(Path(where), error)
-    return rows[:last]
+def _listed(sheets: Sequence[str]) -> str:
+    return ", ".join(map(repr, sheets[:_SHOWN])) + ", ..." * (len(sheets) > _SHOWN)
 
 
-def _check_merged(where: str, rows: Sequence[Sequence[Any]], merged: Sequence[str]) -> None:
+def _column_number(letters: bytes) -> int:
+    """1 for A, 27 for AA."""
+    number = 0
+    for letter in letters:
+        number = 26 * number + letter - 64
+    return number
+
+
+def _place(found: re.Match[bytes]) -> Place:
+    return int(found[2]) - 1, _column_number(found[1]) - 1
+
+
+def _cell_name(place: Place) -> str:
+    """B3 for row 2 and column 1."""
+    return f"{_letters(place[1])}{place[0] + 1}"
+
+
+def _letters(column: int) -> str:
+    return _letters(column // 26 - 1) + chr(65 + column % 26) if column >= 0 else ""
+
+
+def _check_merged(where: str, rows: Cells, merged: Sequence[tuple[Place, Place]]) -> None:
     """Refuse merged cells, but for a title that stands alone in its rows."""
-    from openpyxl.utils import range_boundaries
-
-    for found in merged:
-        _, top, _, bottom = range_boundaries(found)
-        filled = sum(c.value is not None for row in rows[top - 1 : bottom] for c in row)
-        if filled > 1:
+    for first, last in merged:
+        if sum(value != "" for row in rows[first[0] : last[0] + 1] for value in row) > 1:
             raise TableError(
-                f"{where}: the cells {found} are merged; needed is a value in each cell, and one "
-                "name above each column: unmerge them and fill the blank ones"
+                f"{where}: the cells {_cell_name(first)}:{_cell_name(last)} are merged; needed is "
+                "a value in each cell, and one name above each column: unmerge them and fill the "
+                "blank ones"
             )
 
 
-def _check_formulas(file: Path, where: str, title: str, rows: Sequence[Sequence[Any]]) -> None:
-    """Refuse formulas whose value the file does not hold, as libraries write them."""
-    book = _opened(file, data_only=False)
-    try:
-        sheet = book[title]
-        sheet.reset_dimensions()
-        for row, written in zip(rows, sheet.iter_rows(max_row=max(len(rows), 1)), strict=False):
-            for i, cell in enumerate(written):
-                if cell.data_type == "f" and (i >= len(row) or row[i].value is None):
-                    raise TableError(
-                        f"{where}, cell {cell.coordinate}: a formula whose value is not in the "
-                        "file; open it in a spreadsheet program and save it"
-                    )
-    finally:
-        book.close()
-
-
-def _check_dates(where: str, rows: Sequence[Sequence[Any]]) -> None:
+def _check_dates(where: str, rows: Cells) -> None:
     """Refuse a date in a column of numbers: a spreadsheet takes 1.4 for the first of April."""
-    width = max(map(len, rows), default=0)
+    width = len(rows[0]) if rows else 0
+    if not any(isinstance(value, datetime.date) for row in rows for value in row):
+        return
     # lines before a table, as `date: 2024-05-31`, have a name and a value
-    wide = [row for row in rows if sum(c.value is not None for c in row) > min(2, width - 1)]
-    for i in range(width):
-        column = [row[i] for row in wide if i < len(row) and row[i].value is not None]
-        dates = [cell for cell in column if isinstance(cell.value, datetime.date)]
-        if dates and any(_is_number(cell.value) for cell in column):
+    wide = [i for i, row in enumerate(rows) if sum(v != "" for v in row) > min(2, width - 1)]
+    for column in range(width):
+        dates = [i for i in wide if isinstance(rows[i][column], datetime.date)]
+        if dates and any(type(rows[i][column]) in _NUMBERS for i in wide):
             raise TableError(
-                f"{where}, cell {dates[0].coordinate}: a date among numbers; the spreadsheet has "
-                "taken a number such as 1.4 for it: type it anew, in cells formatted as numbers"
+                f"{where}, cell {_cell_name((dates[0], column))}: a date among numbers; the "
+                "spreadsheet has taken a number such as 1.4 for it: type it anew, in cells "
+                "formatted as numbers"
             )
 
 
-def _texts(rows: Sequence[Sequence[Any]]) -> list[list[str]]:
-    in_percent: set[int] = set()  # columns whose head says %
+def _texts(rows: Cells, percents: set[Place]) -> list[list[str]]:
+    """The cells as texts, without blank ones at the ends of rows and without blank last rows."""
+    heads: set[int] = set()  # columns whose head says %
+    for i, row in enumerate(rows if percents else ()):
+        for j, value in enumerate(row):
+            if isinstance(value, str) and "%" in value:
+                heads.add(j)
+            elif (i, j) in percents and j in heads and type(value) in _NUMBERS:
+                row[j] = float(f"{100.0 * value:.15g}")
     found = []
     for row in rows:
-        texts = []
-        for i, cell in enumerate(row):
-            value = cell.value
-            if isinstance(value, str) and "%" in value:
-                in_percent.add(i)
-            elif i in in_percent and _is_number(value) and "%" in cell.number_format:
-                value = float(f"{100.0 * value:.15g}")
-            texts.append(_text(value))
+        texts = [str(v).removesuffix(".0") if type(v) is float else _text(v) for v in row]
+        while texts and not texts[-1]:
+            texts.pop()
         found.append(texts)
+    while found and not found[-1]:
+        found.pop()
     return found
 
 
 def _text(value: Any) -> str:
-    if value is None:
-        return ""
+    if isinstance(value, str):
+        return " ".join(value.split())  # a tab or a new line would divide the cell
     if isinstance(value, bool):
         return str(int(value))
-    if isinstance(value, datetime.datetime):
-        return value.isoformat(sep=" ")
+    if isinstance(value, datetime.date):
+        return f"{value}" if isinstance(value, datetime.datetime) else f"{value} 00:00:00"
     if isinstance(value, datetime.timedelta):
         seconds = value.total_seconds()
         return f"{int(seconds // 3600):02d}:{int(seconds % 3600 // 60):02d}:{seconds % 60:09.6f}"
-    # a tab or a new line would divide the cell
-    return " ".join(str(value).split()) if isinstance(value, str) else str(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return str(value)

@@ -4,7 +4,6 @@ import os
 import re
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
@@ -39,8 +38,3 @@ def test_every_command_is_there_without_entry_points(tmp_path):
         if words == ["--help"]:
             listed = {line.split()[0] for line in done.stdout.splitlines() if COMMAND.match(line)}
             assert listed == set(COMMANDS)
-
-
-def test_the_installed_entry_points_are_the_built_in_commands():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["entry-points"]["soilml.commands"] == COMMANDS

@@ -5,20 +5,6 @@ import pytest
 
 from soilml import Estimator
 from soilml.cli import progress
-from soilml.onboard.presentation import MOST_LINES, remarks_on_runs
-from soilml.remarks import Remark
-
-
-def test_many_runs_with_the_same_remark_have_one_line():
-    same, other = Remark("out-of-range", "the estimate is the prior"), Remark("other", "neither")
-    many = [(f"r{i}", same) for i in range(MOST_LINES + 1)]
-    (one,) = remarks_on_runs("run", many)
-    assert one.text == "run r0, r1, r2 and 8 more: the estimate is the prior"
-    assert one.about == tuple(name for name, _ in many) and one.code == "out-of-range"
-    few = remarks_on_runs("run", [*many[:MOST_LINES], ("other", other)])
-    assert few[0].text == "run r0: the estimate is the prior" and len(few) == MOST_LINES + 1
-    assert few[-1].text == "run other: neither" and few[-1].about == ("other",)
-    assert remarks_on_runs("run", []) == []
 
 
 @pytest.mark.parametrize("name", ["wheel", "wheel_linear"])

@@ -101,7 +101,7 @@ def test_relations_fitted_to_walks_answer_in_place_of_the_printed_ones(
         ("run,slip\na,0.2\n", [], "nothing was measured"),
         ("run,slip,torque_Nm\na,0.2,\n", [], "nothing was measured"),
         ("run,slip,sinkage_m\na,0.2,-0.01\n", [], "a midstance sinkage must be above 0 m"),
-        ("run,slip,torque_Nm\na,0.2,1.1\n", ["--torque-std", "-1"], "torque_std is -1"),
+        ("run,slip,torque_Nm\na,0.2,1.1\n", ["--torque-std", "-1"], "needed is 0 to 1e+06 N m"),
         ("run,torque_Nm\na,1.1\n", ["--known", "mud"], "needed is one of SSC-1, SSC-2"),
         ("run,torque_Nm\na,1.1\n", ["--known", "95,2e4"], "needed is one of SSC-1, SSC-2"),
         ("run,torque_Nm\na,1.1\n", ["--known", "es-3", "--by", "run"], "--by asks for a soil"),

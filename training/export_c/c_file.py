@@ -11,6 +11,7 @@ from typing import Any
 from soilml import __version__
 from soilml.onboard.metadata import read_fields
 from soilml.onboard.set_contract import MEMORY_INPUTS, SET_PREFIX
+from soilml.onboard.tracking.soil_tracker import DEFAULT_LENGTH
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 from training.export_c.c_text import array, number
 from training.export_c.functions import (
@@ -74,7 +75,12 @@ class CFile:
 
 
 def write_c(
-    model: Any, metadata: Mapping[str, str], name: str, origin: str, rows: int = ROWS_PER_CALL
+    model: Any,
+    metadata: Mapping[str, str],
+    name: str,
+    origin: str,
+    rows: int = ROWS_PER_CALL,
+    length: int = DEFAULT_LENGTH,
 ) -> CFile:
     """Translate a model file.
 
@@ -83,6 +89,7 @@ def write_c(
     name: Prefix of all C names that a user sees.
     origin: Name of the model file, for the comment at the head.
     rows: Rows that one step takes at most.
+    length: Rows that a tracker remembers.
 
     Raises `ModelFileError` for a graph with an operator, a type or a shape that is not known.
     """
@@ -127,7 +134,7 @@ def write_c(
         "factors": fields["pooling"].single_row_coverage_factor.tolist(),
         "z90": Z_90,
         "vague": NOT_IDENTIFIED_ABOVE,
-        "tracker": tracker_values(interface, sizes["memory_bytes"], rows) if depends else None,
+        "tracker": tracker_values(interface, sizes["memory_bytes"], length) if depends else None,
         **sizes,
     }
     source, header = (
@@ -175,7 +182,7 @@ def _sizes(
         work += interface.columns * BYTES[interface.precision] + 16  # rows that were added last
     triangle = interface.columns * (interface.columns + 1) // 2
     precision, shared = BYTES[interface.precision], 4 + len(interface.context)
-    memory = triangle * precision + shared * BYTES["float"] + 16
+    memory = triangle * precision + shared * BYTES["float"] + 24
     return {
         "memory_bytes": -(-memory // 8) * 8 if interface.sets else 0,
         "work_bytes": -(-work // 8) * 8,

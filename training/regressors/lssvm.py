@@ -2,55 +2,27 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, final
 
+import numpy as np
+
+from soilml.arrays import Floats
+from training.onnx_graph.builder import Graph
 from training.regressors.exact_solution import ExactSolution
 from training.regressors.fixed_size_solution import FixedSizeSolution
-from training.regressors.kernel_expansion import KernelExpansion
-
-
-class FixedSizeLSSVM(KernelExpansion):
-    """LS-SVM in the primal, on Nystrom features of a subset of the rows with large Renyi entropy.
-
-    Rows are read in parts: time is proportional to their number, memory hardly depends on it.
-
-    centres: Size of the subset, and of the exported model.
-    gamma, width: As for `LSSVM`.
-    random_state: Seed of the selection of centres.
-
-    Notes
-    -----
-    More centres reduce the error only while the function varies over less than their distance; the
-    inverse problem from a single reading does not.
-
-    References: Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; Williams and
-    Seeger, NIPS 13, 2001 (Nystrom); De Brabanter et al., Computational Statistics and Data Analysis
-    54(6), 2010 (large data sets).
-    """
-
-    type_name: ClassVar[str] = "fixed-size-lssvm"
-
-    def __init__(
-        self,
-        centres: int = 150,
-        gamma: float | None = None,
-        width: float | None = None,
-        random_state: int = 0,
-    ) -> None:
-        self.centres, self.random_state = centres, random_state
-        self.gamma, self.width = gamma, width
-
-    def solution_for(self, rows: int) -> FixedSizeSolution:
-        """The fixed-size solution."""
-        return FixedSizeSolution(self.centres, self.gamma, self.width, self.random_state)
-
+from training.regressors.gaussian_regressor import GaussianRegressor, Progress, Requirements
+from training.regressors.rbf_expansion import Expansion, Rows, rbf
 
 #: Most training rows that are solved exactly unless the solution is stated: 1.7 GB, some minutes.
 MOST_EXACT_ROWS = 20_000
+#: Elements of the kernel matrix that a prediction computes at a time.
+PREDICTED_AT_A_TIME = 4_000_000
 
 
-class LSSVM(KernelExpansion):
-    """Least squares support vector regression with bias, Gaussian kernel, any number of outputs.
+class LSSVM(GaussianRegressor):
+    r"""Least squares support vector regression with bias, Gaussian kernel, any number of outputs.
+
+    .. math:: f(x) = \sum_j \alpha_j k(x, c_j) + b
 
     solution ({"by-rows", "exact", "fixed-size"}): "exact" has a prototype for each row; its time
         grows with the cube of the number of rows and its memory with the square. "fixed-size" has
@@ -79,6 +51,8 @@ class LSSVM(KernelExpansion):
     type_name: ClassVar[str] = "lssvm"
     choices: ClassVar[dict[str, tuple[str, ...]]] = {"solution": ("by-rows", "exact", "fixed-size")}
 
+    expansion_: Expansion  # centres and weights in standardised units, and how they were selected
+
     def __init__(
         self,
         solution: str = "by-rows",
@@ -98,7 +72,97 @@ class LSSVM(KernelExpansion):
             return ExactSolution(self.gamma, self.width, self.random_state)
         return FixedSizeSolution(self.centres, self.gamma, self.width, self.random_state)
 
+    @final
+    def _fit_standardised(
+        self, x: Floats, z: Floats, validation: Rows | None, progress: Progress
+    ) -> Floats:
+        self.expansion_ = self.solution_for(len(x)).solve(x, z, validation, progress)
+        return self.expansion_.log_variances
+
+    @final
+    def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
+        found = self.expansion_
+        weights = np.hstack([found.alpha, found.log_variance_alpha])
+        chunk = max(PREDICTED_AT_A_TIME // len(found.centres), 1)
+        parts = [
+            rbf(x[i : i + chunk], found.centres, found.width) @ weights
+            for i in range(0, len(x), chunk)
+        ]
+        mean, log_variance = np.split(np.vstack(parts), 2, axis=1)
+        return mean + found.bias, log_variance + found.log_variance_bias
+
+    @final
+    def _input_factor(self) -> float:
+        """With x and centres divided by sqrt(2) width the kernel is exp(-|x - c|^2)."""
+        return float(1.0 / (np.sqrt(2.0) * self.expansion_.width))
+
+    @final
+    def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
+        found = self.expansion_
+        squared = graph.squared_distances(x, found.centres * self._input_factor())
+        kernel = graph.op("Exp", graph.op("Neg", squared))
+        q = found.alpha.shape[1]
+        weights = np.hstack([found.alpha, found.log_variance_alpha])
+        bias = np.concatenate([found.bias, found.log_variance_bias])
+        both = graph.affine(kernel, weights, bias)
+        return graph.columns(both, 0, q), graph.columns(both, q, 2 * q)
+
+    @final
+    def requirements(self, rows: int, inputs: int, outputs: int) -> Requirements:
+        """Number of prototypes, and the memory of the solution."""
+        solution = self.solution_for(rows)
+        size = f"{solution.name}, {solution.prototypes(rows)} prototypes"
+        return Requirements(size, solution.bytes(rows, inputs, outputs))
+
+    @final
+    def fitted_settings(self) -> str:
+        """Solution, number of centres, gamma and width."""
+        e = self.expansion_
+        return f"{e.solution}, {len(e.centres)} centres, gamma {e.gamma:.3g}, width {e.width:.3g}"
+
+    @final
+    def hyperparameter_search(self) -> list[tuple[float, Floats, Floats]]:
+        """Kernel width, gammas and held-out errors of each width; the selected one is the last."""
+        return self.expansion_.search
+
     def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """Gamma, width and solution; None where fitting again takes too long."""
-        fixed = super().learning_curve_parameters()
-        return None if fixed is None else fixed | {"solution": self.expansion_.solution}
+        """The chosen gamma, width and solution; None where fitting again takes too long."""
+        found = self.expansion_
+        if found.solution == "exact":
+            return None
+        chosen = {"gamma": found.gamma, "width": found.width, "solution": found.solution}
+        return {key: value for key, value in chosen.items() if key in self.get_params()}
+
+
+class FixedSizeLSSVM(LSSVM):
+    """LS-SVM in the primal, on Nystrom features of a subset of the rows with large Renyi entropy.
+
+    Rows are read in parts: time is proportional to their number, memory hardly depends on it.
+
+    centres: Size of the subset, and of the exported model.
+    gamma, width: As for `LSSVM`.
+    random_state: Seed of the selection of centres.
+
+    Notes
+    -----
+    More centres reduce the error only while the function varies over less than their distance; the
+    inverse problem from a single reading does not.
+
+    References: Suykens et al., Least Squares Support Vector Machines, 2002, chapter 6; Williams and
+    Seeger, NIPS 13, 2001 (Nystrom); De Brabanter et al., Computational Statistics and Data Analysis
+    54(6), 2010 (large data sets).
+    """
+
+    type_name: ClassVar[str] = "fixed-size-lssvm"
+    choices: ClassVar[dict[str, tuple[str, ...]]] = {}
+    solution = "fixed-size"
+
+    def __init__(
+        self,
+        centres: int = 150,
+        gamma: float | None = None,
+        width: float | None = None,
+        random_state: int = 0,
+    ) -> None:
+        self.centres, self.random_state = centres, random_state
+        self.gamma, self.width = gamma, width

@@ -8,15 +8,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
+    NumberFrom,
     add_effects_option,
     add_exact_model_option,
     add_gravity_options,
     add_model_and_runs,
     add_output,
-    add_picture_option,
     add_row_options,
     gravity_change,
-    number,
     slip_limit,
     whole_number_from,
 )
@@ -98,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_gravity_options(parser)
     parser.add_argument(
         "--target-load",
-        type=number,
+        type=NumberFrom(1e-3, 1e6, "N"),
         metavar="N",
         help="with --gravity: load of the wheel there (default: mean of [rover])",
     )
@@ -110,7 +109,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_exact_model_option(parser)
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw maps of the expected width over slip and load")
+    add_output(
+        parser, "--picture", "FILE.png", "draw maps of the expected width over slip and load"
+    )
 
 
 def _with_noise_of_rows(case: Case, readings: Readings) -> Case:

@@ -98,7 +98,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_by_option(parser)
     add_row_options(parser)
     add_exact_model_option(parser)
-    parser.add_argument("--as-usual", action="store_true", help=argparse.SUPPRESS)
     add_output(parser, "--out", "FILE.csv", "write the curves to this file")
     add_output(parser, "--picture", "FILE.png", "draw the curves and bands")
     add_report_option(parser)
@@ -186,11 +185,6 @@ def _check(args: argparse.Namespace) -> None:
     if args.picture is not None and args.by is not None:
         raise InputError(
             "--picture draws one soil; select it with --where run=NAME instead of --by"
-        )
-    if args.as_usual:
-        raise InputError(
-            "--as-usual is gone: the soil is averaged over typical errors, unless --exact-model "
-            "asks for the model as it is"
         )
     if args.trained is not None and args.exact_model:
         raise InputError("--exact-model applies to the rows, not to the file of --from")

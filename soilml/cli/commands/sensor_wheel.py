@@ -6,10 +6,9 @@ import argparse
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_gear_option,
     add_output,
-    add_picture_option,
-    number,
 )
 from soilml.errors import InputError, TableError
 
@@ -48,12 +47,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_gear_option(parser)
     parser.add_argument(
         "--diameter",
-        type=number,
+        type=NumberFrom(1e-4, 1.0, "m"),
         metavar="M",
         help="diameter of round sensors, whose averaging over the disc is removed",
     )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw k_x and pull against slip")
+    add_output(parser, "--picture", "FILE.png", "draw k_x and pull against slip")
 
 
 def run(args: argparse.Namespace) -> int:

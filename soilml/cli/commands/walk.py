@@ -6,9 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
+    NumberFrom,
     add_output,
-    add_picture_option,
-    number,
 )
 from soilml.errors import InputError
 
@@ -45,11 +44,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stiffness", help="stiffnesses in N/m^3, in place of --ground")
     parser.add_argument("--slip", help="commanded slips; without it the wheel rolls freely")
     parser.add_argument("--offset", action="store_true", help="with the stress at the surface")
-    parser.add_argument("--mass", type=number, metavar="KG", help="carried (default: 3.75 kg)")
-    parser.add_argument("--speed", type=number, metavar="RAD_S", help="default: 0.3 rad/s")
+    parser.add_argument(
+        "--mass", type=NumberFrom(0.01, 1e5, "kg"), metavar="KG", help="carried (default: 3.75 kg)"
+    )
+    parser.add_argument(
+        "--speed", type=NumberFrom(1e-3, 100.0, "rad/s"), metavar="RAD_S", help="default: 0.3 rad/s"
+    )
     add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw the walks, or their values against legs, stiffness or slip")
+    add_output(
+        parser,
+        "--picture",
+        "FILE.png",
+        "draw the walks, or their values against legs, stiffness or slip",
+    )
 
 
 def run(args: argparse.Namespace) -> int:

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_by_option,
     add_ignore_extra_option,
     add_output,
-    add_picture_option,
-    number,
 )
 from soilml.errors import InputError
 
@@ -78,14 +77,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
     )
-    parser.add_argument("--torque-std", type=number, default=0.0, metavar="NM", help="std, N m")
     parser.add_argument(
-        "--vibration-std", type=number, default=0.0, metavar="M_S2", help="std, m/s^2"
+        "--torque-std", type=NumberFrom(0.0, 1e6, "N m"), default=0.0, metavar="NM", help="std, N m"
+    )
+    parser.add_argument(
+        "--vibration-std",
+        type=NumberFrom(0.0, 1e4, "m/s^2"),
+        default=0.0,
+        metavar="M_S2",
+        help="std, m/s^2",
     )
     add_by_option(parser)
     add_ignore_extra_option(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_picture_option(parser, "draw the soil by sensor, or the slip by stride")
+    add_output(parser, "--picture", "FILE.png", "draw the soil by sensor, or the slip by stride")
 
 
 def run(args: argparse.Namespace) -> int:

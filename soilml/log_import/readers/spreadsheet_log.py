@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from soilml.io.spreadsheet import SheetRows
+from soilml.io.spreadsheet import sheet_rows
 from soilml.log_import.readers.delimited_text import recordings_of
 from soilml.log_import.recording import Recording
 
@@ -14,9 +14,9 @@ def read_spreadsheet_log(path: Path) -> list[Recording]:
 
     path: A spreadsheet, or `BOOK.xlsx#SHEET`.
 
-    Raises `InputError` where the sheet has no samples, and as `SheetRows` does.
+    Raises `InputError` where the sheet has no samples, and as `sheet_rows` does.
     """
-    rows = list(SheetRows(path))
+    rows = sheet_rows(path)
     width = max(map(len, rows), default=0)
     # cells hold no tab; a quotation mark, as of inches, must not seem to open a quoted cell
     lines = ["\t".join([*row, *[""] * (width - len(row))]).replace('"', "''") for row in rows]

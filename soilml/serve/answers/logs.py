@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from soilml.io.read_table import RUNS, read_table
-from soilml.io.spreadsheet import SheetRows, is_spreadsheet, sheets_with_cells, split_sheet
+from soilml.io.spreadsheet import is_spreadsheet, sheet_rows, sheets_with_cells, split_sheet
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.log_import.checks.table_hints import table_remarks
@@ -83,7 +83,7 @@ def is_table_of_runs(file: Path) -> bool:
 
         header = set(read_parquet(file)[0])
     elif is_spreadsheet(file):
-        header = set(next((row for row in SheetRows(file) if row), []))
+        header = set(next((row for row in sheet_rows(file) if row), []))
     elif file.suffix.lower() in (".csv", ".txt", ".tsv"):
         with file.open("rb") as opened:
             line = opened.readline(1 << 16).decode("utf-8-sig", errors="replace")

@@ -11,11 +11,13 @@ from conftest import WHEEL_ON_SAND
 
 from soilml import Model, Operating, Wheel, identify, read_case, soil
 from soilml.cli import main
+from soilml.config.simulator import emulator_of, read_runs
 from soilml.errors import InputError
 from soilml.experiment_design.simulator_runs import further_runs, space_filling_runs
 from soilml.io.read_table import read_table
 from soilml.io.text_tables import csv_text
 from soilml.numerics.gaussian_emulator import fit_emulator
+from soilml.quantities import column
 
 MODEL = (
     WHEEL_ON_SAND
@@ -119,6 +121,18 @@ def test_the_error_that_is_stated_is_that_of_runs_that_the_emulator_has_not_seen
         assert case.discrepancy[name].constant == stated
 
 
+def test_the_intervals_of_an_emulator_hold_the_runs_that_it_has_not_seen(folder, box):
+    """The process alone holds 0.53 to 0.86 of them where 0.9 is stated."""
+    gear, emulator = emulator_of(read_runs(folder / "simulated.csv"), box.model.gear, box.prior)
+    x = gear.values(np.random.default_rng(6).random((400, 5)))
+    columns = ("slip", "load_N", "cohesion_Pa", "friction_angle_rad", "shear_modulus_m")
+    forces = simulate(dict(zip(columns, x.T, strict=True)))
+    truth = np.stack([forces[column(name)] for name in gear.channels], axis=1)
+    u = gear.fractions(x)
+    held = np.mean(np.abs(emulator(u) - truth) < 1.645 * emulator.std(u), axis=0)
+    assert np.all(held > 0.85) and np.all(held < 0.98)
+
+
 def test_the_wheel_as_a_black_box_gives_the_soil_of_the_front_door(folder, box):
     rows = read_table(folder / "runs.csv")
     front = identify(read_case(folder / "front.toml"), rows, method="posterior")
@@ -166,12 +180,12 @@ def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
     own = {"python": 'python = "rig.py:forces"', "command": 'command = "PY rig.py {design} {runs}"'}
     text = MODEL + SIMULATOR + own[how].replace("PY", sys.executable) + "\n"
     (tmp_path / "model.toml").write_text(text)
-    assert main(["design-runs", "model.toml", "--count", "40"]) == 0
+    assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 0
     captured = capsys.readouterr()
     assert "40 runs in" in captured.err and "torque_Nm" in captured.out
     first = read_table("simulated.csv")
     assert len(first) == 40 and np.isfinite(first["torque_Nm"]).all()
-    assert main(["design-runs", "model.toml", "--count", "10"]) == 0
+    assert main(["design-runs", "model.toml", "--trust", "--count", "10"]) == 0
     both = read_table("simulated.csv")
     assert len(both) == 50 and both["slip"][:40].tolist() == first["slip"].tolist()
     if how == "python":
@@ -179,6 +193,32 @@ def test_design_runs_makes_runs_and_more_where_the_emulator_is_unsure(
         assert main(["design-runs", "model.toml", "--count", "5", "--out", "more.csv"]) == 0
         assert "torque_Nm" not in Path("more.csv").read_text()
         assert read_case("model.toml").simulator.error["torque_Nm"] > 0.0
+
+
+@pytest.mark.parametrize(
+    "own",
+    ['python = "rig.py:forces"', """command = 'sh -c "touch it_ran" {design} {runs}'"""],
+    ids=["python", "command"],
+)
+@pytest.mark.parametrize("words", [[], ["--out", "design.csv"]], ids=["printed", "written"])
+def test_a_model_file_runs_no_code_by_itself(tmp_path, monkeypatch, capsys, own, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig.py").write_text('from pathlib import Path\n\nPath("it_ran").touch()\n' + RIG)
+    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + own + "\n")
+    assert main(["design-runs", "model.toml", "--count", "40", *words]) == 0
+    assert not {"it_ran", "simulated.csv"} & {file.name for file in tmp_path.iterdir()}
+    said = capsys.readouterr().err
+    assert ("with --trust" in said) == (not words) and ("rig.py:forces" in said or "sh -c" in said
+                                                        or words)  # fmt: skip
+    main(["design-runs", "model.toml", "--count", "40", "--trust"])
+    assert Path("it_ran").exists()
+
+
+def test_trust_needs_code_that_it_trusts(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model.toml").write_text(MODEL + SIMULATOR)
+    assert main(["design-runs", "model.toml", "--trust"]) == 2
+    assert "neither python nor command" in capsys.readouterr().err
 
 
 def test_further_runs_lie_where_there_are_none(folder):
@@ -243,7 +283,7 @@ def test_simulators_that_fail_are_one_line(tmp_path, monkeypatch, capsys, body, 
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rig.py").write_text(f"def forces(design):\n    {body}\n")
     (tmp_path / "model.toml").write_text(MODEL + SIMULATOR + 'python = "rig.py:forces"\n')
-    assert main(["design-runs", "model.toml", "--count", "40"]) == 2
+    assert main(["design-runs", "model.toml", "--trust", "--count", "40"]) == 2
     captured = capsys.readouterr()
     assert said in captured.err and captured.err.count("\n") == 1
     assert not (tmp_path / "simulated.csv").exists()

@@ -36,5 +36,6 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
         "soilml.onboard.narrower_prior",
         "soilml.onboard.set_contract",
         "soilml.onboard.set_posterior",
+        "soilml.onboard.state_checksum",
         "soilml.quantities",
     }

@@ -74,17 +74,6 @@ def test_the_std_from_vibration_is_that_of_repeated_tests():
     assert errors == pytest.approx(0.5 * drawn[0].std[0], rel=0.1)
 
 
-def test_more_pairs_reduce_the_uncertainty():
-    law = TORQUE_SLIP["simplified"]
-    one = soil_from_torque(1.0, 0.2, law)
-    many = soil_from_torque(np.full(4, 1.0), np.full(4, 0.2), law)
-    assert many.std[0] == pytest.approx(one.std[0] / 2)
-
-
-def test_torque_noise_increases_the_uncertainty():
-    assert (soil_from_torque(1.0, 0.2, torque_std=0.2).std > soil_from_torque(1.0, 0.2).std).all()
-
-
 def test_invalid_pairs_are_refused():
     with pytest.raises(InputError, match="2 values of torque and 1 slips"):
         soil_from_torque([1.0, 2.0], [0.1])
