@@ -14,6 +14,7 @@ MODULES = (
     "training_bench",
     "sets",
     "flags",
+    "faults_on_board",
     "model_errors",
     "streams",
     "slip_unknown",
