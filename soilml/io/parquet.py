@@ -11,8 +11,9 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from soilml.errors import MissingLibraryError, TableError
+from soilml.errors import TableError
 from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
+from soilml.optional_imports import need
 
 
 def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
@@ -22,12 +23,9 @@ def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     Raises `OSError` where it is missing, `TableError` where a file is damaged or has a column
     twice, or where a folder has no file, files of different tables, or fewer rows than it should.
     """
-    try:
-        import pyarrow as pa
-    except ImportError:
-        raise MissingLibraryError(
-            f"{path}: reading Parquet needs pyarrow: pip install 'soilml[ground]'"
-        ) from None
+    need("pyarrow", "", what=f"{path}: reading Parquet")
+    import pyarrow as pa
+
     files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
     if not files:
         raise TableError(f"{path} is a folder without a Parquet file")
@@ -59,12 +57,9 @@ class ArrowStream(Protocol):
 
 def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
     """Arrow columns by name of a data frame; raises `TableError` for a column that occurs twice."""
-    try:
-        import pyarrow as pa
-    except ImportError:
-        raise MissingLibraryError(
-            "reading a data frame needs pyarrow: pip install 'soilml[ground]'"
-        ) from None
+    need("pyarrow", "", what="reading a data frame")
+    import pyarrow as pa
+
     arrow = pa.table(frame)
     if len(set(arrow.column_names)) < len(arrow.column_names):
         raise TableError("data frame: a column occurs twice")

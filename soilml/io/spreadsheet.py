@@ -16,7 +16,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.etree import ElementTree
 
-from soilml.errors import MissingLibraryError, TableError
+from soilml.errors import TableError
+from soilml.optional_imports import need
 
 ENDINGS = (".xlsx", ".xlsm")
 #: Most bytes of a spreadsheet once unpacked; most cells from the first to the last row and column
@@ -125,13 +126,9 @@ def _check_size(file: Path) -> None:
 def _opened(file: Path) -> Iterator[_Book]:
     """A spreadsheet, closed at the end; what fails within is a damaged part of it."""
     _check_size(file)
-    try:
-        from python_calamine import CalamineWorkbook
-    except ImportError:
-        raise MissingLibraryError(
-            f"{file}: reading spreadsheets needs python-calamine: pip install 'soilml[logs]'; or "
-            "save the sheet as CSV"
-        ) from None
+    need("python_calamine", "", "logs", what=f"{file}: reading spreadsheets")
+    from python_calamine import CalamineWorkbook
+
     try:
         with zipfile.ZipFile(file) as packed, CalamineWorkbook.from_path(file) as cells_of:
             yield _Book(file, packed, cells_of, _parts(packed), _percent_styles(packed))
