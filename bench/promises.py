@@ -45,10 +45,11 @@ def promises(estimator: Estimator, soils: int, rows: int, seed: int = SEED) -> l
     for _ in range(soils):
         truth = {f.path: float(f.prior.at(rng.random())) for f in free}
         points = [(float(rng.choice(SLIPS)), float(rng.choice(LOADS))) for _ in range(rows)]
-        shared = [
+        offset, load_gain, torque_gain = (
             usual[name] * float(rng.standard_normal())
             for name in ("slip_bias", "load_gain", "torque_gain")
-        ]
+        )
+        shared = (offset, 1.0 + load_gain, 1.0 + torque_gain)
         normal = rng.standard_normal(rows + 1)
         readings = _readings(case, truth, points, normal[:rows], shared)
         told = estimator.run(**readings)
@@ -67,7 +68,7 @@ def _readings(
     truth: dict[str, float],
     points: list[tuple[float, float]],
     normal: np.ndarray,
-    shared: list[float],
+    shared: tuple[float, float, float],
 ) -> dict[str, np.ndarray]:
     """Readings by name at slips and loads as they are read, with offset and gains of sensors."""
     offset, load_gain, torque_gain = shared
