@@ -98,6 +98,16 @@ def test_an_ended_run_goes_on_where_it_stopped(folders, monkeypatch):
     assert made[5:] == [("flat", 3)]
 
 
+def test_a_run_during_which_the_code_changes_is_not_written(folders, monkeypatch):
+    states = iter(["one", "one", "other"])
+    monkeypatch.setattr(runner, "source_state", lambda: next(states, "other"))
+    main([bench(squared)], ["squares", "--workers", "1", "--quick"])
+    with pytest.raises(SystemExit, match="changed meanwhile; run it again"):
+        states = iter(["one", "other"])
+        main([bench(squared)], ["squares", "--workers", "1"])
+    assert not list((folders / "results").iterdir())
+
+
 def test_an_unknown_bench_is_named(folders, capsys):
     with pytest.raises(SystemExit) as ended:
         main([bench(squared)], ["cubes"])
