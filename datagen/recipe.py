@@ -165,7 +165,7 @@ def parse_recipe(text: str, where: str) -> Recipe:
         content = None
     if not isinstance(content, dict):
         raise InputError(f"{where} is not a table in JSON")
-    settings = Settings(content, where, Path())
+    settings = Settings(content, where)
     recipe = _take_recipe(settings, EFFECTS)
     settings.finish()
     return recipe

@@ -17,10 +17,27 @@ from contextlib import contextmanager
 from typing import TypeVar
 
 T = TypeVar("T")
+#: Characters of a message: names of files and columns in it may be of any number and length.
+MOST_SHOWN = 1500
+_BEGINNING = 1000  # Of them, what was given; the rest is the end, what is needed
+
+
+def shortened(text: str) -> str:
+    """A message without its middle, where it is longer than `MOST_SHOWN` characters.
+
+    >>> len(shortened("x" * 10**6))
+    1500
+    """
+    if len(text) <= MOST_SHOWN:
+        return text
+    return f"{text[:_BEGINNING]} ... {text[_BEGINNING + 5 - MOST_SHOWN :]}"
 
 
 class SoilmlError(Exception):
-    """Root of the tree: what was given, what is needed, a hint, in one line."""
+    """Root of the tree: what was given, what is needed, a hint, in one line of bounded length."""
+
+    def __str__(self) -> str:
+        return shortened(super().__str__())
 
 
 class InputError(SoilmlError, ValueError):

@@ -58,8 +58,9 @@ class CompiledModel:
             self.structs[name] = type(name, (ctypes.Structure,), {"_fields_": members})
         self.library = ctypes.CDLL(str(library))
         for function, struct in (("empty_row", "row"), ("usual_context", "context")):
-            if made := self.structs.get(f"{self.name}_{struct}"):
-                getattr(self.library, f"{self.name}_{function}").restype = made
+            made, whole = self.structs.get(f"{self.name}_{struct}"), f"{self.name}_{function}"
+            if made and hasattr(self.library, whole):
+                getattr(self.library, whole).restype = made
         if f"{self.name}_work" in self.structs:
             self.work = self.new("work")
 

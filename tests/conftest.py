@@ -21,6 +21,10 @@ from compiled_c_fixtures import compiled as compiled
 from compiled_c_fixtures import exported as exported
 from compiled_c_fixtures import library as library
 from shared_files import shared_folder
+from slip_step_fixtures import slip_case as slip_case
+from slip_step_fixtures import slip_drive as slip_drive
+from slip_step_fixtures import slip_files as slip_files
+from slip_step_fixtures import slip_stream as slip_stream
 
 #: The reference wheel on dry sand.
 WHEEL_ON_SAND = """\

@@ -158,10 +158,11 @@ def test_the_page_names_the_files_of_each_kind():
             assert RELEASED[file] == row["kind"]
 
 
-def test_the_minimal_call_is_that_of_the_estimator(whole_file):
+def test_the_minimal_call_is_that_of_the_estimator_and_prints_nothing(whole_file, capfd):
     (block,) = re.findall(r"```python\n(.*?)```", PAGE, flags=re.DOTALL)
     names: dict = {}
     exec(block.replace("exported/wheel.onnx", str(whole_file)), names)
+    assert capfd.readouterr() == ("", "")
     rows = {name: names["feed"][name] for name in ("slip", "torque", "load")}
     expected = Estimator.load(whole_file).run(**rows)
     assert names["in_range"][0] == expected.in_range

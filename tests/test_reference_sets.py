@@ -23,17 +23,15 @@ from training.spec import read_any_wheel_spec
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
-from exact_sets import exact_set_posterior, si_values
+from exact_sets import exact_set_posterior, posterior_of_memory
 from reference_sets import (
     ANY_WHEEL,
     ONE_WHEEL,
     as_any_wheel_sets,
-    constant_noise_sets,
     generate_reference_sets,
     packaged_posteriors,
     with_noise_of_reading,
 )
-from set_comparison import posterior_of_memory
 
 pytestmark = pytest.mark.slow
 
@@ -108,26 +106,6 @@ def test_noise_of_the_reading_is_the_same_share_of_it(some):
         share = one.sets.origin.noise["torque"][1]
         assert after["torque_std"] / after["torque"] == pytest.approx(share)
         assert np.array_equal(after["sinkage_std"] > 1.0, before["sinkage_std"] > 1.0)
-
-
-def test_constant_noise_is_equal_in_all_rows_and_of_the_stated_size():
-    sets = constant_noise_sets(20)
-    limit = load_limit(packaged_posteriors(), sets)
-    truth = np.concatenate([r.sets.truth for r in sets])
-    std = np.sqrt(np.diagonal(limit.covariance, axis1=1, axis2=2))
-    assert np.sqrt(np.mean(((limit.mean - truth) / std) ** 2)) < 2.0
-    errors = []
-    for one, fed in zip(sets, with_noise_of_reading(sets), strict=True):
-        constant, share = one.sets.origin.noise["torque"]
-        assert one.rows == 32 and np.ptp(constant) == 0.0 and not share.any()
-        assert np.array_equal(fed.sets.readings["torque_std"], constant)
-        x = np.broadcast_to(one.sets.origin.x[0], (one.rows, 1, one.sets.origin.x.shape[1]))
-        y = one.family.responses(one.sets.origin.designs[0], x)
-        torque = si_values(one.sets, 0, y)[:, 0, 0]
-        assert 0.0099 < constant[0, 0] / np.median(torque) < 0.081
-        errors.append(np.ptp((one.sets.readings["torque"][0] - torque) / constant[0]))
-    # the range of 32 normal numbers is 4.1 standard deviations on average
-    assert 3.5 < np.median(errors) < 4.7
 
 
 STEPS = 36
@@ -258,3 +236,21 @@ def test_the_log_density_at_the_truth_is_that_of_the_exact_posterior(triples):
     gap = [e.log_density - m.log_density for _, m, e in triples]
     assert abs(np.mean(gap)) < 0.2
     assert np.mean([e.log_density for _, _, e in triples]) > 1.0  # both are far above the prior
+
+
+def test_sets_are_scored_beside_their_exact_posterior():
+    import sets
+    from runner import rows_of
+
+    case = {"name": f"wheel, {ONE_WHEEL}", "rows": 6, "count": 3}
+    rows = rows_of([{"case": case, "rows": sets.measured(case)}])
+    assert len(rows) == 3 and all(row["answered"] for row in rows)
+    ratio, _ = sets.rmse_ratio(rows)
+    assert np.all((ratio > 0.7) & (ratio < 1.4))
+    exact = [row | {"error": [row["error"][1]] * 2, "log_density": [2.0, 2.3]} for row in rows]
+    assert sets.rmse_ratio(exact)[0] == pytest.approx(1.0)
+    text = sets.tables([row | {"held90": np.ones((2, 3), bool)} for row in exact])
+    assert "| 0.300 |" in text and "100.0% / 100.0%" in text
+    even = np.random.default_rng(3).random((2000, 1))
+    assert sets.uniformity_p_values(even, (0.1, 0.5, 0.9))[0] > 0.01
+    assert sets.uniformity_p_values(even**2, (0.1, 0.5, 0.9))[0] < 1e-6

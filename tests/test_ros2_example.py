@@ -3,6 +3,7 @@
 import ast
 import math
 import sys
+import zipfile
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -367,3 +368,54 @@ def test_restart_forgets_the_soil():
     own.restart()
     assert own.soil().values["rows_remembered"] == 0.0
     assert own.soil().level is Level.WARN
+
+
+def test_the_state_is_written_as_the_rover_goes(tmp_path):
+    """Once a stop without notice lost the rows of the whole drive."""
+    path = tmp_path / "rows.npz"
+    own = logic(state_file=str(path), save_every=4.0)
+    assert not path.exists()
+    counts = []
+    for message in contents(drive(20)):
+        if play(own, [message]):
+            counts.append(logic(state_file=str(path)).soil().values["rows_remembered"])
+    assert counts[:6] == [1, 1, 1, 1, 5, 5] and counts[-1] >= 15
+    assert [file.name for file in tmp_path.iterdir()] == ["rows.npz"]
+    own.restart()
+    assert logic(state_file=str(path)).soil().values["rows_remembered"] == 0
+
+
+def test_a_state_that_cannot_be_written_is_told_and_the_drive_goes_on(tmp_path):
+    folder = tmp_path / "state"
+    folder.mkdir()
+    own = logic(state_file=str(folder / "rows.npz"), save_every=1.0)
+    folder.rmdir()
+    assert len(play(own, contents(drive(10)))) == 9
+    told = own.soil()
+    assert told.level is Level.WARN
+    assert told.message.endswith("; state_file cannot be written: No such file or directory")
+    folder.mkdir()
+    play(own, contents(drive(10, begin=110)))
+    assert own.soil().level is Level.OK
+
+
+def test_a_large_state_file_is_not_read(tmp_path):
+    path = tmp_path / "rows.npz"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as out:
+        out.writestr("system.npy", bytes(16 << 20))
+    assert path.stat().st_size < 100_000
+    told = logic(state_file=str(path)).remark
+    assert "is not used" in told and "holds 16 MB; a state of a tracker has at most 8 MB" in told
+
+
+def test_the_noise_of_the_shipped_parameters_does_not_stop_a_wheel_of_constant_load():
+    """All rows but the first two were stuck."""
+    text = (ROOT / "examples" / "ros2" / "config" / "wheel.yaml").read_text()
+    names = ("torque_noise", "slip_noise", "load_noise")
+    lines = [line.partition(":") for line in text.splitlines()]
+    shipped = {k.strip(): ast.literal_eval(v.strip()) for k, _, v in lines if k.strip() in names}
+    assert min(shipped["load_noise"]) > 0.0
+    own = logic(**shipped)
+    play(own, contents(drive(30)))
+    values = own.soil().values
+    assert values["rows_stuck"] == 0 and values["rows_remembered"] == 29

@@ -117,6 +117,29 @@ def test_rows_without_an_answer_have_a_flag_and_no_twist(node_module, store, dri
     assert node.logic._state.recent[1] < 0.0
 
 
+@pytest.mark.parametrize(
+    ("field", "flag", "answered"),
+    [("torque", "torque-set-aside", True), ("rim_speed", "row-not-possible", False)],
+)
+def test_a_wild_reading_is_flagged_and_the_next_rows_are_answered(
+    node_module, store, drive, field, flag, answered
+):
+    """The twists that follow were not a number, and called determined, until the node was started
+    again."""
+    node = node_module().SlipNode()
+    play(node, messages(store, drive, range(45, 50)))
+    wild = SimpleNamespace(rim_speed=drive.rim_speed, torque=drive.torque, slope=drive.slope)
+    setattr(wild, field, np.where(np.arange(4) == 1, 1e20, getattr(drive, field)))
+    play(node, messages(store, wild, range(50, 52), begin=105))
+    play(node, messages(store, drive, range(52, 60), begin=107))
+    told = [message.status[0].message for message in node.published["slip_flags"]]
+    assert [flag in text for text in told[5:8]] == [True, True, False]
+    twists = [message.twist for message in node.published["slip_twist"]]
+    assert len(twists) == len(told) - (0 if answered else 2)
+    for twist in twists:
+        assert np.isfinite([twist.twist.linear.x, *twist.covariance]).all()
+
+
 def test_a_message_without_an_orientation_is_no_attitude(node_module, store):
     node = node_module().SlipNode()
     node.callbacks["imu"](store.of("sensor_msgs", "Imu"))
@@ -130,6 +153,7 @@ def test_a_message_without_an_orientation_is_no_attitude(node_module, store):
         ({"joints": ["a"]}, "names 1; "),
         ({"joint_signs": [1.0, 1.0, 2.0, 1.0]}, "other numbers than 1.0 and -1.0"),
         ({"wheel_radius": 0.0}, "wheel_radius is 0; it must be above zero"),
+        ({"wheel_radius": 0.2}, "wheel_radius is 0.2; "),
         ({"wheel_radius": "wide"}, "wheel_radius is 'wide'; needed: radius of the wheels, m"),
         ({"joints": "flfr"}, "the parameter joints is 'flfr'; needed is a list"),
         ({"joints": 4}, "the parameter joints is 4; needed is a list"),

@@ -28,14 +28,17 @@ WHEEL = {
     "cohesion_max": 3000.0,
     "shear_modulus_max": 0.03,
 }
-#: Python, onnxruntime and numpy: the oldest that are allowed, and releases that fused nodes with
-#: names of their own making; the newest are those of the other tests.
+#: Python, onnxruntime and numpy: the oldest that are allowed, releases that fused nodes with names
+#: of their own making, the newest of Python 3.10, by the file with
+#: hashes, and the newest that is allowed.
 MATRIX = [
     ("3.10", "1.19.0", "2.1.0"),
     ("3.11", "1.19.0", "2.1.0"),
     ("3.11", "1.20.1", None),
     ("3.11", "1.21.1", None),
     ("3.11", "1.22.1", None),
+    (FROM_LOCK := ("3.10", "1.23.2", "2.2.6")),
+    ("3.11", "1.32.0", None),
 ]
 #: The oldest of all in `make test`, the others in `make test-long`.
 PARAMETERS = [
@@ -106,6 +109,8 @@ def board(request):
         subprocess.run([interpreter, "-m", "venv", "--clear", folder], check=True)
         wanted = [f"onnxruntime=={runtime}", *([f"numpy=={numpy}"] if numpy else [])]
         wanted += ["tomli"] if version == "3.10" else []
+        if request.param == FROM_LOCK:
+            wanted = ["--require-hashes", "-r", ROOT / "tools" / "supply" / "onboard-hashes.txt"]
         command = [own, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *wanted]
         subprocess.run([str(part) for part in command], check=True)
         complete.touch()
@@ -152,12 +157,13 @@ def test_the_command_line_estimates_on_the_oldest_python(board, whole_file, tmp_
     assert float(found["friction_angle_rad"]) == pytest.approx(expected["friction_angle"][0], 1e-3)
 
 
-def test_the_matrix_begins_where_the_package_does():
+def test_the_matrix_begins_and_ends_where_the_package_does():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     needed = {r.name: r.specifier for r in map(Requirement, project["dependencies"])}
     for version, runtime, numpy in MATRIX:
         assert Version(runtime) in needed["onnxruntime"]
         assert numpy is None or Version(numpy) in needed["numpy"]
         assert f"Programming Language :: Python :: {version}" in project["classifiers"]
-    oldest = min(Version(runtime) for _, runtime, _ in MATRIX)
-    assert Version(f"{oldest.major}.{oldest.minor - 1}.9") not in needed["onnxruntime"]
+    runtimes = [Version(runtime) for _, runtime, _ in MATRIX]
+    for end, step in ((min(runtimes), -1), (max(runtimes), 1)):
+        assert Version(f"{end.major}.{end.minor + step}.0") not in needed["onnxruntime"]

@@ -14,24 +14,28 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 TOOLS = ROOT / ".venv-supply" / "bin"
-#: File with hashes, and the extras of pyproject.toml that it is for.
-LOCKED = {"onboard-hashes.txt": (), "ground-hashes.txt": ("ground", "logs")}
+#: Files with hashes, in the folder `SUPPLY`: extras of pyproject.toml, and the oldest Python.
+SUPPLY = Path("tools") / "supply"
+LOCKED = {
+    "onboard-hashes.txt": ((), "3.10"),
+    "ground-hashes.txt": (("ground", "logs", "map", "serve"), "3.11"),
+}
 
 
 def lock_command(tools: Path, name: str) -> list[str]:
     """The command that writes the file of `LOCKED`: versions of constraints.txt with hashes."""
-    extras = [f"--extra={extra}" for extra in LOCKED[name]]
+    extras = [f"--extra={extra}" for extra in LOCKED[name][0]]
     return [
         *(str(tools / "uv"), "pip", "compile", "pyproject.toml", *extras),
-        *("--constraint=constraints.txt", "--universal", "--python-version=3.11"),
+        *("--constraint=constraints.txt", "--universal", f"--python-version={LOCKED[name][1]}"),
         *("--generate-hashes", "--no-annotate", "--no-header", "--quiet"),
-        f"--output-file={name}",
+        f"--output-file={SUPPLY / name}",
     ]
 
 
 def locked_names(name: str) -> list[str]:
     """Names of the packages in a lock file, in order."""
-    lines = (ROOT / name).read_text().splitlines()
+    lines = (ROOT / SUPPLY / name).read_text().splitlines()
     return [line.split("==")[0] for line in lines if "==" in line and not line.startswith(" ")]
 
 
@@ -73,7 +77,12 @@ def main(task: str) -> int:
         for name in LOCKED:
             target = Path("build") / name.replace("-hashes.txt", ".cdx.json")
             (ROOT / target).parent.mkdir(exist_ok=True)
-            words = ["requirements", name, "--output-reproducible", f"--output-file={target}"]
+            words = [
+                "requirements",
+                str(SUPPLY / name),
+                "--output-reproducible",
+                f"--output-file={target}",
+            ]
             subprocess.run([str(TOOLS / "cyclonedx-py"), *words], cwd=ROOT, check=True)
             print(target)
     elif task == "licences":
@@ -81,7 +90,12 @@ def main(task: str) -> int:
         for package in locked_names("ground-hashes.txt"):
             print(f"| {package} | {licence(package)} |")
     else:
-        words = ["--requirement=ground-hashes.txt", "--no-deps", "--disable-pip", "--format=json"]
+        words = [
+            f"--requirement={SUPPLY / 'ground-hashes.txt'}",
+            "--no-deps",
+            "--disable-pip",
+            "--format=json",
+        ]
         ran = subprocess.run(
             [str(TOOLS / "pip-audit"), *words], cwd=ROOT, capture_output=True, text=True
         )

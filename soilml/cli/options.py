@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
+from soilml.io.bounds import ROWS
 from soilml.io.cell_text import read_number, read_whole_number
 
 if TYPE_CHECKING:
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
 
 FILE_SUFFIXES = (".html", ".json", ".csv", ".toml", ".pdf")  # Of no folder that is made
 REPORT_FILES = ("report.html", "report.json")  # Files of the folder of --report
-MAX_ROWS = 10_000_000  # Rows beyond which a table would not fit into the memory of a small machine
 _MAX_SHOWN = 80  # A longer option value is cut in an error message
 
 
@@ -255,6 +256,26 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(f"{text!r} given; needed is a number") from None
 
 
+@dataclass(frozen=True)
+class NumberFrom:
+    """The type of an option that is a number from `lower` to `upper`, in `unit`.
+
+    Raises `ArgumentTypeError` for anything else.
+    """
+
+    lower: float
+    upper: float
+    unit: str = ""
+
+    def __call__(self, text: str) -> float:
+        value = number(text)
+        if not self.lower <= value <= self.upper:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} given; needed is {self.lower:g} to {self.upper:g} {self.unit}".rstrip()
+            )
+        return value
+
+
 def slip_limit(text: str) -> float:
     """A slip between 0 and 1; raises `ArgumentTypeError` for anything else."""
     value = number(text)
@@ -332,8 +353,8 @@ def parse_numbers(option: str, text: str) -> NDArray[np.float64]:
     try:
         if ":" in text:
             start, stop, count = text.split(":")
-            if read_whole_number(count) > MAX_ROWS:
-                raise InputError(f"{option} is {text!r}; at most {MAX_ROWS} values are possible")
+            if read_whole_number(count) > ROWS.most:
+                raise InputError(f"{option} is {text!r}; at most {ROWS.most} values are possible")
             with np.errstate(all="ignore"):
                 values = np.linspace(
                     read_number(start), read_number(stop), read_whole_number(count)

@@ -82,10 +82,11 @@ def fail(text: str, status: int, program: str = "soilml") -> int:
     """Print `text` as one line on standard error; returns the exit status."""
     from contextlib import suppress
 
+    from soilml.errors import shortened
     from soilml.io.cell_text import escaped
 
     try:
-        print(f"{program}: {' '.join(escaped(text).split())}", file=sys.stderr)
+        print(f"{program}: {shortened(' '.join(escaped(text).split()))}", file=sys.stderr)
     except OSError:  # a full device: the status says what the line cannot
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stderr.fileno())

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -57,7 +56,7 @@ def recipe_case(text: str, source: str) -> Case | None:
     Raises `InputError` for a text that is not a recipe; `source` names the file that holds it.
     """
     content = recipe_content(text, source)
-    return take_case(Settings(content, f"recipe of {source}", Path())) if content else None
+    return take_case(Settings(content, f"recipe of {source}")) if content else None
 
 
 def check_wheel_columns(

@@ -47,8 +47,7 @@ _VALUE = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
 def take_quantity(settings: Settings, key: str, unit: str) -> float:
     """The value of `key` in a parameter's SI unit: a number, or a text with a unit.
 
-    >>> from pathlib import Path
-    >>> settings = Settings({"friction_angle": "33 deg"}, "model.toml [soil]", Path())
+    >>> settings = Settings({"friction_angle": "33 deg"}, "model.toml [soil]")
     >>> round(take_quantity(settings, "friction_angle", "rad"), 4)
     0.576
     """
@@ -124,7 +123,7 @@ def take_gears(
         tables[name] = Settings(
             named.take(name, dict, f"a table [gears.{name}]"),
             f"{settings.where} [gears.{name}]",
-            settings.folder,
+            settings.files,
         )
     gears, priors, suspected = {}, {}, []
     for name, own in tables.items():

@@ -36,14 +36,17 @@ class Simulator:
 
     Attributes
     ----------
-    table
-        File of the runs, beside the model file.
-    python, command
-        How a run is made: FILE.py:FUNCTION, or a command with {design} and {runs}; "" for neither.
+    runs
+        File of the runs; None where the model file has them within it.
+    python, function
+        The Python file and its function that make runs; None and "" where none does.
+    command
+        The command with {design} and {runs} that makes runs; "" for none. Neither is run by what
+        reads a file.
     slip, load
         Ranges of the design, load in N.
     folder
-        Folder of the model file.
+        Folder in which the command is run, that of the model file.
     gear
         The gear of the model file.
     error
@@ -54,27 +57,30 @@ class Simulator:
         The runs: those of the file, or of the key `runs`, by which a recipe has them within it.
     """
 
-    table: str
-    python: str
+    runs: Path | None
+    python: Path | None
+    function: str
     command: str
     slip: tuple[float, float]
     load: tuple[float, float]
-    folder: Path
+    folder: Path | None
     gear: Gear
     error: dict[str, float] = field(default_factory=dict)
     states_discrepancy: bool = False
     runs_read: Table | None = field(default=None, repr=False, compare=False)
 
     @property
-    def runs(self) -> Path:
-        """The file of the runs."""
-        return self.folder / self.table
+    def code(self) -> str:
+        """What makes runs, as the model file has it; "" where nothing does."""
+        return self.command or (f"{self.python}:{self.function}" if self.python else "")
 
     def lines(self) -> list[str]:
-        """The table as lines of TOML, with the full path of the runs."""
-        own = {"python": self.python, "command": self.command}
-        runs = f"table = '{self.runs.resolve()}'"
-        if not self.table:
+        """The table as lines of TOML, with the full paths of its files."""
+        python = f"{self.python.resolve()}:{self.function}" if self.python else ""
+        own = {"python": python, "command": self.command}
+        if self.runs is not None:
+            runs = f"table = '{self.runs.resolve()}'"
+        else:
             columns = (f"{key} = {values}" for key, values in self.columns().items())
             runs = f"runs = {{ {', '.join(columns)} }}"
         return [
@@ -98,12 +104,19 @@ class Simulator:
 def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     """Read the table [simulator]; raises `InputError` for what is missing, unknown or wrong."""
     own_runs = _take_runs(settings) if "runs" in settings else None
-    table = settings.text("table") if own_runs is None else ""
-    python, command = settings.text("python", ""), settings.text("command", "")
-    if python and command:
+    runs = settings.file("table") if own_runs is None else None
+    called, command = settings.text("python", ""), settings.text("command", "")
+    if called and command:
         settings.fail("python and command are both given; needed is one of them")
-    if python and python.rpartition(":")[0] == "":
-        settings.fail(f"python is {python!r}; needed is FILE.py:FUNCTION")
+    file, _, function = called.rpartition(":")
+    if called and not file:
+        settings.fail(f"python is {called!r}; needed is FILE.py:FUNCTION")
+    try:
+        python = settings.files.path(file) if called else None
+        if command:
+            settings.files.path(command.split()[0])
+    except InputError as error:
+        settings.fail(f"{'python' if called else 'command'} {error}")
     if command and not ("{design}" in command and "{runs}" in command):
         settings.fail(
             f"command is {command!r}; it must contain {{design}}, the table that it reads, and "
@@ -115,7 +128,9 @@ def take_simulator(settings: Settings, gear: Gear) -> Simulator:
     if load[0] <= 0.0:
         settings.fail("load_N must be above zero")
     settings.finish()
-    return Simulator(table, python, command, slip, load, settings.folder, gear, runs_read=own_runs)
+    return Simulator(
+        runs, python, function, command, slip, load, settings.files.folder, gear, runs_read=own_runs
+    )
 
 
 def _take_runs(settings: Settings) -> Table:
@@ -149,12 +164,14 @@ def emulated(
     """
     need("scipy", "", what="a model file with [simulator]")
     table = simulator.runs_read
-    if table is None and not simulator.runs.is_file():
-        raise InputError(
-            f"{simulator.runs}: there is no such file; `soilml design-runs` proposes the runs of "
-            "[simulator], and makes them where it has python or command"
-        )
-    table = read_runs(simulator.runs) if table is None else table
+    if table is None:
+        assert simulator.runs is not None
+        if not simulator.runs.is_file():
+            raise InputError(
+                f"{simulator.runs}: there is no such file; `soilml design-runs` proposes the runs "
+                "of [simulator], and makes them where it has python or command"
+            )
+        table = read_runs(simulator.runs)
     gear, emulator = emulator_of(table, simulator.gear, prior)
     _check_soil(gear, soil, prior, table.source)
     error = {column(name): float(e) for name, e in zip(gear.channels, emulator.error, strict=True)}

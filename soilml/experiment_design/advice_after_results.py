@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,11 +12,8 @@ from soilml.arrays import Floats
 from soilml.config.case import Case, take_case
 from soilml.errors import FitError, InputError, SoilmlError
 from soilml.experiment_design.design import Advice, CandidateGrid, advise, candidate_grid
-from soilml.experiment_design.parameter_samples import (
-    ParameterSamples,
-    samples_of_moments,
-    samples_of_rows,
-)
+from soilml.experiment_design.expected_answers import advise_by_answers
+from soilml.experiment_design.parameter_samples import ParameterSamples, samples_of_rows
 from soilml.experiment_design.presentation import next_row_remarks
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
@@ -25,7 +21,7 @@ from soilml.identification.fit import Fit
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
 from soilml.physics.operating_point import COVARIATES, Operating
-from soilml.quantities import CHANNELS, column
+from soilml.quantities import CHANNELS
 from soilml.remarks import Remark
 
 if TYPE_CHECKING:
@@ -34,8 +30,6 @@ if TYPE_CHECKING:
 
 #: Samples and simulated readings of an advice that accompanies a result: takes half a second.
 QUICK_SAMPLES, QUICK_OUTCOMES = 768, 128
-#: Rows up to which the exact posterior after an estimate takes at most half a second too.
-MAX_EXACT_ROWS = 4
 SEQUENCE_LENGTH = 2  # Rows in the planned sequence of such an advice
 #: Tables and keys of a recipe that a case contains, or that concern the sampling of rows only.
 CASE_KEYS = {"gear", "soil", "effect", "noise", "discrepancy", "operating", "rows", "seed", "runs"}
@@ -68,44 +62,43 @@ def advice_after_fit(
         return None
 
 
-def advice_after_estimate(
-    estimator: Estimator, mean: Floats, covariance: Floats, readings: Mapping[str, Floats]
-) -> list[Remark]:
-    """Remarks on the next measurement after an estimate, (q,) and (q, q), of readings (rows,).
+def advice_of_file(
+    estimator: Estimator,
+    mean: Floats,
+    covariance: Floats,
+    readings: Mapping[str, Floats],
+    box: Mapping[str, tuple[float, float]] | None = None,
+) -> Advice | None:
+    """Advice after an estimate, (q,) and (q, q), of readings (rows,); None where none is possible.
 
-    The present width is that of the estimate. The effect of a next row on it follows from the exact
-    posterior of up to `MAX_EXACT_ROWS` rows, and for more rows from mean and covariance. Model,
-    prior and noise are those of the recipe in the file; slips, loads and sensors are those of its
-    training. No remarks where the recipe has what a case lacks: sensor bias, vibration, speed, or
-    slip as a target.
+    What a next row leaves is what the file itself answers with that row, within the narrower prior
+    `box` if there is one: its errors of sensors and of the model are in the expectation as they are
+    in the answer. Model, prior and noise of simulated readings are those of the recipe in the file;
+    slips, loads and sensors are those of its training. None where the recipe has what a case lacks:
+    sensor bias, vibration, speed, or slip as a target.
     """
     trained = _trained_for(estimator)
     if trained is None:
-        return []
+        return None
     case, ranges = trained
-    slip, load = (np.atleast_1d(readings[key]) for key in ("slip", "load"))
-    current = np.sqrt(np.diag(covariance)) / estimator.prior.std
     try:
-        free = select_free(case, None)
-        if slip.size <= MAX_EXACT_ROWS:
-            rows = Table({column(n): np.atleast_1d(readings[n]) for n in estimator.inputs})
-            samples = samples_of_rows(
-                case, usable_readings(case, rows), free, QUICK_SAMPLES, exact_model=True
-            )
-        else:
-            samples = samples_of_moments(free, estimator.names, mean, covariance, QUICK_SAMPLES)
-        advice = _quick(
-            case,
-            samples,
-            ranges,
-            Operating(slip=slip, load=load),
-            channels=estimator.inputs,
-            parameters=estimator.names,
-            current_fraction=current,
-        )
+        return advise_by_answers(estimator, case, ranges, mean, covariance, readings, box or {})
     except (SoilmlError, ValueError):  # LinAlgError is one: no covariance, or none of this case
+        return None
+
+
+def advice_after_estimate(
+    estimator: Estimator,
+    mean: Floats,
+    covariance: Floats,
+    readings: Mapping[str, Floats],
+    box: Mapping[str, tuple[float, float]] | None = None,
+) -> list[Remark]:
+    """Remarks on the next measurement; arguments as for `advice_of_file`."""
+    advice = advice_of_file(estimator, mean, covariance, readings, box)
+    if advice is None:
         return []
-    return next_row_remarks(advice, "this row" if slip.size == 1 else "these rows")
+    return next_row_remarks(advice, "this row" if np.size(readings["slip"]) == 1 else "these rows")
 
 
 def mean_covariates(at: Operating) -> dict[str, float]:
@@ -120,9 +113,7 @@ def _quick(
     ranges: CandidateGrid,
     driven: Operating,
     *,
-    channels: tuple[str, ...] | None = None,
-    parameters: tuple[str, ...] | None = None,
-    current_fraction: Floats | None = None,
+    current_fraction: Floats,
 ) -> Advice:
     return advise(
         case,
@@ -131,8 +122,6 @@ def _quick(
         measured=driven,
         count=SEQUENCE_LENGTH,
         covariates=mean_covariates(driven),
-        channels=channels,
-        parameters=parameters,
         current_fraction=current_fraction,
         outcome_count=QUICK_OUTCOMES,
     )
@@ -147,7 +136,7 @@ def _trained_for(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
         recipe = json.loads(estimator.metadata["recipe"])
         if recipe.keys() - CASE_KEYS or recipe["operating"].keys() - {"slip", "load_N"}:
             return None
-        case = take_case(Settings(recipe, estimator.path, Path()))
+        case = take_case(Settings(recipe, estimator.path))
         ends = [recipe["operating"][key] for key in ("slip", "load_N")]
         pairs = [entry["range"] if isinstance(entry, dict) else entry for entry in ends]
         slips, loads = ([float(x) for x in np.linspace(a, b, GRID_SIZE)] for a, b in pairs)

@@ -109,6 +109,9 @@ def further_runs(case: Case, table: Table, count: int, seed: int = 0) -> Columns
 def run_simulator(simulator: Simulator, design: Mapping[str, Floats]) -> dict[str, Any]:
     """The design (n,) with the outputs of the simulator, and status where it states one.
 
+    It runs the Python file or the command of the model file, which may do all that its user may:
+    call it for a file that you would run yourself.
+
     The first run is made twice. Raises `InputError` where the simulator fails, gives no number,
     lacks a channel or rows, or answers the same question in two ways.
     """
@@ -162,8 +165,8 @@ def _answers(simulator: Simulator, design: Mapping[str, Floats]) -> dict[str, An
 
 def _called(simulator: Simulator, design: Mapping[str, Floats]) -> Mapping[str, Any]:
     """The outputs of FILE.py:FUNCTION, which is called with the columns of the design."""
-    name, _, function = simulator.python.rpartition(":")
-    path = simulator.folder / name
+    path, function = simulator.python, simulator.function
+    assert path is not None
     if not path.is_file():
         raise InputError(f"[simulator] python: {path}: there is no such file")
     spec = importlib.util.spec_from_file_location(path.stem, path)

@@ -9,6 +9,7 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.errors import FitError, InputError, TableError
+from soilml.fitting.faulty_readings import sound_rows
 from soilml.fitting.operating_points import operating_points, with_rover_columns
 from soilml.fitting.readings import (
     LEAST_RELATIVE_STD,
@@ -39,13 +40,14 @@ def usable_readings(case: Case, table: Table, *, drifts: bool = True) -> Reading
     the case's, `FitError` where no reading remains or all standard deviations of one are zero.
     """
     models = (case.model, *case.gears.values())
+    table, faults = sound_rows(case, table)
     if drifts or any(effect.about.uses for model in models for effect in model.effects):
         table = with_order_columns(case, table, FROM_ORDER if drifts else None)
     table, excluded = answered_rows(with_rover_columns(case, table))
     check_wheel_size(case, table)
     if isinstance(case.model.gear, EmulatedGear):
         check_design(case.model.gear, table)
-    notes = [*_remarks_on(case, table), *excluded]
+    notes = [*faults, *_remarks_on(case, table), *excluded]
     found = stack_readings(case, table)
     if not found.channels:
         raise FitError(f"{table.source}: no reading of {', '.join(map(column, CHANNELS))}")

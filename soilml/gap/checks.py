@@ -23,9 +23,6 @@ MIN_REPEAT_DEGREES_OF_FREEDOM = 6
 #: fewer, the noise cannot be told from the declared one.
 MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS = 4, 8
 ONE_LOAD = "one-load"  # Code of the obstacle that one load cannot test the soil parameters
-#: Fraction of copied rows above which the note on them is a warning, and rows from which a run that
-#: repeats another one exactly is a copy of it: a row or two can agree by chance.
-MANY_COPIES, COPIED_ROWS = 0.2, 3
 
 
 @dataclass(frozen=True)
@@ -132,40 +129,6 @@ CHECKS: tuple[Callable[[CheckedData], Iterator[Finding]], ...] = (
     _check_count,
     _check_variety,
 )
-
-
-def without_copies(table: Table) -> tuple[Table, list[Remark]]:
-    """The table without exact copies of earlier rows and runs, and a remark on how many there were.
-
-    A run is a copy if its rows are those of an earlier run but for their name, at least
-    `COPIED_ROWS` of them.
-    """
-    names = [n for n in table.columns if n not in ("source", "run")]
-    cells = list(zip(*[[str(v) for v in table[n]] for n in names], strict=True))
-    run = [str(v) for v in table["run"]] if "run" in table else [""] * len(table)
-    rows: dict[str, dict[tuple[str, ...], int]] = {}
-    for i, (own, key) in enumerate(zip(run, cells, strict=True)):
-        rows.setdefault(own, {}).setdefault(key, i)
-    first: dict[tuple[tuple[str, ...], ...], str] = {}
-    copied: list[str] = []
-    kept: list[int] = []
-    for own, of_run in rows.items():
-        if first.setdefault(tuple(sorted(of_run)), own) != own and len(of_run) >= COPIED_ROWS:
-            copied.append(own)
-        else:
-            kept += of_run.values()
-    count = len(table) - len(kept)
-    if not count:
-        return table, []
-    text = f"{'1 row is an exact copy' if count == 1 else f'{count} rows are exact copies'}"
-    text += f" of {'another' if count == 1 else 'others'} and {'was' if count == 1 else 'were'} "
-    text += f"excluded; {len(kept)} are analysed"
-    if copied:
-        repeats = "repeats another run" if len(copied) == 1 else "repeat other runs"
-        text += f": run{'s' if len(copied) > 1 else ''} {', '.join(copied)} {repeats}"
-    many = count > MANY_COPIES * len(table)
-    remark = Remark("duplicate-rows", text, tuple(copied), "warning" if many else "note")
-    return table.rows(np.asarray(sorted(kept), dtype=np.int64)), [remark]
 
 
 def estimate_repeat_noise(readings: Readings) -> tuple[dict[str, float], list[Remark]]:

@@ -14,6 +14,7 @@ from soilml.config.remainder import SAME_ROWS
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
+from soilml.fitting.faulty_readings import sound_rows
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
@@ -22,7 +23,6 @@ from soilml.gap.checks import (
     DataCheckResult,
     check_readings,
     estimate_repeat_noise,
-    without_copies,
 )
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
@@ -184,7 +184,7 @@ def gap(
     effects = candidate_effects(case, effects)
     case = without_learned_discrepancy(case).without_suspected()
     known_costs = check_costs(costs or {})
-    table, copies = without_copies(as_table(table))
+    table, copies = sound_rows(case, as_table(table))
     known, case = case.remainder, case.without_remainder_of(table)
     copies += () if case.remainder is known else (SAME_ROWS,)
     table = with_rover_columns(case, with_order_columns(case, table, FROM_ORDER))

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
+from soilml.io.bounds import COLUMNS, ROWS, TEXT_BYTES
 from soilml.io.cell_text import cell_as_text
-from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
+from soilml.io.table import TEXT, Column, text_column
 
 #: Bytes of the smallest file that is read so: below, the import of pyarrow takes longer.
 SMALLEST = 1 << 20
 BLOCK = 1 << 24  # Bytes that are held at a time
-_WIDEST = 1000  # Columns of the widest file that is read so
 
 
 def read_good_csv(
@@ -52,7 +52,7 @@ def _read(
         first = opened.readline(longest)
         _need(first.endswith(b"\n") and b'"' not in first)
         header = [name.strip() for name in first.decode("utf-8-sig").split(",")]
-        _need(len(header) < _WIDEST)
+        _need(len(header) <= COLUMNS.most)
         kept = list(columns(header))
         types = {name: pa.string() if name in TEXT else pa.float64() for name in kept}
         parsed = csv.ConvertOptions(column_types=types, include_columns=kept, null_values=[""])
@@ -74,9 +74,12 @@ def _read(
             _need(not blank.any())
             lines.append(numbers + before)
             before += count
-            _need(sum(map(len, lines)) <= MOST_ROWS)
+            _need(sum(map(len, lines)) <= ROWS.most)
             if progress is not None:
                 progress(opened.tell())
+    for name in set(TEXT) & found.keys():
+        widest = max((part.itemsize for part in found[name]), default=0)
+        _need(widest * sum(map(len, found[name])) <= TEXT_BYTES.most)
     return {name: np.concatenate(parts) for name, parts in found.items()}, np.concatenate(lines)
 
 

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
+from soilml.io.bounds import COLUMNS, ROWS, TEXT_BYTES
 from soilml.io.cell_text import cell_as_text, is_number, read_numbers
 from soilml.io.csv_by_arrow import read_good_csv
 from soilml.io.spreadsheet import sheet_rows
-from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
+from soilml.io.table import TEXT, Column, text_column
 
 BLOCK = 8192  # Rows whose cells are held as text at a time
 _LINE = 1_000_000  # Characters of a line; a longer one is not of a table
@@ -89,6 +90,7 @@ def _columns(
     header = [name.strip() for name in next(reader, [])]
     if not header:
         raise TableError(f"{file} is empty; needed is a header: {header_hint}")
+    COLUMNS.check(file, len(header))
     kept = list(columns(header))
     places = [header.index(name) for name in kept]
     blocks: list[list[Column]] = [[] for _ in kept]
@@ -100,6 +102,9 @@ def _columns(
             filled.append(_column(file, name, cells, numbers))
         if progress is not None:
             progress()
+    for name, filled in zip(kept, blocks, strict=True):
+        longest = max((part.itemsize for part in filled), default=0)
+        TEXT_BYTES.check(f"{file}, column {name}", longest * sum(map(len, filled)) * (name in TEXT))
     empty = {name: np.zeros(0, np.str_ if name in TEXT else np.float64) for name in kept}
     found = {
         name: np.concatenate([empty[name], *filled])
@@ -141,8 +146,7 @@ def _blocks(
         rows.append(row)
         lines.append(reader.line_num)
         total += 1
-        if total > MOST_ROWS:
-            raise TableError(f"{file} has more than {MOST_ROWS} rows; split it, or thin it")
+        ROWS.check(file, total)
         if len(rows) == BLOCK:
             yield np.asarray(lines, dtype=np.int64), rows
             rows, lines = [], []

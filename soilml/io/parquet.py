@@ -12,16 +12,21 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from soilml.errors import TableError
-from soilml.io.table import MOST_ROWS, TEXT, Column, text_column
+from soilml.io.bounds import COLUMNS, ROWS, TABLE_VALUES, TEXT_BYTES, Bound
+from soilml.io.table import TEXT, Column, text_column
 from soilml.optional_imports import need
 
 
-def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
+def read_parquet(path: Path, most: Bound = TABLE_VALUES) -> tuple[dict[str, Any], dict[str, str]]:
     """Arrow columns by name, and the file's metadata; page checksums are verified if present.
 
-    The path is a file, or a folder whose Parquet files are one table, in the order of their names.
-    Raises `OSError` where it is missing, `TableError` where a file is damaged or has a column
-    twice, or where a folder has no file, files of different tables, or fewer rows than it should.
+    Columns of text are dictionaries: a value that repeats stands once in memory. `most` bounds the
+    values of all columns. The path is a file, or a folder whose Parquet files are one table, in the
+    order of their names.
+
+    Raises `OSError` where it is missing, `TableError` where a file is damaged, has a column twice
+    or more than a bound of `soilml.io.bounds`, or where a folder has no file, files of different
+    tables, or fewer rows than it should.
     """
     need("pyarrow", "", what=f"{path}: reading Parquet")
     import pyarrow as pa
@@ -29,7 +34,7 @@ def read_parquet(path: Path) -> tuple[dict[str, Any], dict[str, str]]:
     files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
     if not files:
         raise TableError(f"{path} is a folder without a Parquet file")
-    _check_rows(path, files)
+    _check_sizes(path, files, most)
     tables = [_read_file(file) for file in files]
     first = _metadata(tables[0])
     for file, table in zip(files, tables, strict=True):
@@ -66,17 +71,29 @@ def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
     return dict(zip(arrow.column_names, arrow.columns, strict=True))
 
 
-def _check_rows(path: Path, files: Sequence[Path]) -> None:
-    """Raise `TableError` for more than `MOST_ROWS` rows, before any of them is read.
+def _check_sizes(path: Path, files: Sequence[Path], most: Bound) -> None:
+    """Raise `TableError` for more than may be read, as the ends of the files state it.
 
     A column that repeats one value takes hardly any room in a file, and all of it in memory.
     """
-    rows = sum(_opened(file, lambda opened: int(opened.metadata.num_rows)) for file in files)
-    if rows > MOST_ROWS:
-        raise TableError(f"{path} has more than {MOST_ROWS} rows; split it, or thin it")
+    rows = values = texts = 0
+    for file in files:
+        found = _opened(file, lambda opened: opened.metadata)
+        rows += int(found.num_rows)
+        COLUMNS.check(file, int(found.num_columns))
+        ROWS.check(path, rows)
+        most.check(path, rows * int(found.num_columns))
+        for i in range(found.num_row_groups):
+            group = found.row_group(i)
+            for part in map(group.column, range(group.num_columns)):
+                values += int(part.num_values)  # of lists, more than rows
+                is_text = part.physical_type in ("BYTE_ARRAY", "FIXED_LEN_BYTE_ARRAY")
+                texts += int(part.total_uncompressed_size) * is_text
+        most.check(path, values)
+        TEXT_BYTES.check(path, texts)
 
 
-def _opened(file: Path, read: Callable[[Any], Any]) -> Any:
+def _opened(file: Path, read: Callable[[Any], Any], texts: Sequence[str] = ()) -> Any:
     """What a function reads of an opened file; raises `TableError` for a damaged one."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -85,7 +102,11 @@ def _opened(file: Path, read: Callable[[Any], Any]) -> Any:
         # threads of Arrow that read from an object of Python abort the process where it ends first
         try:
             with pa.OSFile(os.fsencode(file)) as opened:
-                return read(pq.ParquetFile(opened, page_checksum_verification=True))
+                return read(
+                    pq.ParquetFile(
+                        opened, page_checksum_verification=True, read_dictionary=list(texts) or None
+                    )
+                )
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             first = str(error).splitlines()[0] if str(error) else type(error).__name__
             raise TableError(f"{file} is not a complete Parquet file: {first}") from None
@@ -93,12 +114,15 @@ def _opened(file: Path, read: Callable[[Any], Any]) -> Any:
 
 def _read_file(file: Path) -> Any:
     """The content of one file as an Arrow table."""
-    arrow = _opened(file, lambda opened: opened.read())
-    names = arrow.column_names
+    import pyarrow as pa
+
+    schema = _opened(file, lambda opened: opened.schema_arrow)
+    names = schema.names
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise TableError(f"{file}: column {twice} occurs twice")
-    return arrow
+    texts = [name for name in names if pa.types.is_string(schema.field(name).type)]
+    return _opened(file, lambda opened: opened.read(), texts)
 
 
 def _metadata(table: Any) -> dict[str, str]:
@@ -141,21 +165,49 @@ def plain_column(file: Path, name: str, column: Any) -> Column:
     """
     import pyarrow as pa
 
-    if pa.types.is_dictionary(column.type):
-        column = column.cast(column.type.value_type)
-    if pa.types.is_string_view(column.type):  # of polars
-        column = column.cast(pa.string())
-    kind = column.type
+    kind = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
-    text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
+    text = any(f(kind) for f in (pa.types.is_string, pa.types.is_large_string, _is_string_view))
     if name not in TEXT:
         if not number:
             raise TableError(f"{file}, column {name}: has type {kind}; needed are numbers")
-        return np.asarray(column.to_numpy(), dtype=np.float64)
+        return np.asarray(column.cast(kind).to_numpy(), dtype=np.float64)
     if not (text or pa.types.is_integer(kind) or pa.types.is_null(kind)):
         raise TableError(f"{file}, column {name}: has type {kind}; needed is text")
     try:
-        cells = column.to_pylist()
+        cells, code = distinct_cells(column)
     except UnicodeDecodeError as error:
         raise TableError(f"{file}, column {name}: has text that is not UTF-8: {error}") from None
-    return text_column(cells, lambda i: f"{file} line {i + 1}, column {name}")
+    texts = text_column(
+        cells, lambda i: f"{file} line {int(np.argmax(code == i)) + 1}, column {name}"
+    )
+    TEXT_BYTES.check(f"{file}, column {name}", texts.itemsize * len(code))
+    found: Column = texts[code]
+    return found
+
+
+def distinct_cells(column: Any) -> tuple[list[Any], Any]:
+    """The values of an Arrow column, each once, and the index of that of each row (rows,)."""
+    import pyarrow as pa
+
+    if _is_string_view(column.type):  # of polars
+        column = column.cast(pa.string())
+    if not pa.types.is_dictionary(column.type):
+        column = column.dictionary_encode()
+    cells: dict[Any, int] = {}
+    codes = [np.zeros(0, np.int64)]
+    for chunk in column.chunks:
+        own = np.asarray(chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False), np.int64)
+        place = np.zeros(len(chunk.dictionary) + 1, np.int64)  # a blank cell is the last
+        used = np.unique(own)
+        found = chunk.dictionary.take(pa.array(used[used >= 0])).to_pylist()
+        for i, cell in zip(used, [*[None] * int((used < 0).sum()), *found], strict=True):
+            place[i] = cells.setdefault(cell, len(cells))
+        codes.append(place[own])
+    return list(cells), np.concatenate(codes)
+
+
+def _is_string_view(kind: Any) -> bool:
+    import pyarrow as pa
+
+    return bool(pa.types.is_string_view(kind))

@@ -32,7 +32,12 @@ FILLED = ("run", "slip", "load_N")  # Columns in which every row must have a val
 Limits = tuple[float, float, str]  # Lower and upper bound, and what is needed in words
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
 _LIMITS: dict[str, Limits] = {
-    "slip": (-1.0, 1.0, "a slip ratio, between -1 and 1, as a fraction and not in percent"),
+    "slip": (
+        -1.0,
+        1.0,
+        "a slip ratio, between -1 and 1, as a fraction and not in percent: 1 - v/(r omega); "
+        "(r omega - v)/v = q is q/(1 + q)",
+    ),
     "load_N": (1e-6, 1e7, "a load above zero and below 1e7, in N"),
     "torque_Nm": (-1e7, 1e7, "a torque between -1e7 and 1e7, in N m"),
     "drawbar_pull_N": (-1e7, 1e7, "a force between -1e7 and 1e7, in N"),

@@ -17,15 +17,12 @@ from typing import Any, NoReturn
 from xml.etree import ElementTree
 
 from soilml.errors import TableError
+from soilml.io.spreadsheet_size import check_spreadsheet_size
 from soilml.optional_imports import need
 
 ENDINGS = (".xlsx", ".xlsm")
-#: Most bytes of a spreadsheet once unpacked; most cells from the first to the last row and column
-#: of a sheet.
-LARGEST, MOST_CELLS = 256 << 20, 2_000_000
 _SHEET = re.compile(r"(.+\.xls[xm])#([^#]+)", re.IGNORECASE | re.DOTALL)
 _SHOWN = 12  # Most sheets that a message names
-_INSTEAD = "save the sheet as CSV, or the rows as Parquet"
 #: A cell in the XML of a sheet that has some attribute, and the place that it states.
 _CELL = rb"""<(?:\w+:)?c(?=\s)%s[^>]*?\sr=["']([A-Z]{1,3})(\d{1,7})["'][^>]*>"""
 _ANY_CELL = re.compile(rb"<(?:\w+:)?c[\s/>]")
@@ -104,28 +101,10 @@ def sheet_rows(path: Path) -> list[list[str]]:
         return _texts(rows, book.in_percent(xml))
 
 
-def _check_size(file: Path) -> None:
-    """Refuse what is no packed file, and what unpacks to more than `LARGEST`."""
-    try:
-        with zipfile.ZipFile(file) as packed:
-            # a part is read to its declared size and no further
-            size = sum(part.file_size for part in packed.infolist())
-    except (zipfile.BadZipFile, ValueError, NotImplementedError):
-        raise TableError(
-            f"{file} is no .xlsx file: it is damaged, has a password, or is of the older kind .xls;"
-            " open it in a spreadsheet program and save it as .xlsx or CSV"
-        ) from None
-    if size > LARGEST:
-        raise TableError(
-            f"{file} has {size / 2**20:.0f} MB unpacked; at most {LARGEST >> 20} MB are read: "
-            f"{_INSTEAD}"
-        )
-
-
 @contextmanager
 def _opened(file: Path) -> Iterator[_Book]:
     """A spreadsheet, closed at the end; what fails within is a damaged part of it."""
-    _check_size(file)
+    check_spreadsheet_size(file)
     need("python_calamine", "", "logs", what=f"{file}: reading spreadsheets")
     from python_calamine import CalamineWorkbook
 
@@ -187,22 +166,10 @@ class _Book:
     percent_styles: set[bytes]
 
     def sheet(self, title: str) -> tuple[bytes, Any]:
-        """The XML of a sheet, and its cells.
-
-        Raises `TableError` where the sheet is too large: calamine holds all cells up to its last
-        row and column, blank or not.
-        """
+        """The XML of a sheet, and its cells."""
         xml = self.packed.read(self.parts[title])
-        places = _PLACED.findall(xml)
-        if len(places) < len(_ANY_CELL.findall(xml)):
+        if len(_PLACED.findall(xml)) < len(_ANY_CELL.findall(xml)):
             raise ValueError(f"sheet {title!r} has cells without their places")
-        columns = max(map(_column_number, {letters for letters, _ in places}), default=0)
-        rows = max(map(int, {digits for _, digits in places}), default=0)
-        if rows * columns > MOST_CELLS:
-            raise TableError(
-                f"{self.file}, sheet {title!r}: the sheet has more than {MOST_CELLS} cells, blank "
-                f"ones included; {_INSTEAD}"
-            )
         return xml, self.cells_of.get_sheet_by_name(title)
 
     def in_percent(self, xml: bytes) -> set[Place]:

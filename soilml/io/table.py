@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import TableError
+from soilml.io.bounds import MOST_TEXT
 from soilml.io.cell_text import is_plain, read_number
 from soilml.optional_imports import need
 from soilml.row_status import Status
@@ -18,9 +19,6 @@ Column = NDArray[Any]
 
 #: Columns that hold text; all others hold numbers, NaN where a cell is blank.
 TEXT = ("run", "status", "source", "wheel", "gear", "test")
-#: Rows that a table may have: more do not fit into the memory of a usual machine.
-MOST_ROWS = 10_000_000
-MOST_TEXT = 256  # Characters of a text; every row of a column takes the memory of the longest
 
 
 def fault_of_text(text: str) -> str:

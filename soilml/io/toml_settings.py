@@ -7,29 +7,32 @@ import os
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import refuse_device
+from soilml.io.bounds import SETTINGS
+from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.optional_imports import tomllib
 
 #: Tables and lists in one another that a settings file may have; none needs more than six.
 MOST_DEPTH = 20
 #: A part of a key, bare or in quotes, or another character.
 _TOKEN = re.compile(r"""[A-Za-z0-9_-]+|"(?:[^"\\]|\\.)*"|'[^']*'|.""")
-#: Characters of a settings file; those of the project have some thousand.
-MOST_CHARACTERS = 4_000_000
 
 
 class Settings:
-    """One table of a TOML file; each key is taken once, and `finish` rejects the others."""
+    """One table of a TOML file; each key is taken once, and `finish` rejects the others.
 
-    def __init__(self, content: dict[str, Any], where: str, folder: Path) -> None:
+    `files` are those that it may name; none, unless its user gave the file.
+    """
+
+    def __init__(self, content: dict[str, Any], where: str, files: NamedFiles = NO_FILES) -> None:
         self.content = content
         self._remaining = dict(content)
         self._all = tuple(content)
         self.where = where
-        self.folder = folder
+        self.files = files
         self._known: list[str] = []
 
     def __contains__(self, key: str) -> bool:
@@ -66,10 +69,17 @@ class Settings:
         """A text."""
         return str(self.take(key, str, "a text in quotes", default))
 
+    def file(self, key: str) -> Path:
+        """The path of a file; raises `InputError` for one that these settings may not name."""
+        try:
+            return self.files.path(self.text(key))
+        except InputError as error:
+            self.fail(f"{key} {error}")
+
     def table(self, key: str) -> Settings:
         """The table [key]; an empty one where there is none."""
         content = self.take(key, dict, f"a table [{key}]", {})
-        return Settings(content, f"{self.where} [{key}]", self.folder)
+        return Settings(content, f"{self.where} [{key}]", self.files)
 
     def tables(self, key: str) -> list[Settings]:
         """The tables [[key]], in order."""
@@ -77,7 +87,7 @@ class Settings:
         if not all(isinstance(entry, dict) for entry in content):
             self.fail(f"{key} must be written as tables: [[{key}]]")
         return [
-            Settings(entry, f"{self.where} [[{key}]] number {i}", self.folder)
+            Settings(entry, f"{self.where} [[{key}]] number {i}", self.files)
             for i, entry in enumerate(content, 1)
         ]
 
@@ -93,26 +103,25 @@ class Settings:
             hint = f"did you mean {near[0]!r}?" if near else f"known: {known}"
             self.fail(f"unknown key {key!r}; {hint}")
 
-    def fail(self, text: str) -> None:
+    def fail(self, text: str) -> NoReturn:
         """Raise `InputError` with file and table before the text."""
         raise InputError(f"{self.where}: {text}")
 
 
-def read_settings(path: str | os.PathLike[str], write: str = "") -> Settings:
+def read_settings(
+    path: str | os.PathLike[str], write: str = "", files: NamedFiles | None = None
+) -> Settings:
     """The TOML file at `path`; raises `InputError` where it is missing or not valid TOML.
 
-    `write` is the command that writes a first one, for the message.
+    `write` is the command that writes a first one, for the message; `files` are those that the file
+    may name, by default any, beside it.
     """
     file = Path(path)
     try:
         refuse_device(file)
         with file.open(encoding="utf-8-sig") as opened:  # which may be a pipe, of any length
-            text = opened.read(MOST_CHARACTERS + 1)
-        if len(text) > MOST_CHARACTERS:
-            raise InputError(
-                f"{file} has more than {MOST_CHARACTERS / 1e6:.0f} million characters; needed are "
-                "settings in TOML"
-            )
+            text = opened.read(SETTINGS.most + 1)
+        SETTINGS.check(file, len(text))
         _check_keys(text, str(file))
         content = tomllib.loads(text)
         _check_depth(content, str(file))
@@ -132,7 +141,7 @@ def read_settings(path: str | os.PathLike[str], write: str = "") -> Settings:
         raise InputError(f"{file} is not valid TOML: a number has thousands of digits") from None
     except RecursionError:
         raise InputError(f"{file} is not valid TOML: tables or lists are nested too deep") from None
-    return Settings(content, str(file), file.parent)
+    return Settings(content, str(file), files or NamedFiles(file.parent))
 
 
 def _check_keys(text: str, where: str) -> None:

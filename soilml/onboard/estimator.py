@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
@@ -229,7 +230,7 @@ class Estimator:
 
         Raises `InputError` if `keep` is not a whole number of rows, from 0 to 256.
         """
-        return self._configured_sets.start(self.memory_id).keeping(keep)
+        return self._configured_sets.start(self.memory_id).keeping(keep).sealed()
 
     @cached_property
     def memory_id(self) -> str:
@@ -247,8 +248,8 @@ class Estimator:
         Parameters
         ----------
         memory : Memory
-            From `start`, or from the step before. One of another file, wheel or prior raises
-            `InputError`.
+            From `start`, or from the step before. One of another file, wheel or prior, or one that
+            has changed since, raises `InputError`.
         **measured : float or array_like
             As for `run`.
 
@@ -267,10 +268,11 @@ class Estimator:
         rows = sets.rows(measured)
         if before.kept is None:
             estimate, memory = self._set_estimate(rows, before)
-            return estimate, memory.packed(len(before.system))
+            return estimate, memory.packed(len(before.system)).sealed()
         rows = before.kept.with_rows(rows)
         estimate, memory = self._set_estimate(rows, before.kept.before)
-        return estimate, replace(memory.packed(), kept=before.kept.after(rows, memory))
+        kept = before.kept.after(rows, memory)
+        return estimate, replace(memory.packed(), kept=kept).sealed()
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
@@ -293,7 +295,8 @@ class Estimator:
         sets = self._configured_sets
         found, memory = sets.update(self.session, rows, memory)
         head = self.names, self.units, self.prior
-        return estimate_of_set(*head, found, memory, sets.least_share_in_range), memory
+        estimate = estimate_of_set(*head, found, memory, sets.least_share_in_range)
+        return with_exact_check(estimate, sets, self.session, memory), memory
 
     def __deepcopy__(self, memo: object = None) -> Estimator:
         """The estimator itself, which nothing changes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.features import as_numbers
 from soilml.onboard.set_contract import Floats
+from soilml.onboard.state_checksum import state_checksum
 
 Singles = NDArray[np.float32]
 
 #: Rows fed to the graph at a time: bounds its working memory, whatever the length of a run.
 ROWS_PER_CALL = 256
-MEMORY_FORMAT = "1"  # Version of the content of a memory
+MEMORY_FORMAT = "2"  # Version of the content of a memory; those of version 1 have no checksum
 #: A memory is packed each time that it has grown by so many rows, so that a step takes about as
 #: long after thousands of readings as after a few.
 PACKED_EVERY = 32
@@ -82,6 +83,9 @@ class Memory:
         Version of the content.
     kept : KeptRows or None
         The last rows as they were read, where `Estimator.start` was asked to keep some.
+    checksum : int
+        Of all that, as `Estimator.start` and `Estimator.step` wrote it. A memory whose content has
+        changed since is refused.
     """
 
     system: Floats
@@ -89,6 +93,25 @@ class Memory:
     file: str = ""
     format: str = MEMORY_FORMAT
     kept: KeptRows | None = None
+    checksum: int = 0
+
+    def sealed(self) -> Memory:
+        """This memory with the checksum of its content."""
+        return replace(self, checksum=state_checksum(*self._parts()))
+
+    @property
+    def is_sealed(self) -> bool:
+        """Whether the content is that of the checksum."""
+        return self.checksum == state_checksum(*self._parts())
+
+    def _parts(self) -> Iterator[object]:
+        yield from (self.format, self.file)
+        yield from (np.asarray(self.system, np.float64), np.asarray(self.counts, np.float32))
+        if self.kept is not None:
+            yield self.kept.most
+            for name, values in self.kept.rows.items():
+                yield from (name, values)
+            yield from self.kept.before._parts()
 
     @property
     def rows(self) -> int:
@@ -161,5 +184,7 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
             f"numbers of shape (rows, {columns}): {begin}"
         )
     if memory.kept is not None:
-        check_memory(memory.kept.before, columns, identity, path)
+        check_memory(memory.kept.before.sealed(), columns, identity, path)
+    if not memory.is_sealed:
+        raise InputError(f"this memory is damaged: its checksum does not match: {begin}")
     return memory

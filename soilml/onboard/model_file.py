@@ -50,6 +50,7 @@ MOST_BYTES = 256 << 20
 _MOST_SHOWN = 40  # Characters of an entry of the metadata that a message shows
 #: The metadata entry `soilml_kind` of a graph of one step, which other programs feed.
 ONE_STEP = "step"
+SLIP_STEP = "slip-step"  # The same of a slip filter, which `SlipStream` runs
 
 
 def released_models() -> dict[str, Path]:
@@ -93,6 +94,11 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     file = find_model(path)
     content = _read_content(file)
     metadata = _read_metadata(file, content)
+    if metadata.get("soilml_kind") == SLIP_STEP:
+        raise ModelFileError(
+            f"{file} is the slip filter of a rover, for SlipStream; needed is a file that soilml "
+            "train wrote"
+        )
     if "soilml_format" not in metadata:
         raise ModelFileError(
             f"{file} is an ONNX model without soilml metadata; needed is one that soilml train "
@@ -114,9 +120,35 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
             f"{file} is one step of a stream, written by soilml export-step for other programs; "
             "needed is the file that it was made from"
         )
+    return _open_intact(file, content, metadata), metadata
+
+
+def open_slip_step(path: str | os.PathLike[str], form: str) -> tuple[Session, dict[str, str]]:
+    """As `open_model`, for a slip filter in this version of its format."""
+    file = Path(path)
+    content = _read_content(file)
+    metadata = _read_metadata(file, content)
+    if metadata.get("soilml_kind") != SLIP_STEP:
+        raise ModelFileError(f"{file} is no file of soilml export-slip")
+    if (found := metadata.get("soilml_format", "1")) != form:
+        raise ModelFileError(
+            f"{file} has format {_shown(found)} of slip filters; this version of soilml reads "
+            f"format {form}: write it again with soilml export-slip"
+        )
+    return _open_intact(file, content, metadata), metadata
+
+
+def _open_intact(file: Path, content: bytes, metadata: Mapping[str, str]) -> Session:
     if not _is_intact(content, metadata):
         raise ModelFileError(f"{file} is damaged: its checksum does not match; copy it again")
-    return _create_session(file, content), metadata
+    return _create_session(file, content)
+
+
+def with_checksums(graph: bytes, metadata: dict[str, str]) -> bytes:
+    """The content of a file, from its graph and metadata, to which both checksums are added."""
+    metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
+    metadata["metadata_sha256"] = metadata_checksum(metadata)
+    return graph + serialise_metadata(metadata)
 
 
 def metadata_checksum(metadata: Mapping[str, str]) -> str:

@@ -5,9 +5,10 @@ It needs numpy and onnxruntime alone. `soilml export-slip` writes the graph.
 
 from __future__ import annotations
 
+import json
 import os
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, final
 
 import numpy as np
@@ -15,8 +16,9 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.features import as_number, as_numbers
-from soilml.onboard.model_file import Session, create_session
+from soilml.onboard.model_file import Session, open_slip_step
 from soilml.onboard.set_contract import Floats
+from soilml.onboard.state_checksum import state_checksum
 
 #: Of the weights of the grounds: ends of the 90 % interval of speed and slip, and the median.
 QUANTILES = (0.02, 0.5, 0.98)
@@ -25,17 +27,54 @@ JUDGED = 10  # Rows whose misfit is judged together
 #: last mean rim speed (m/s), and the last misfits; below zero where there was none.
 RECENT = 2 + JUDGED
 #: Flags in the order of the graph's output; docs/how-to/slip-unknown.md explains them.
-FLAGS = ("standing", "passed-over", "no-soil", "no-fit", "beyond", "not-determined")
+FLAGS = (
+    "standing",
+    "passed-over",
+    "no-soil",
+    "no-fit",
+    "beyond",
+    "not-determined",
+    "torque-set-aside",
+)
 REFUSED = FLAGS[:3]  # Flags of rows without an answer
-KIND = "slip-step"  # The metadata entry `soilml_kind` of such a file
+SLIP_FORMAT = "2"  # Version of files and states; files of version 1 have no checksum
+#: Readings of a row, with their least and largest possible value: what lies beyond is an error of a
+#: sensor, and its square may overflow. A load beyond the table's counts as that of its end.
+POSSIBLE = {
+    "rim_speed": (-100.0, 100.0),  # m/s
+    "load": (1e-6, 1e7),  # N, of a wheel
+    "slope": (-1.6, 1.6),  # rad
+    "elapsed": (1e-6, 1e9),  # s
+}
+#: Largest deviation of an answer from the file's own probe: of mean and standard deviation, in
+#: standard deviations, and of probabilities.
+PROBE_TOLERANCE = 5e-3
 
 
+@final
 @dataclass(frozen=True)
 class SlipState:
-    """What is known after some rows: of fixed size, to be stored as it is."""
+    """What is known after some rows: of fixed size, to be stored as it is.
+
+    Parameters
+    ----------
+    grounds, recent : ndarray of float32
+        Of the graph.
+    file : str
+        Which file it is of, and the version of its format: `SlipStream.identity`.
+    checksum : int
+        Of all that, as the stream wrote it. A state whose numbers have changed since is refused.
+    """
 
     grounds: NDArray[np.float32]
     recent: NDArray[np.float32]
+    file: str
+    checksum: int
+
+    @staticmethod
+    def of(grounds: NDArray[np.float32], recent: NDArray[np.float32], file: str) -> SlipState:
+        """A state with its checksum."""
+        return SlipState(grounds, recent, file, state_checksum(grounds, recent, file))
 
 
 @dataclass(frozen=True)
@@ -75,36 +114,51 @@ class SlipEstimate:
 class SlipStream:
     """Speed and slips row by row, state in and state out (docs/how-to/slip-unknown.md)."""
 
-    session: Session
+    session: Session = field(repr=False)
     path: str
+    metadata: Mapping[str, str] = field(repr=False)
     wheels: tuple[str, ...]
+    radius: Floats  # (k,), m
     load_range: tuple[float, float]  # N, of the table; a load beyond counts as that of its end
     load_of_attitude: Floats  # (k, 3): loads are linear in three products of sines and cosines
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> SlipStream:
-        """A file of `soilml export-slip`; raises `ModelFileError` for any other."""
+        """A file of `soilml export-slip`, verified by its checksums and its own probe.
+
+        The probe is some rows with their known answers. Raises `ModelFileError` for another file,
+        a damaged one, or a failing probe.
+        """
+        session, metadata = open_slip_step(path, SLIP_FORMAT)
         try:
-            session = create_session(Path(path).read_bytes())
-        except OSError as error:
-            raise ModelFileError(f"{path} cannot be read: {error.strerror or error}") from None
-        except Exception as error:
-            first = " ".join(str(error).split())
-            raise ModelFileError(f"{path} cannot be loaded as an ONNX file: {first}") from None
-        metadata = session.get_modelmeta().custom_metadata_map
-        if metadata.get("soilml_kind") != KIND:
-            raise ModelFileError(f"{path} is no file of soilml export-slip")
-        low, high = (float(value) for value in metadata["load_N"].split())
-        wheels = tuple(metadata["wheels"].split("\n"))
-        shares = np.asarray([float(x) for x in metadata["load_of_attitude"].split()])
-        return SlipStream(session, str(path), wheels, (low, high), shares.reshape(-1, 3))
+            rover, table = json.loads(metadata["rover"]), json.loads(metadata["table"])
+            low, high = (float(value) for value in table["load_N"])
+            shares = np.asarray(table["load_of_attitude"], dtype=np.float64)
+            wheels = tuple(str(wheel["name"]) for wheel in rover["wheels"])
+            radius = np.asarray([float(wheel["radius_m"]) for wheel in rover["wheels"]])
+            found = SlipStream(
+                session, str(path), metadata, wheels, radius, (low, high), shares.reshape(-1, 3)
+            )
+            passed = found._reproduces(json.loads(metadata["probe"]))
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ModelFileError(f"{path}: its metadata is damaged ({error})") from None
+        except Exception as error:  # onnxruntime raises many kinds, none with a public base
+            raise ModelFileError(f"{path} cannot be run: {' '.join(str(error).split())}") from None
+        if not passed:
+            raise ModelFileError(f"{path} fails its own probe on this machine: do not use it")
+        return found
+
+    @property
+    def identity(self) -> str:
+        """Identity of its states: version of the format, and checksum of the graph."""
+        return f"{SLIP_FORMAT}-{self.metadata['graph_sha256'][:16]}"
 
     def start(self) -> SlipState:
         """The state before any row."""
         feed = {name: np.zeros(shape, np.float32) for name, shape in self._shapes.items()}
         feed["recent"][1:] = -1.0
         grounds = self.session.run(["start"], feed)[0]
-        return SlipState(grounds, feed["recent"])
+        return SlipState.of(grounds, feed["recent"], self.identity)
 
     def loads(self, slope: float, roll: float = 0.0) -> Floats:
         """Load of each wheel (k,), N, by pitch and roll, rad; roll is positive where left is high.
@@ -127,13 +181,17 @@ class SlipStream:
         """The answer for a row, and the state after it.
 
         rim_speed: Radius times rotation of each wheel (k,), m/s, negative backward.
-        torque: Read torque of each wheel (k,), N m; NaN where there is none.
+        torque: Read torque of each wheel (k,), N m; NaN where there is none. One beyond what any
+            soil carries is left out, with the flag `torque-set-aside`.
         load: Load of each wheel (k,), N.
         slope: Pitch, rad, positive uphill.
         elapsed: Time since the row before, s.
 
-        Raises `InputError` for another number of wheels, or what is not finite but for a torque.
+        Raises `InputError` for another number of wheels; for what is not finite or not possible
+        (`POSSIBLE`), but for a torque; for a state that is damaged or of another file; and
+        for a row whose answer would not be finite. Go on with the state that was given.
         """
+        self._check(state)
         given = {"rim_speed": rim_speed, "torque": torque, "load": load}
         feed = {name: as_numbers(name, values) for name, values in given.items()}
         for name, values in feed.items():
@@ -144,16 +202,22 @@ class SlipStream:
                 )
         feed["slope"] = np.asarray([as_number("slope", slope)])
         feed["elapsed"] = np.asarray([as_number("elapsed", elapsed)])
-        for name, values in feed.items():
-            if name != "torque" and not np.isfinite(values).all():
+        for name, (low, high) in POSSIBLE.items():
+            values = feed[name]
+            if not np.isfinite(values).all():
                 raise InputError(f"{name} is not finite; give the row again without it missing")
-        if feed["load"].min() <= 0.0 or feed["elapsed"][0] <= 0.0:
-            raise InputError("load and elapsed must be above zero")
-        single = {name: values.astype(np.float32) for name, values in feed.items()}
+            bad = values[(values < low) | (values > high)]
+            if bad.size:
+                raise InputError(f"{name} is {bad[0]:g}; possible is {low:g} to {high:g}")
+        with np.errstate(over="ignore"):  # a torque beyond float32 is left out
+            single = {name: values.astype(np.float32) for name, values in feed.items()}
         single |= {"grounds": state.grounds, "recent": state.recent}
         outputs = ("speed", "slip", "probability", "flags", "grounds_out", "recent_out")
-        speed, slip, probability, flags, grounds, recent = self.session.run(outputs, single)
-        found = SlipEstimate(
+        found = self.session.run(outputs, single)
+        if not all(np.isfinite(part).all() for part in found):
+            raise InputError("the answer for this row is not finite: the row is not used")
+        speed, slip, probability, flags, grounds, recent = found
+        estimate = SlipEstimate(
             speed=float(speed[0]),
             speed_std=float(speed[1]),
             speeds=speed[2:].astype(np.float64),
@@ -162,7 +226,34 @@ class SlipStream:
             beyond=float(probability[1]),
             flags=tuple(name for name, on in zip(FLAGS, flags, strict=True) if on > 0.5),
         )
-        return found, SlipState(grounds, recent)
+        return estimate, SlipState.of(grounds, recent, self.identity)
+
+    def _check(self, state: object) -> None:
+        """Raise `InputError` unless it is a state of this file, as a step wrote it."""
+        begin = "begin with stream.start()"
+        if not isinstance(state, SlipState):
+            raise InputError(f"state is a {type(state).__name__}; needed is a SlipState: {begin}")
+        if state.file != self.identity:
+            raise InputError(
+                f"this state is of {state.file!r}, which is another file or version than "
+                f"{self.identity!r} of {self.path}: {begin}"
+            )
+        if state.checksum != state_checksum(state.grounds, state.recent, state.file):
+            raise InputError(f"this state is damaged: its checksum does not match: {begin}")
+
+    def _reproduces(self, probe: list[dict[str, Any]]) -> bool:
+        """Whether the rows of the probe, one after the other, have their known answers."""
+        state = self.start()
+        for entry in probe:
+            rows: dict[str, Any] = {n: np.asarray(v, np.float64) for n, v in entry["row"].items()}
+            found, state = self.step(state, **rows)
+            own = (found.speed, found.speed_std, found.no_soil, found.beyond)
+            known = entry["speed"], entry["speed_std"], entry["no_soil"], entry["beyond"]
+            scale = np.asarray([known[1], known[1], 1.0, 1.0])
+            away = np.abs(np.subtract(own, known)) / scale
+            if not (away < PROBE_TOLERANCE).all():
+                return False
+        return bool(probe)
 
     @property
     def _shapes(self) -> dict[str, list[int]]:

@@ -15,6 +15,7 @@ from soilml.arrays import Floats
 from soilml.config.model_settings import in_si, take_quantity, take_soil
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover, read_gravity
 from soilml.errors import InputError
+from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
@@ -90,6 +91,7 @@ class SoilQuestion:
     entries: Published soils by name, as likely as each other; empty where the file states one soil.
     soil, prior, tests: The soil of the file, priors of its parameters, tests of it.
     rows: Model file and table of runs whose posterior is the soil; None without.
+    named: What that model file may name; None for any file, beside it.
     """
 
     entries: Mapping[str, SoilEntry] = field(default_factory=dict)
@@ -97,6 +99,7 @@ class SoilQuestion:
     prior: Mapping[str, Prior] = field(default_factory=dict)
     tests: tuple[SoilTest, ...] = ()
     rows: tuple[Path, Path] | None = None
+    named: NamedFiles | None = None
 
     @property
     def files(self) -> list[str]:
@@ -140,13 +143,15 @@ class DesignStudy:
         return np.asarray(0.5 * rover.loads(slope))
 
 
-def read_study(path: str | os.PathLike[str]) -> DesignStudy:
+def read_study(path: str | os.PathLike[str], files: NamedFiles | None = None) -> DesignStudy:
     """Read a question of a design from a TOML file with [rover], [wheel], [soil] and [goal].
+
+    `files` are those that it may name, by default any, beside it.
 
     Raises `InputError`, which names file, table and key, for a figure that is missing, misspelt or
     out of bounds: nothing of a rover is assumed.
     """
-    settings = read_settings(path)
+    settings = read_settings(path, files=files)
     rover, wheel = settings.table("rover"), settings.table("wheel")
     dimensions = {
         "mass": _take_dimension(rover, "mass"),
@@ -248,9 +253,10 @@ def _is_size(value: Any) -> bool:
 def _take_soil(settings: Settings) -> SoilQuestion:
     """One soil as in a model file, `names` of published ones, or `model` with `runs`."""
     if "model" in settings or "runs" in settings:
-        model, runs = settings.text("model"), settings.text("runs")
+        rows = settings.file("model"), settings.file("runs")
         settings.finish()
-        return SoilQuestion(rows=(settings.folder / model, settings.folder / runs))
+        named = None if settings.files.folder is not None else NO_FILES
+        return SoilQuestion(rows=rows, named=named)
     if "names" not in settings:
         name = settings.content.get("name")
         own, prior, tests = take_soil(settings)
@@ -265,7 +271,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
         )
     names = settings.take("names", list, "a list of published soils, see `soilml soils`")
     base = Settings({k: v for k, v in settings.content.items() if k != "names"}, settings.where,
-                    settings.folder)  # fmt: skip
+                    settings.files)  # fmt: skip
     if not names or not all(isinstance(name, str) for name in names):
         settings.fail(f"names is {names!r}; needed is a list of published soils")
     try:
@@ -273,7 +279,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
     except InputError as error:
         settings.fail(str(error))
     base.content["name"] = names[0]
-    _, prior, tests = take_soil(Settings(base.content, settings.where, settings.folder))
+    _, prior, tests = take_soil(Settings(base.content, settings.where, settings.files))
     others = base.content.keys() - {"name", "prior", "test"}
     if others:
         settings.fail(f"{sorted(others)[0]} is of one soil; for all of names write [soil.prior]")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.errors import InputError
+from soilml.io.cell_text import read_whole_number
 
 if TYPE_CHECKING:
     import socket
@@ -34,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         "--port",
-        type=int,
+        type=port_number,
         default=PORT,
         metavar="N",
         help=f"port of the page (default: {PORT}; 0 takes a free one)",
@@ -42,6 +43,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-browser", action="store_true", help="print the address, and open no browser"
     )
+
+
+def port_number(text: str) -> int:
+    """The number of a port; raises `ArgumentTypeError` for anything else."""
+    try:
+        if 0 <= (port := read_whole_number(text)) <= 65535:
+            return port
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number from 0 to 65535")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -53,8 +64,6 @@ def run(args: argparse.Namespace) -> int:
 
     for library, extra in _LIBRARIES:
         need(library, "serve", extra)
-    if not 0 <= args.port <= 65535:
-        raise InputError(f"--port is {args.port}; needed is a number from 0 to 65535")
     opened = _listen(args.port)
     with tempfile.TemporaryDirectory(prefix="soilml-serve-") as folder:
         number = asyncio.run(_serve(opened, Path(folder), browser=not args.no_browser))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
-from soilml.serve.answers.job_files import OUTPUT
+from soilml.serve.answers.job_files import READ, WRITTEN
 
 _MOST_JOBS = 24  # Jobs that are remembered; the oldest are forgotten with their files
 #: Longest line of a worker, bytes: an answer with its pictures and tables.
@@ -47,7 +47,7 @@ class Job:
         """A file that the job has written and listed; `InputError` where there is none."""
         if name not in (self.result or {}).get("files", []):
             raise InputError(f"this analysis has no file {name}")
-        return self.folder / OUTPUT / name
+        return self.folder / WRITTEN / name
 
 
 class Jobs:
@@ -66,9 +66,10 @@ class Jobs:
             await self.forget(next(iter(self._jobs.values())))
         key = secrets.token_hex(16)
         job = Job(key, kind, self.folder / key)
-        job.folder.mkdir(parents=True)
+        for name in (READ, WRITTEN):
+            (job.folder / name).mkdir(parents=True)
         for file in files:
-            target = job.folder / file.name
+            target = job.folder / READ / file.name
             if target.exists():
                 raise InputError(f"two files have the name {file.name}; rename one of them")
             try:
@@ -107,7 +108,7 @@ class Jobs:
 
     async def _follow(self, job: Job, request: dict[str, Any]) -> None:
         """Start the process, and take what it says until it ends."""
-        command = [sys.executable, "-m", "soilml.serve.worker", str(job.folder)]
+        command = [sys.executable, "-m", "soilml.serve.worker", str(job.folder / READ)]
         pipe = asyncio.subprocess.PIPE
         process = await asyncio.create_subprocess_exec(
             *command,

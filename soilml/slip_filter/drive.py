@@ -33,6 +33,7 @@ FLAGS = {
     "no-fit": "neither a soil of the prior nor a hard floor explains the torques: do not use them",
     "beyond": "more slip than the table has, or stuck: the slip is a lower limit",
     "not-determined": "the interval of the slip is wide",
+    "torque-set-aside": "a torque is beyond what any soil carries: left out, as if not read",
     "behind-command": "the rims turn more slowly than commanded",
 }
 #: Flags of rows without an answer.
@@ -212,6 +213,8 @@ def slip_of_drive(case: Case, rows: Rows | DriveRows, *, soils: int = SOILS) -> 
         misfit.append(answer.misfit)
         no_soil[i] = answer.no_soil
         found = list(_after(answer.no_soil, answer.beyond, misfit, answer.slip, k))
+        if (np.abs(drive.torque[i]) > filter_.most_torque).any():
+            found.append("torque-set-aside")
         if drive.commanded[i] * BEHIND > np.abs(drive.rim_speed[i]).mean():
             found.append("behind-command")
         flags.append(tuple(found))

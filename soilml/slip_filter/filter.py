@@ -24,6 +24,9 @@ FLOOR_NOISE = 0.005  # Torque by which wheels on a hard floor act against each o
 MODEL_NOISE = 0.02  # Error of the model of a row, over the torque
 #: Power of the density of a row: errors of the model are alike in rows beside each other.
 POWER = 0.2
+#: Largest torque of a wheel over its radius and the heaviest load of the table. No soil carries as
+#: much: what is read above it is no torque, and is left out.
+MOST_TORQUE = 10.0
 OUTLIER, OUTLIER_STD = 0.01, 0.3  # Share of glitches, and their error over load and radius
 #: Quantiles that are the ends of the 90 % interval, and the median. Those at 5 and 95 % covered
 #: 79 % of the slips of 22 simulated drives with rims alike, these 90 %: rovers are driven to the
@@ -97,6 +100,7 @@ class SlipFilter:
         variances = [errors.loss_std**2, 0.0, errors.gain_std**2]
         self._cov = np.asarray(variances)[:, None, None] * np.ones((3, n, k))
         self._ratio = travel_ratio(table.slip)
+        self.most_torque = MOST_TORQUE * table.load[-1] * table.radius  # (k,), N m
 
     def start(self) -> Belief:
         """The belief before any row."""
@@ -109,7 +113,8 @@ class SlipFilter:
         """The answer for a row, and the belief after it.
 
         rim_speed: r omega of each wheel (k,), m/s, above zero.
-        torque: Read torque of each wheel (k,), N m; NaN where there is none.
+        torque: Read torque of each wheel (k,), N m; NaN where there is none. One beyond
+            `most_torque` is left out.
         load: Load of each wheel (k,), N, in the range of the table; beyond it that of its end.
         slope: Pitch, rad, positive uphill.
         """
@@ -217,7 +222,7 @@ class SlipFilter:
         its standard deviations: a covariance of rank one beside that of each wheel.
         """
         torque, model, spread, common, load = row
-        seen = np.isfinite(torque)
+        seen = np.abs(torque) <= self.most_torque
         reading = np.where(seen, torque, 0.0)
         noise = self.noise[0] ** 2 + (self.noise[1] * reading) ** 2
         noise = noise + (MODEL_NOISE * reading) ** 2 + spread

@@ -17,6 +17,8 @@ from soilml.config.case import Case, read_case
 from soilml.errors import InputError, did_you_mean
 from soilml.fitting.coordinates import select_free
 from soilml.identification.posterior import prior_fractions
+from soilml.io.atomic_files import refuse_device
+from soilml.io.bounds import JSON_BYTES
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
@@ -105,6 +107,8 @@ def read_source_soil(path: str | os.PathLike[str], run: str | None = None) -> So
             f"{path}: needed is result.json of `soilml identify --out`, or a model file in .toml"
         )
     try:
+        refuse_device(file)
+        JSON_BYTES.check(file, file.stat().st_size)
         content = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.io.bounds import LOG_VALUES
 from soilml.optional_imports import need
 
 MOST_CELLS = 4_000_000
@@ -40,11 +42,11 @@ class MapGrid:
         """
         low = np.floor((place.min(axis=0) - margin) / cell)
         high = np.ceil((place.max(axis=0) + margin) / cell)
-        columns, rows = (high - low).astype(np.int64)
-        if columns * rows > MOST_CELLS:
+        columns, rows = high - low
+        if not columns * rows <= MOST_CELLS:
             raise InputError(
-                f"the map would have {columns * rows} cells of {cell:g} m; at most {MOST_CELLS} "
-                "are possible: give larger ones with --cell, or map parts of the drive"
+                f"the map would have {columns * rows:.3g} cells of {cell:g} m; at most "
+                f"{MOST_CELLS} are possible: give larger ones with --cell, or map parts of it"
             )
         return MapGrid(float(low[0] * cell), float(low[1] * cell), cell, (int(rows), int(columns)))
 
@@ -159,11 +161,14 @@ def read_elevation(path: str) -> Elevation:
     try:
         with tifffile.TiffFile(Path(path)) as file:
             page: Any = file.pages[0]
+            LOG_VALUES.check(path, math.prod(page.shape))
             height = np.asarray(page.asarray(), dtype=np.float64)
             tags = {code: page.tags[code].value for code in (_SCALE, _TIEPOINT, _NODATA, _KEYS)
                     if code in page.tags}  # fmt: skip
     except FileNotFoundError:
         raise InputError(f"{path}: there is no such file") from None
+    except InputError:
+        raise
     except Exception as error:  # of whatever a damaged file raises
         first = " ".join(str(error).split())
         raise InputError(f"{path} cannot be read as GeoTIFF: {first}") from None

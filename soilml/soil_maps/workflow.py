@@ -34,6 +34,7 @@ from soilml.soil_maps.raster import Elevation, MapGrid
 
 MODEL = "any_wheel"  # Released file that is taken where none is named
 CELL, REACH = 0.5, 2.0  # m
+SIZES = 0.01, 1000.0  # Least and greatest of both, m: a print of a wheel, and a day's drive
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0])
 HEADINGS = ("E", "NE", "N", "NW", "W", "SW", "S", "SE")
 STEPS = 8  # Slopes between which those of a terrain are interpolated
@@ -192,13 +193,16 @@ def soil_map(
     Raises
     ------
     InputError
-        For a gear or effect that the file is not for, several gears, a cell or reach that is not
-        above zero, and as `rover_performance` does.
+        For a gear or effect that the file is not for, several gears, a cell or reach beyond
+        `SIZES` or without a known cell, and as `rover_performance` does.
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
-    if not (0.0 < cell < np.inf and 0.0 < reach < np.inf):
-        raise InputError(f"cell is {cell:g} m and reach {reach:g} m; both must be above zero")
+    low, high = SIZES
+    if not (low <= cell <= high and low <= reach <= high):
+        raise InputError(
+            f"cell is {cell:g} m and reach {reach:g} m; needed are {low:g} to {high:g} m"
+        )
     if case.gears:
         raise InputError("the model file has several gears; a map is of the wheels of one: --gear")
     own = Estimator.load(MODEL) if estimator is None else estimator
@@ -214,6 +218,11 @@ def soil_map(
     )
     field = SoilField(soils)
     known = _within(grid, drive.place[followed.used], reach)
+    if not known.any():
+        raise InputError(
+            f"no cell of {cell:g} m has its middle within {reach:g} m of a reading; give smaller "
+            "ones with --cell, or a longer --reach"
+        )
     centres = grid.centres[known]
     mean, covariance = field.at(centres)
     ability = pitch = by_heading = None

@@ -16,7 +16,7 @@ from conftest import MODEL
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.experiment_design.advice_after_results import _trained_for, advice_after_estimate
+from soilml.experiment_design.advice_after_results import advice_after_estimate
 from soilml.remarks import texts
 
 pytestmark = pytest.mark.slow
@@ -155,13 +155,6 @@ def test_an_estimate_abstains_in_words_and_keeps_its_table_clean(folder, small_m
     assert "a typical row: best next row for all parameters: slip" in captured.err
 
 
-def test_slips_and_loads_of_the_advice_are_those_trained_for(small_model):
-    case, ranges = _trained_for(Estimator.load(small_model))
-    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus"}
-    assert (min(ranges.slips), max(ranges.slips)) == (0.05, 0.6)
-    assert (min(ranges.loads), max(ranges.loads)) == (30.0, 120.0)
-
-
 @pytest.mark.parametrize(
     "more",
     [
@@ -183,16 +176,16 @@ def test_a_recipe_that_a_case_cannot_hold_gets_no_advice(small_model, more):
     assert advice_after_estimate(other, one.mean, one.covariance, readings) == []
 
 
-@pytest.mark.parametrize("rows", [1, 4, 6])
-def test_short_and_long_runs_at_one_load_ask_for_another(small_model, rows):
-    estimator = Estimator.load(small_model)
-    readings = {"slip": [0.2] * rows, "load": [60.0] * rows, "torque": [2.9] * rows}
+@pytest.mark.parametrize("rows", [1, 4, 40])
+def test_short_and_long_runs_at_one_load_ask_for_another(whole_file, rows):
+    estimator = Estimator.load(whole_file)
+    torque = 2.9 * (1.0 + 0.02 * np.random.default_rng(1).standard_normal(rows))
+    readings = {"slip": np.full(rows, 0.2), "load": np.full(rows, 60.0), "torque": torque}
     one = estimator.run(**readings)
-    arrays = {name: np.asarray(values) for name, values in readings.items()}
-    said = texts(advice_after_estimate(estimator, one.mean, one.covariance, arrays))
+    said = texts(advice_after_estimate(estimator, one.mean, one.covariance, readings))
     cohesion = next(line for line in said if line.startswith("cohesion"))
     left, again = (int(share) for share in re.findall(r"leaves (\d+)%", cohesion))
-    assert left < again - 20 and " at 60 N" not in cohesion
+    assert left < again - 5 and " at 60 N" not in cohesion.split(";")[0]
     assert ("this row," if rows == 1 else "these rows,") in cohesion
 
 

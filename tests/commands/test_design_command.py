@@ -100,7 +100,7 @@ def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
     [
         (("mass = 12.0\n", ""), [], "mass is missing; needed is a number in kg"),
         (("0.18]", "9.0]"), [], "of axle 1 leaves the ground on a slope of 3 deg"),
-        (("", ""), ["--slope", "70"], "--slope is 1.222 rad"),
+        (("", ""), ["--slope", "70"], "needed is 0 to 60 degrees"),
         (("", ""), ["--gravity", "pluto"], "gravity is 'pluto'"),
         (("", ""), ["--soil", "moon"], "no soil 'moon'"),
         (("", ""), ["--draws", "3"], "needed is a whole number from 50 to 20000"),

@@ -3,22 +3,9 @@
 import numpy as np
 import pytest
 
-from soilml import Estimator
-from soilml.cli import progress
-from soilml.onboard.presentation import MOST_LINES, remarks_on_runs
-from soilml.remarks import Remark
-
-
-def test_many_runs_with_the_same_remark_have_one_line():
-    same, other = Remark("out-of-range", "the estimate is the prior"), Remark("other", "neither")
-    many = [(f"r{i}", same) for i in range(MOST_LINES + 1)]
-    (one,) = remarks_on_runs("run", many)
-    assert one.text == "run r0, r1, r2 and 8 more: the estimate is the prior"
-    assert one.about == tuple(name for name, _ in many) and one.code == "out-of-range"
-    few = remarks_on_runs("run", [*many[:MOST_LINES], ("other", other)])
-    assert few[0].text == "run r0: the estimate is the prior" and len(few) == MOST_LINES + 1
-    assert few[-1].text == "run other: neither" and few[-1].about == ("other",)
-    assert remarks_on_runs("run", []) == []
+from datagen.recipe import read_recipe
+from soilml import Estimator, simulate
+from soilml.cli import main, progress
 
 
 @pytest.mark.parametrize("name", ["wheel", "wheel_linear"])
@@ -44,3 +31,17 @@ def test_progress_counts_the_rows_that_the_graph_is_given(monkeypatch, name):
     assert done == sorted(done) and done[-1] == 600
     assert inside.shape == (300,)
     np.testing.assert_array_equal(found.mean, estimator.run(**rows).mean)
+
+
+@pytest.mark.parametrize(("factor", "said"), [(1.0, False), (0.7, True)])
+def test_rows_that_disagree_with_the_exact_model_are_named(tmp_path, capsys, factor, said):
+    table = simulate(read_recipe("wheel").case, np.linspace(0.1, 0.5, 16), [60.0, 90.0] * 8, seed=3)
+    columns = ("slip", "load_N", "torque_Nm", "sinkage_m", "drawbar_pull_N")
+    rows = np.stack([np.asarray(table[name], float) for name in columns], axis=1)
+    rows[:, 2] *= factor
+    file = tmp_path / "rows.csv"
+    lines = ["run," + ",".join(columns), *("a," + ",".join(f"{x:.6g}" for x in r) for r in rows)]
+    file.write_text("\n".join(lines) + "\n")
+    assert main(["estimate", "wheel", str(file), "--by", "run"]) == 0
+    output = capsys.readouterr()
+    assert ("disagree with the exact model" in output.out + output.err) == said

@@ -9,9 +9,7 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL as MODEL
 
 from soilml.cli import main
-from soilml.cli.commands.gap import _calibration
 from soilml.config.case import read_case
-from soilml.errors import InputError
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 from soilml.physics.user_effects import load_effects
@@ -312,10 +310,3 @@ def test_no_decision_is_made_from_the_words_of_a_remark(
     assert main(["gap", *names, "--out", str(tmp_path / "nonsense")]) == 0
     assert in_codes(tmp_path / "nonsense") == plain
     assert "Next runs is not" in (tmp_path / "nonsense" / "gap.json").read_text()
-
-
-def test_a_calibration_without_a_number_says_how_it_is_written():
-    with pytest.raises(InputError, match=r"needed is EFFECT=STD, as in torque-gain=0\.003"):
-        _calibration(["torque-gain"], EFFECTS)
-    with pytest.raises(InputError, match="must be a number above zero"):
-        _calibration(["torque-gain=0"], EFFECTS)

@@ -3,6 +3,7 @@
 import resource
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -12,8 +13,8 @@ from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
 from soilml.errors import InputError, TableError
+from soilml.io.bounds import ROWS
 from soilml.io.parquet import read_parquet
-from soilml.io.table import MOST_ROWS
 from soilml.io.toml_settings import MOST_DEPTH, read_settings
 
 MARK = 'from pathlib import Path\n\nPath("it_ran").touch()\n'
@@ -56,7 +57,7 @@ def test_dots_in_texts_numbers_and_comments_are_no_key(tmp_path):
 def test_a_parquet_file_of_more_rows_than_a_csv_file_may_have_is_refused(tmp_path):
     """Before it is read: a column that repeats one value takes some kB."""
     file = tmp_path / "rows.parquet"
-    pq.write_table(pa.table({"slip": pa.array(np.zeros(MOST_ROWS + 1, np.int8))}), file)
+    pq.write_table(pa.table({"slip": pa.array(np.zeros(ROWS.most + 1, np.int8))}), file)
     assert file.stat().st_size < 200_000
     with pytest.raises(TableError, match="more than 10000000 rows"):
         read_parquet(file)
@@ -66,7 +67,7 @@ def test_the_rows_of_a_folder_of_parquet_files_are_counted_together(tmp_path, mo
     for name in ("a", "b"):
         pq.write_table(pa.table({"slip": [0.1] * 6}), tmp_path / f"{name}.parquet")
     assert len(read_parquet(tmp_path)[0]["slip"]) == 12
-    monkeypatch.setattr("soilml.io.parquet.MOST_ROWS", 11)
+    monkeypatch.setattr("soilml.io.parquet.ROWS", replace(ROWS, most=11))
     with pytest.raises(TableError, match="more than 11 rows"):
         read_parquet(tmp_path)
 

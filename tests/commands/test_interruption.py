@@ -10,7 +10,6 @@ import pytest
 from conftest import MODEL
 
 from soilml.cli import main
-from soilml.errors import InputError
 from soilml.io.atomic_files import Swap
 
 #: Runs the command line; SIGINT arrives when the named module is imported.
@@ -89,26 +88,6 @@ def test_a_signal_after_the_command_is_answered(monkeypatch, capsys, number):
     monkeypatch.setattr(module, "replaced", ["d.parquet"])
     assert module.main(["generate"]) == 128 + number
     assert capsys.readouterr().err == "soilml: interrupted; complete before that: d.parquet\n"
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("turned", [RuntimeError, ImportError, InputError])
-def test_an_interruption_that_became_another_error_is_one(monkeypatch, capsys, number, turned):
-    """Python turns what is raised while a class is made into a RuntimeError, and libraries too."""
-
-    def run(_):
-        try:
-            signal.raise_signal(number)
-        except BaseException as stop:
-            raise turned("the library is not installed") from stop
-
-    module = importlib.import_module("soilml.cli.commands.soils")
-    monkeypatch.setattr(module, "run", run)
-    assert main(["soils"]) == 128 + number
-    assert capsys.readouterr().err == "soilml: interrupted; no output was written\n"
-    monkeypatch.setattr(module, "run", lambda _: int("no interruption"))
-    with pytest.raises(ValueError, match="no interruption"):
-        main(["soils"])
 
 
 @pytest.mark.parametrize("where", ["__enter__", "__exit__"])

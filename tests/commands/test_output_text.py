@@ -20,14 +20,3 @@ def test_what_is_told_has_no_terminal_commands(capsys):
         say("an effect \x1b]0;named\x07 so\nand \u202eturned")
         said = getattr(capsys.readouterr(), stream)
         assert said == "an effect \\x1b]0;named\\x07 so\nand \\u202eturned\n"
-
-
-def test_a_list_of_numbers_is_one_line():
-    content = {
-        "a": [1.5, -2e-9, float("nan")],
-        "b": ["x [\n 1\n ]", [[1, 2], []]],
-        "c": [1, "x"],
-    }
-    text = json_text(content)
-    assert '"a": [1.5, -2e-09, null]' in text and "[1, 2]" in text
-    assert json.loads(text) == {**content, "a": [1.5, -2e-9, None]}

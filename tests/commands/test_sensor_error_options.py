@@ -123,7 +123,7 @@ def test_commands_that_do_not_use_a_bias_refuse_it(folder, capsys):
 
 def test_a_declared_bias_is_a_checked_sensor_for_gap(folder, monkeypatch):
     """[bias] says of gap's effects what --checked says; the option has the last word."""
-    bias = take_bias(Settings(tomllib.loads(BIAS)["bias"], "[bias]", folder))
+    bias = take_bias(Settings(tomllib.loads(BIAS)["bias"], "[bias]"))
     sizes = {"torque-gain": 0.05, "torque-offset": 0.1, "sinkage-offset": 0.002}
     assert checked_sensors(bias) == sizes and set(sizes) <= set(EFFECTS)
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n")

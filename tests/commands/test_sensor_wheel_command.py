@@ -84,6 +84,14 @@ def test_the_disc_of_the_sensors_is_taken_out_of_the_stress(files, capsys):
     assert (files / "k.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_a_stress_in_kpa_is_told(files, capsys):
+    head, *rows = (line.split(",") for line in (files / "stress.csv").read_text().splitlines())
+    lines = [",".join(head), *(f"{run},{angle},{float(p) / 1000}" for run, angle, p in rows)]
+    (files / "stress.csv").write_text("\n".join(lines) + "\n")
+    assert main(COMMAND) == 0
+    assert "2e+03 times the measured one: probably normal_Pa is in kPa" in capsys.readouterr().err
+
+
 def test_a_run_without_balance_is_named_and_the_others_answer(files, capsys):
     text = (
         (files / "runs.csv")

@@ -11,22 +11,14 @@ import threading
 import time
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import RECIPE
-from scipy.stats import qmc
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
-from datagen.simulation import _skip, pieces
+from datagen.simulation import pieces
 from soilml.errors import InputError
 from soilml.processes import process_map
-
-
-def slow_first(number):
-    """The earliest items take longest, so that results arrive out of order."""
-    time.sleep(0.02 * (number < 3))
-    return number, os.getpid()
 
 
 def wait_for_another(folder, number):
@@ -61,11 +53,6 @@ def test_results_come_in_order_from_several_processes(method, tmp_path):
     assert not multiprocessing.active_children()
 
 
-def test_one_worker_is_this_process():
-    with process_map(slow_first, range(3), 1) as results:
-        assert {process for _, process in results} == {os.getpid()}
-
-
 def test_an_error_in_a_worker_is_that_of_the_function():
     with (
         pytest.raises(InputError, match="five is too many"),
@@ -81,14 +68,6 @@ def test_a_worker_that_is_killed_is_named():
         process_map(die_at_five, range(9), 2) as results,
     ):
         list(results)
-
-
-def test_workers_end_where_the_results_are_not_wanted_any_more():
-    with pytest.raises(KeyboardInterrupt), process_map(slow_first, range(99), 2) as results:
-        next(results)
-        assert multiprocessing.active_children()
-        raise KeyboardInterrupt
-    assert not multiprocessing.active_children()
 
 
 def is_alive(process):
@@ -117,16 +96,6 @@ def test_workers_end_when_the_process_is_killed():
     while any(is_alive(worker) for worker in workers):
         assert time.monotonic() < deadline
         time.sleep(0.02)
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 7, 1000, 65_537])
-def test_skipping_points_is_fast_forward(count):
-    fast, plain = (qmc.Sobol(5, scramble=True, rng=np.random.default_rng((3, 1))) for _ in "ab")
-    _skip(fast, count)
-    if count:
-        plain.fast_forward(count)
-    assert fast.num_generated == plain.num_generated == count
-    assert (fast.random(64) == plain.random(64)).all()
 
 
 @pytest.mark.slow
@@ -198,19 +167,6 @@ def no_endless_wait():
     yield
     signal.alarm(0)
     signal.signal(signal.SIGALRM, before)
-
-
-def large_result(number):
-    return bytes(20_000_000)
-
-
-@pytest.mark.slow
-def test_workers_killed_while_they_write_are_not_waited_for(no_endless_wait):
-    for _ in range(10):
-        with pytest.raises(KeyboardInterrupt), process_map(large_result, range(40), 2) as results:
-            next(results)
-            raise KeyboardInterrupt
-        assert not multiprocessing.active_children()
 
 
 def killed_while_writing(delay):

@@ -43,29 +43,6 @@ def at(slip, load=60.0):
     return SampledRows(run, {}, np.full(RUNS, slip), np.full(RUNS, load), {})
 
 
-def test_errors_of_many_runs_have_the_covariance_of_the_remainder(recipe):
-    """Two rows of a run have errors alike; runs are independent of each other."""
-    slips = np.asarray([0.2, 0.25, 0.5])
-    drawn = np.stack([model_error(recipe, 0, at(s))["torque_Nm"] for s in slips])
-    columns = recipe.case.remainder.process_columns(
-        "torque", slips, np.full(3, 60.0), fitted_anew=True
-    )
-    expected = columns @ columns.T
-    # 4000 draws tell a variance within 2.2 %, five of whose standard errors are allowed
-    size = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
-    np.testing.assert_allclose(drawn @ drawn.T / RUNS / size, expected / size, atol=0.11)
-    assert np.abs(drawn.mean(axis=1)).max() < 5.0 * np.sqrt(expected.max() / RUNS)
-    assert abs(np.corrcoef(drawn[0, 1:], drawn[0, :-1])[0, 1]) < 5.0 / np.sqrt(RUNS)
-
-
-def test_the_rows_of_one_run_have_one_smooth_error(recipe):
-    slip = np.linspace(0.1, 0.5, 401)
-    rows = SampledRows(np.full(401, 7), {}, slip, np.full(401, 60.0), {})
-    error = model_error(recipe, 0, rows)["torque_Nm"]
-    # neighbours are 0.003 of a correlation length apart: white noise would differ by its size
-    assert np.abs(np.diff(error)).max() < 0.05 * np.abs(error).max()
-
-
 def test_generated_rows_are_the_model_its_mean_and_the_error(recipe):
     exact = replace(recipe, bias={}, case=replace(recipe.case, noise={}))
     rows, sampled = simulate_rows(exact, 0, 0, 64), sample_rows(exact, 0, 0, 64)

@@ -130,31 +130,11 @@ def test_a_disk_that_is_too_small_is_refused_before_anything_is_written(
     assert [file.name for file in tmp_path.iterdir()] == ["recipe.toml"]
 
 
-def test_the_size_is_estimated_well(recipe, tmp_path, monkeypatch):
-    many = recipe.sized(rows=20_000)
-    generate(many, tmp_path / "d.parquet")
-    size = (tmp_path / "d.parquet").stat().st_size
-    for share, fits in ((0.9, False), (1.2, True)):
-        disk = SimpleNamespace(free=share * size)
-        monkeypatch.setattr("shutil.disk_usage", lambda path, disk=disk: disk)
-        monkeypatch.setattr("datagen.generate.pieces", functools.partial(pieces, size=5000))
-        if fits:
-            generate(many, tmp_path / "e.parquet")
-        else:
-            with pytest.raises(InputError, match="free"):
-                generate(many, tmp_path / "e.parquet")
-
-
 def test_a_recipe_that_mostly_fails_leaves_no_folder(recipe, tmp_path):
     heavy = replace(recipe, load=replace(recipe.load, lower=3e4, upper=1.2e5))
     with pytest.raises(InputError, match="no equilibrium"):
         generate_folder(heavy, tmp_path / "data")
     assert not (tmp_path / "data").exists()
-
-
-def test_a_block_has_no_more_runs_than_the_sequence_has_points(recipe):
-    with pytest.raises(InputError, match="at most 1073741824 can be drawn with one seed"):
-        pieces(recipe.sized(rows=5 * 10**9))
 
 
 @pytest.mark.slow

@@ -23,6 +23,13 @@ b,0.3,90,4.4,7.0,0.021
 b,0.5,90,5.3,8.0,0.022
 """
 MODEL = THREE_CHANNEL_MODEL
+#: Another program in place of the equations, by a file that the page may not name.
+SIMULATOR = """\
+[simulator]
+table = "/etc/hostname"
+slip = [0.05, 0.6]
+load_N = [30.0, 110.0]
+"""
 RECIPE_TEXT = RECIPE.format(rows=50, seed=1)
 
 #: Forty lines of a rig that starts, drives with slip and stops, under a header with units.

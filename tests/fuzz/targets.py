@@ -10,16 +10,21 @@ import contextlib
 import io
 import json
 import os
+import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from unittest import mock
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "faults"))
 
 import files
 import numpy as np
 import onnx
+import small_files
 from hypothesis import strategies as st
 
 import soilml
@@ -33,7 +38,9 @@ from soilml.identification import METHODS
 from soilml.io.read_table import as_table, read_table
 from soilml.io.table import Table
 from soilml.log_import import import_log, init_map
+from soilml.log_import.readers import read_log
 from soilml.parameters import declared
+from soilml.serve.answers.chosen_case import model_text
 
 EXPORTED = Path(soilml.__file__).parents[1] / "exported"
 ONNX = (EXPORTED / "wheel_linear.onnx").read_bytes()
@@ -75,6 +82,30 @@ def _log(content: bytes) -> None:
         tomllib.loads(text)
         drawn.write_text(text.replace("# radius = ", "radius = "), encoding="utf-8")
         import_log(log, drawn, accept=True)
+
+
+def _page_model(content: bytes) -> None:
+    """A model file of the page: none of its text leads to a file."""
+    asked: list[str] = []
+    with _without_files(asked):
+        try:
+            model_text({"model": content.decode(errors="replace")})
+        finally:
+            assert not asked, asked
+
+
+@contextlib.contextmanager
+def _without_files(asked: list[str]) -> Iterator[None]:
+    """Note each file that is opened for reading and does not belong to the page."""
+    opened = Path.open
+
+    def noted(path: Path, *words: Any, **more: Any) -> Any:
+        if path.name != "MODEL.toml" and "soilml" not in path.parts:
+            asked.append(str(path))
+        return opened(path, *words, **more)
+
+    with mock.patch.object(Path, "open", noted):
+        yield
 
 
 def _rows(content: bytes) -> None:
@@ -272,6 +303,14 @@ TARGETS: dict[str, Target] = {
         2.0,
     ),
     "log": Target(_log, files.changed_text(files.LOG) | st.binary(max_size=64), 0.3),
+    "spreadsheet": Target(
+        _in_file("r.xlsx", read_log), files.changed_bytes(small_files.small_xlsx()), 0.3
+    ),
+    "matlab": Target(
+        _in_file("r.mat", read_log), files.changed_bytes(small_files.small_mat()), 0.5
+    ),
+    "hdf5": Target(_in_file("r.h5", read_log), files.changed_bytes(small_files.small_hdf5()), 0.5),
+    "page-model": Target(_page_model, files.changed_text(files.MODEL + files.SIMULATOR), 0.5),
     "python-rows": Target(_rows, as_json(python_columns), 3.0),
     "onnx": Target(
         _in_file("m.onnx", Estimator.load), files.changed_bytes(ONNX) | changed_metadata(), 0.5

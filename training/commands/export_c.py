@@ -25,10 +25,14 @@ Functions, with NAME the name of OUT.c:
   NAME_set_step        add rows to a set
   NAME_set_answer      the estimate from all rows of the set
   NAME_set_update      a step and its answer in one
+  NAME_tracker_start   begin a drive over soils that change
+  NAME_tracker_read    one row of it: what it is, and the soil after it
 
 docs/c-export.md describes them, with an example in C and one in C++.
 """
-MOST_ROWS = 4096  # Rows of one step that the working memory may be asked for
+#: Rows of one step that the working memory may be asked for, and rows that a tracker remembers.
+MOST_ROWS = 4096
+LEAST_LENGTH = 16  # Fewest rows that a tracker remembers
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,6 +45,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=32,
         metavar="N",
         help="rows that one step of a set takes at most; working memory grows with it (default 32)",
+    )
+    parser.add_argument(
+        "--length",
+        type=whole_number_from(LEAST_LENGTH, MOST_ROWS),
+        default=100,
+        metavar="N",
+        help="rows that a tracker remembers; its memory grows with it (default 100)",
     )
 
 
@@ -65,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     check_c_name(out)
     file = find_model(args.model)
     metadata = Estimator.load(file).metadata
-    written = write_c(onnx.load(str(file)), metadata, out.stem, file.name, args.rows)
+    written = write_c(onnx.load(str(file)), metadata, out.stem, file.name, args.rows, args.length)
     with atomic_outputs(outputs(args)) as (source, header):
         source.write_text(written.source, encoding="utf-8")
         header.write_text(written.header, encoding="utf-8")

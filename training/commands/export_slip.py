@@ -7,12 +7,11 @@ from pathlib import Path
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_effects_option,
     add_output,
-    number,
     whole_number_from,
 )
-from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 
 HELP = "write the slip filter of a rover without odometry as ONNX, and as C99"
@@ -42,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"draws of the prior that stand for all soils (default: {SOILS})",
     )  # fmt: skip
     parser.add_argument(
-        "--least-speed", type=number, default=0.005, metavar="M/S",
+        "--least-speed", type=NumberFrom(1e-4, 10.0, "m/s"), default=0.005, metavar="M/S",
         help="speed of a rim below which the wheel stands (default: 0.005)",
     )  # fmt: skip
     add_effects_option(parser)
@@ -68,8 +67,6 @@ def run(args: argparse.Namespace) -> int:
     need("jinja2", "export-slip")
     if args.c is not None:
         check_c_name(Path(args.c))
-    if args.least_speed <= 0.0:
-        raise InputError(f"--least-speed is {args.least_speed:g}; it must be above zero")
     case = read_case(args.rover, available_effects(args))
     with working(f"tabulating forces on {args.soils} soils"):
         found = slip_files(case, args.soils, STEEPEST, args.least_speed, args.c, args.out)

@@ -19,7 +19,7 @@ from soilml.io.atomic_files import atomic_output
 from soilml.io.toml_settings import Settings
 from soilml.onboard.features import READABLE, compute_features, inputs_of, numerator_denominator
 from soilml.onboard.gaussian_pooling import write_pooling
-from soilml.onboard.model_file import FORMAT, metadata_checksum, serialise_metadata
+from soilml.onboard.model_file import FORMAT, with_checksums
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES
 from training.dataset import PER_ROW
@@ -195,7 +195,7 @@ def _gear_in_si(entry: dict[str, Any]) -> dict[str, Any]:
     """The gear of a recipe, with numbers for values that have a unit, such as "150 mm"."""
     if not entry:
         return {}
-    made = take_gear(Settings(dict(entry), "[gear]", Path()))
+    made = take_gear(Settings(dict(entry), "[gear]"))
     return {
         name: getattr(made, name, value) if isinstance(value, str) else value
         for name, value in entry.items()
@@ -254,11 +254,9 @@ def export_model(
 
 def write_model(model: Any, metadata: dict[str, str], path: str | os.PathLike[str]) -> None:
     """Write a graph with its metadata; the checksums of both are added to `metadata`."""
-    graph = model.SerializeToString(deterministic=True)
-    metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
-    metadata["metadata_sha256"] = metadata_checksum(metadata)
+    content = with_checksums(model.SerializeToString(deterministic=True), metadata)
     with atomic_output(path) as part:
-        part.write_bytes(graph + serialise_metadata(metadata))
+        part.write_bytes(content)
 
 
 def _parity_readings(trained: TrainedModel) -> dict[str, Floats]:

@@ -78,7 +78,7 @@ def _family(metadata: Mapping[str, str], sets: Mapping[str, Any], path: Path) ->
     """The family of wheels that a file was trained for, from the recipe or spec in its metadata."""
     if sets["alone"]:
         ranges = json.loads(metadata["spec"])["any_wheel"]
-        return DimensionlessFamily.take(Settings(ranges, "[any_wheel]", path))
+        return DimensionlessFamily.take(Settings(ranges, "[any_wheel]"))
     targets = [entry["name"] for entry in json.loads(metadata["outputs"])]
     return RecipeFamily.of(parse_recipe(metadata["recipe"], str(path)), targets)
 

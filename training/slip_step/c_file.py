@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from soilml import __version__
-from soilml.onboard.slip_stream import FLAGS, QUANTILES, RECENT
+from soilml.onboard.slip_stream import FLAGS, POSSIBLE, QUANTILES, RECENT
 from soilml.slip_filter.filter import SlipFilter
 from training.export_c.c_file import BYTES, kernel_texts, template_environment
 from training.export_c.c_text import array
@@ -19,15 +20,20 @@ from training.export_c.stage_text import ARRAYS
 from training.export_c.tensor import Size, Tensor
 from training.slip_step.graph import start_of
 
+#: Entries of the metadata that tell one file from another, and which rover and prior it is for.
+IDENTITY = ("graph_sha256", "metadata_sha256", "case_sha256")
 OUTPUTS = ("speed", "slip", "probability", "flags", "grounds_out", "recent_out")
 
 
-def write_slip_c(model: Any, filter_: SlipFilter, name: str, origin: str) -> tuple[str, str]:
+def write_slip_c(
+    model: Any, filter_: SlipFilter, name: str, origin: str, metadata: Mapping[str, str]
+) -> tuple[str, str]:
     """Texts of the C file and of its header.
 
     model: Of `slip_step_model`.
     name: Prefix of all C names.
     origin: Name of the model file, for the comment at the head.
+    metadata: Of the model file.
     """
     shared = SharedParts()
     inputs = {
@@ -40,7 +46,7 @@ def write_slip_c(model: Any, filter_: SlipFilter, name: str, origin: str) -> tup
     arrays = {ARRAYS[kind]: (kind, length) for kind, length in function.lengths.items()}
     sizes = {
         "work_bytes": sum(BYTES[kind] * length for kind, length in arrays.values()),
-        "state_bytes": 4 * (start.size + RECENT),
+        "state_bytes": 4 * (start.size + RECENT + 2),
         "constant_bytes": sum(v.size * BYTES[kind] for _, v, kind in used) + 4 * start.shape[0],
     }
     values = {
@@ -60,6 +66,11 @@ def write_slip_c(model: Any, filter_: SlipFilter, name: str, origin: str) -> tup
         "prior": array("prior", start[:, 0].astype(np.float32), "float"),
         "begin": start[0, 1:].tolist(),
         "kernels": kernel_texts(shared),
+        "identity": {key: metadata[key] for key in IDENTITY},
+        "possible": POSSIBLE,
+        "finite": [
+            f"all_finite(out_{key}, {length})" for key, (_, length) in function.outputs.items()
+        ],
         "load": (float(filter_.table.load[0]), float(filter_.table.load[-1])),
         **sizes,
     }

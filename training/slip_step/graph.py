@@ -29,11 +29,11 @@ from soilml.slip_filter.filter import (
 )
 from training.onnx_graph.builder import FLOAT, Graph
 from training.onnx_graph.value import Value, absolute, concat, constant, exp, log, sqrt, where
+from training.slip_step.force_curves import RATIO_ENDS, ForceCurves, columns, slip_of
 
 #: Places of the distribution function of the speed, in standard deviations about the mean.
 PLACES = np.arange(-4.0, 4.01, 0.125)
 TINY, FAR = 1e-12, 1e30  # Smallest divisor; numbers beyond are not measured
-RATIO_ENDS = (0.01, 10.0)  # Of rim speeds to each other
 
 
 def slip_step_model(filter_: SlipFilter, least_speed: float, gravity: float) -> Any:
@@ -104,21 +104,23 @@ class _Step:
         sound = usable * steady
         raw = where(usable > 0.5, raw, float(least_speed) + constant(graph, np.ones(self.k)))
         torque = read["torque"] * way
-        seen = absolute(torque) < FAR
+        size, most = absolute(torque), constant(graph, self.filter.most_torque)
+        seen = size <= most
+        wild = (size > most).astype(np.float32) * (size < FAR).astype(np.float32)
         torque = where(seen, torque, 0.0)
         slope = read["slope"] * way
         load = read["load"].clip(float(self.table.load[0]), float(self.table.load[-1]))
         rim, apart, kept = self._rims(recent.take([0], 0), raw)
-        pull, own = self._curves(graph, rim, load)
+        curves = ForceCurves(graph, self.table, rim, load)
+        pull = curves.pull()
         sin, cos = slope.node("Sin"), slope.node("Cos")
         share = constant(graph, self.filter._share[:, None])
         found = self._balance(graph, pull, (sin + share) * self.filter.weight)
         hot, part, missing, rise, place = found
         error = cos * float(self.filter.weight * self.errors.slope_std)
-        before_at = [(values[0] * hot).sum(1, True) for values in own]
-        after_at = [(values[1] * hot).sum(1, True) for values in own]
-        risen = [b - a for a, b in zip(before_at, after_at, strict=True)]
-        model = [a + part * d for a, d in zip(before_at, risen, strict=True)]
+        ends = [curves.torques(i, hot) for i in range(self.k)]
+        risen = [b - a for a, b in ends]
+        model = [a + part * d for (a, _), d in zip(ends, risen, strict=True)]
         common = [d / rise * error for d in risen]
         step = (hot * constant(graph, np.diff(-self.ratio)[None])).sum(1, True)
         floor = constant(graph, self.table.floor[:, None].astype(float))
@@ -144,6 +146,7 @@ class _Step:
             "sound": sound, "way": way, "rim": rim, "answer": answer, "quantiles": quantiles,
             "after": after, "apart": apart, "middle": middle_raw, "misfit": misfit,
             "no_soil": no_soil, "beyond": beyond, "standing": standing, "usable": usable,
+            "wild": wild.reduce("ReduceMax", 0, True),
         }, new_mean, new_cov)  # fmt: skip
 
     def _rims(self, apart: Value, rim: Value) -> tuple[Value, Value, Value]:
@@ -154,38 +157,6 @@ class _Step:
         joined = where(apart > 0.0, apart * ROWS_ALIKE + now * (1.0 - ROWS_ALIKE), now)
         kept = (1.0 - float(self.errors.speed_std**2) / joined.clip(TINY)).clip(0.0)
         return middle + kept * away, joined, kept
-
-    def _curves(
-        self, graph: Graph, rim: Value, load: Value
-    ) -> tuple[Value, list[tuple[Value, Value]]]:
-        """Pull (n, m) of the rover, and for each wheel its torque at all slips but the last, and
-        at all but the first, (n, m - 1) each."""
-        table, m, levels = self.table, len(self.table.slip), len(self.table.load)
-        fastest = rim.reduce("ReduceMax", 0, True)
-        level = (log(load) - float(np.log(table.load[0]))) * float(
-            (levels - 1) / np.log(table.load[-1] / table.load[0])
-        )
-        own, total = [], None
-        for i, kind in enumerate(table.kind):
-            ratio = fastest / rim.take([i], 0) * constant(graph, self.ratio[None])  # (1, m)
-            slip = slip_of(ratio.clip(*RATIO_ENDS)).clip(
-                float(table.slip[0]), float(table.slip[-1])
-            )
-            between = _hats(graph, table.slip, slip)  # (m nodes, m places)
-            at = absolute(level.take([i], 0) - constant(graph, np.arange(levels)[None]))
-            share = (1.0 - at).clip(0.0)  # (1, levels)
-            both = []
-            for values in (table.pull[kind], table.torque[kind]):
-                flat = constant(graph, values.reshape(levels, -1))
-                whole = (share @ flat).reshape(self.n, m)
-                soils, floors = whole.split([self.soils, self.n - self.soils], 0)
-                both.append(concat([soils @ between, floors], 0))
-            scaled = load.take([i], 0) * both[0]
-            total = scaled if total is None else total + scaled
-            torque = both[1] * (load.take([i], 0) * float(table.radius[i]))
-            own.append((_columns(torque, 0, m - 1), _columns(torque, 1, m)))
-        assert total is not None
-        return total, own
 
     def _balance(
         self, graph: Graph, pull: Value, needed: Value
@@ -201,8 +172,8 @@ class _Step:
         hot = concat([second + begin, rest], 1)
         last = np.eye(1, m - 1, m - 2)
         hot = hot + (1.0 - known) * constant(graph, last)
-        low = (_columns(pull, 0, m - 1) * hot).sum(1, True)
-        high = (_columns(pull, 1, m) * hot).sum(1, True)
+        low = (columns(pull, 0, m - 1) * hot).sum(1, True)
+        high = (columns(pull, 1, m) * hot).sum(1, True)
         rise = (high - low).clip(1e-3 * float(self.filter.weight))
         share = where(known > 0.5, ((needed - low) / rise).clip(0.0, 1.0), 1.0)
         missing = where(known > 0.5, 0.0 * rise, needed - pull.reduce("ReduceMax", 1, True))
@@ -319,7 +290,7 @@ class _Step:
         )
         distribution = (weight * under).sum(0, True)  # (1, places)
         count = len(PLACES)
-        low, high = _columns(distribution, 0, count - 1), _columns(distribution, 1, count)
+        low, high = columns(distribution, 0, count - 1), columns(distribution, 1, count)
         found = []
         for q in QUANTILES:
             share = ((q - low) / (high - low).clip(TINY)).clip(0.0, 1.0)
@@ -371,6 +342,7 @@ class _Step:
             misfit * answered,
             (beyond > LIKELY).astype(np.float32) * answered,
             (width > WIDE).astype(np.float32) * answered,
+            made["wild"] * sound,
         ]
         concat(flags, 0).reshape(len(FLAGS)).named("flags")
 
@@ -378,23 +350,3 @@ class _Step:
 def d_squared(x: Value) -> Value:
     """x times itself."""
     return x * x
-
-
-def slip_of(ratio: Value) -> Value:
-    """Slip from v / (r omega), above zero."""
-    return where(ratio > 1.0, 1.0 / ratio.clip(1.0) - 1.0, 1.0 - ratio)
-
-
-def _columns(x: Value, first: int, last: int) -> Value:
-    return Value(x.graph, x.graph.columns(x.name, first, last), x.dtype)
-
-
-def _hats(graph: Graph, nodes: Floats, places: Value) -> Value:
-    """Weights (m, places) of values at nodes (m,) that interpolate linearly at places (1, .)."""
-    step = np.diff(nodes)
-    up = (places - constant(graph, nodes[1:-1, None])) / constant(graph, step[:-1, None]) + 1.0
-    down = (constant(graph, nodes[1:-1, None]) - places) / constant(graph, step[1:, None]) + 1.0
-    inner = up.node("Min", down).clip(0.0)
-    begin = ((float(nodes[1]) - places) / float(step[0])).clip(0.0)
-    end = ((places - float(nodes[-2])) / float(step[-1])).clip(0.0)
-    return concat([begin, inner, end], 0)

@@ -8,12 +8,11 @@ from enum import IntEnum
 from math import isfinite
 from pathlib import Path
 
-import numpy as np
-
 from soil_estimator.rows import SOURCES, RowCollector, Stretch
 from soil_estimator.settings import NodeSettings
 from soilml import SoilTracker
-from soilml.onboard.tracking import Event, TrackerState
+from soilml.errors import InputError
+from soilml.onboard.tracking import Event, TrackerState, read_state, write_state
 
 #: Names of other joints that a message shows where the wheel's is missing.
 MOST_NAMED = 6
@@ -85,6 +84,8 @@ class SoilLogic:
         self._closed_at: float | None = None
         self._remembered: list[Stretch] = []
         self._events = dict.fromkeys(Event, 0)
+        self._written: float | None = None
+        self._unwritten = ""
         self._tracker, self.remark = self._restored()
 
     def on_joints(
@@ -123,6 +124,7 @@ class SoilLogic:
         self._tracker.restart()
         self._rows.forget()
         self._remembered = []
+        self._try_to_save()
 
     def save(self) -> None:
         """Write the rows that are remembered to the state file, where there is one.
@@ -130,11 +132,15 @@ class SoilLogic:
         Raises OSError if it cannot be written.
         """
         if self._settings.state_file:
-            path = Path(self._settings.state_file)
-            part = path.with_name(path.name + ".part")
-            with part.open("wb") as opened:
-                np.savez(opened, **self._tracker.save())
-            part.replace(path)
+            write_state(self._settings.state_file, self._tracker.save())
+
+    def _try_to_save(self) -> None:
+        """As `save`; a drive goes on where the file cannot be written, and diagnostics say so."""
+        try:
+            self.save()
+            self._unwritten = ""
+        except OSError as error:
+            self._unwritten = f"; state_file cannot be written: {error.strerror or error}"
 
     def inputs(self, now: float) -> SoilReport:
         """Whether the messages arrive, and what is wrong with them. `now` as in `on_joints`."""
@@ -173,7 +179,8 @@ class SoilLogic:
         """The last estimate, with the number of rows by what they were found to be."""
         report = self._report(self._tracker.state, 0)
         counts = {f"rows_{event.name.lower()}": float(n) for event, n in self._events.items()}
-        return SoilReport(report.level, report.message, report.values | counts)
+        level = Level.WARN if self._unwritten else report.level
+        return SoilReport(level, report.message + self._unwritten, report.values | counts)
 
     def _restored(self) -> tuple[SoilTracker, str]:
         """The tracker with the rows of the state file, where these can be used."""
@@ -182,11 +189,9 @@ class SoilLogic:
         if not path or not Path(path).exists():
             return SoilTracker(estimator, length), ""
         try:
-            with Path(path).open("rb") as opened, np.load(opened, allow_pickle=False) as arrays:
-                tracker = SoilTracker.restore(estimator, arrays, length)
-        except Exception as error:  # whatever a damaged file raises
-            first = " ".join(str(error).split())
-            return SoilTracker(estimator, length), f"state_file {path} is not used: {first}"
+            tracker = SoilTracker.restore(estimator, read_state(path), length)
+        except InputError as error:
+            return SoilTracker(estimator, length), f"state_file {path} is not used: {error}"
         return tracker, f"{tracker.state.rows_remembered} rows are restored from {path}"
 
     def _note(self, now: float) -> None:
@@ -218,7 +223,12 @@ class SoilLogic:
         stretches = self._rows.add(stamp, finite)
         if stretches:
             self._closed_at = now
-        return self._read(stretches)
+        reports = self._read(stretches)
+        every = self._settings.save_every
+        if reports and (self._written is None or not 0.0 <= now - self._written < every):
+            self._written = now
+            self._try_to_save()
+        return reports
 
     def _read(self, stretches: Iterable[Stretch]) -> list[SoilReport]:
         """Reports on the rows of stretches that are complete."""

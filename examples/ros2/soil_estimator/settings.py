@@ -34,7 +34,8 @@ DEFAULTS: dict[str, tuple[str, Any]] = {
     "patience": ("longest wait for late messages, s", 2.0),
     "least_speed": ("speed of the rim below which the wheel stands, m/s", 0.005),
     "length": ("rows that are remembered", 100),
-    "state_file": ("file in which the rows are kept when the node stops; empty: none", ""),
+    "state_file": ("file in which the rows are kept; empty: none", ""),
+    "save_every": ("time between two writings of state_file, s", 10.0),
 }
 #: Parameters that a file for many wheels needs, and no other file takes.
 CONTEXT = {
@@ -47,7 +48,7 @@ CONTEXT = {
 }
 PARAMETERS = REQUIRED | {name: text for name, (text, _) in DEFAULTS.items()} | CONTEXT
 NOISE = {"torque_noise": "torque", "slip_noise": "slip", "load_noise": "load"}
-POSITIVE = ("wheel_radius", "period", "patience", "least_speed")
+POSITIVE = ("wheel_radius", "period", "patience", "least_speed", "save_every")
 #: Longest period and patience, s: stamps of messages are whole nanoseconds.
 LONGEST = 86400.0
 
@@ -67,6 +68,7 @@ class NodeSettings:
     least_speed: float
     length: int
     state_file: str
+    save_every: float
     given: Mapping[str, Any]
 
     @property
@@ -95,7 +97,7 @@ def settings_of(given: Mapping[str, Any]) -> NodeSettings:
     for name in POSITIVE:
         if number[name] <= 0.0:
             raise InputError(f"the parameter {name} is {number[name]:g}; it must be above zero")
-    for name in ("period", "patience"):
+    for name in ("period", "patience", "save_every"):
         check_time(name, number[name])
     if abs(number["joint_sign"]) != 1.0:
         raise InputError(f"the parameter joint_sign is {number['joint_sign']:g}; it is 1 or -1")

@@ -102,6 +102,11 @@ class SlipLogic:
             raise InputError(
                 f"the parameter wheel_radius is {self._radius:g}; it must be above zero"
             )
+        if not np.allclose(self.stream.radius, self._radius, rtol=1e-3):
+            raise InputError(
+                f"the parameter wheel_radius is {self._radius:g}; {values['model']} is for wheels "
+                f"of {', '.join(f'{radius:g}' for radius in self.stream.radius)} m"
+            )
         sources = {"pitch": "the inertial unit", "roll": "the inertial unit"}
         for i, joint in enumerate(self._joints):
             sources |= {f"speed_{i}": f"velocity of {joint}", f"torque_{i}": f"effort of {joint}"}
@@ -157,14 +162,17 @@ class SlipLogic:
         load = self.stream.loads(row["pitch"], row["roll"])
         if load.min() <= 0.0:
             return Twist(stretch.end, None, NOT_ESTIMATED, ("wheel-off-the-ground",))
-        answer, self._state = self.stream.step(
-            self._state,
-            [row[f"speed_{i}"] for i in wheels],
-            [row[f"torque_{i}"] for i in wheels],
-            load,
-            row["pitch"],
-            elapsed,
-        )
+        try:
+            answer, self._state = self.stream.step(
+                self._state,
+                [row[f"speed_{i}"] for i in wheels],
+                [row[f"torque_{i}"] for i in wheels],
+                load,
+                row["pitch"],
+                elapsed,
+            )
+        except InputError:  # a row that is not possible: the state stays as it was
+            return Twist(stretch.end, None, NOT_ESTIMATED, ("row-not-possible",))
         speed = answer.speed if answer.answered else None
         return Twist(stretch.end, speed, answer.speed_std**2, answer.flags)
 

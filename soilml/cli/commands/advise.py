@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
+    NumberFrom,
     add_effects_option,
     add_exact_model_option,
     add_gravity_options,
@@ -15,7 +16,6 @@ from soilml.cli.options import (
     add_output,
     add_row_options,
     gravity_change,
-    number,
     slip_limit,
     whole_number_from,
 )
@@ -97,7 +97,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_gravity_options(parser)
     parser.add_argument(
         "--target-load",
-        type=number,
+        type=NumberFrom(1e-3, 1e6, "N"),
         metavar="N",
         help="with --gravity: load of the wheel there (default: mean of [rover])",
     )

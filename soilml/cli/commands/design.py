@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_output,
     add_report_option,
-    number,
     parse_names,
     whole_number_from,
 )
@@ -70,10 +70,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "study", type=InputFile, metavar="ROVER.toml", help="rover, wheel, soil and goal"
     )
-    parser.add_argument("--slope", type=number, metavar="DEG", help="slope in degrees")
+    parser.add_argument(
+        "--slope", type=NumberFrom(0.0, 60.0, "degrees"), metavar="DEG", help="slope in degrees"
+    )
     parser.add_argument("--gravity", metavar="G", help="gravity: earth, moon, mars, or in m/s^2")
     parser.add_argument("--soil", metavar="A,B,...", help="published soils, each as likely")
-    parser.add_argument("--risk", type=number, help="probability of failing that is accepted")
+    parser.add_argument(
+        "--risk", type=NumberFrom(0.001, 0.5), help="probability of failing that is accepted"
+    )
     parser.add_argument(
         "--designs",
         type=whole_number_from(1, 100_000),

@@ -10,12 +10,14 @@ from soilml.cli.options import InputFile, add_output, add_seed_option, whole_num
 HELP = "runs of a simulator that takes the place of the equations"
 DESCRIPTION = """\
 Propose the runs of [simulator] in MODEL.toml: slip, load and the soil in the
-ranges of its priors. Where [simulator] has python or command, the runs are made
-and written to its table; then identify, pull and gap use that simulator.
+ranges of its priors. With --trust, the python or command of [simulator] makes
+the runs, which are written to its table; then identify, pull and gap use that
+simulator. It is code from the model file, and may do all that you may.
 
   soilml design-runs MODEL.toml                    the runs, as a table
-  soilml design-runs MODEL.toml --count 40         40 more where it is unsure
-  soilml design-runs MODEL.toml --out design.csv   without python and command
+  soilml design-runs MODEL.toml --trust            makes them
+  soilml design-runs MODEL.toml --trust --count 40 40 more where it is unsure
+  soilml design-runs MODEL.toml --out design.csv   the runs, as a file
 
 The first runs fill the space evenly. Where the table exists, further runs are
 those at which the emulator of the runs is least sure. The error of the emulator
@@ -36,6 +38,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of runs (default: 20 for each input, 5 where there are runs)",
     )
+    parser.add_argument(
+        "--trust", action="store_true", help="run the python or command of [simulator]"
+    )
     add_seed_option(parser)
     add_output(parser, "--out", "DESIGN.csv", "write the design without making the runs")
 
@@ -48,8 +53,10 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.config.simulator import emulator_of, read_runs
+    from soilml.errors import InputError
     from soilml.experiment_design import simulator_runs as runs
     from soilml.io.atomic_files import save_text
+    from soilml.io.cell_text import one_line
     from soilml.io.text_tables import csv_text, format_table
     from soilml.optional_imports import need
 
@@ -58,6 +65,12 @@ def run(args: argparse.Namespace) -> int:
     inputs = runs.design_inputs(case)
     assert case.simulator is not None
     simulator, earlier = case.simulator, None
+    if simulator.runs is None:
+        raise InputError(
+            f"{args.model} [simulator] has its runs within it; needed is table, the file of them"
+        )
+    if args.trust and not simulator.code:
+        raise InputError(f"--trust: {args.model} [simulator] has neither python nor command")
     if simulator.runs.is_file():
         earlier = read_runs(simulator.runs)
         count = args.count or runs.FURTHER * len(inputs)
@@ -65,8 +78,10 @@ def run(args: argparse.Namespace) -> int:
     else:
         count = args.count or runs.FIRST * len(inputs)
         design = runs.space_filling_runs(case, count, args.seed)
-    if args.out is not None or not (simulator.python or simulator.command):
+    if args.out is not None or not args.trust:
         write_columns(design, args.out)
+        if simulator.code and args.out is None:
+            tell(f"nothing was run; with --trust this makes the runs: {one_line(simulator.code)}")
         return 0
     with working(f"running the simulator {count} times"):
         made: dict[str, Any] = runs.run_simulator(simulator, design)

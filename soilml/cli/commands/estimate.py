@@ -129,6 +129,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.remainder import SAME_ROWS
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
+    from soilml.io.bounds import ESTIMATES
     from soilml.io.read_table import FILLED, RUNS
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.estimator import Estimator
@@ -146,6 +147,7 @@ def run(args: argparse.Namespace) -> int:
     table, case, own = None, None, []
     if args.runs is not None:
         table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
+        ESTIMATES.check(table.source, len(table))
     if args.case is not None:
         case = read_case_of_rows(args, args.case, table)
         if table is not None and not any(map(trained_remainder, estimators)):
@@ -349,7 +351,7 @@ def _group_estimates(
         better += f", or take those of one soil together, such as --by {ALL},"
     remarks += presentation.width_remarks(estimate, whose, "do", better)
     if estimate.in_range.any():
-        name, rows = groups[i := presentation.widest_row(estimate)]
+        name = names[i := presentation.widest_row(estimate)]
         head = "" if by == ALL else f"{by} {name}: "
         remarks += [
             one.under(head)
@@ -357,7 +359,8 @@ def _group_estimates(
                 estimator,
                 estimate.mean[i],
                 estimate.covariance[i],
-                table_estimates.row_readings(estimator, rows),
+                readings[i],
+                box,
             )
         ]
     remarks += presentation.refusal_remarks(by, names, counts - in_range, counts, estimate)

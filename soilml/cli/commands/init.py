@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from soilml.cli.options import whole_number_from
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
 from soilml.io.cell_text import is_number, read_number
@@ -56,7 +57,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="standard deviation of torque: '2 %%', 0.05 (N m) or '2 %% + 0.05' (default: 2 %%)",
     )
     parser.add_argument("--mass", metavar="KG", help="mass of a rover in kg")
-    parser.add_argument("--wheels", type=int, metavar="N", help="its number of wheels (default: 4)")
+    parser.add_argument(
+        "--wheels",
+        type=whole_number_from(2, 100),
+        metavar="N",
+        help="its number of wheels (default: 4)",
+    )
     for name, text in LENGTHS.items():
         parser.add_argument(f"--{name}", metavar="M", help=f"its {text}, in m or such as '40 cm'")
 
@@ -172,7 +178,7 @@ def _soil(name: str | None) -> str:
 def _rover(args: argparse.Namespace) -> str:
     """The tables of the rover, of which no length is assumed."""
     mass, wheels = _size("mass", args.mass), 4 if args.wheels is None else args.wheels
-    if wheels < 2 or wheels % 2:
+    if wheels % 2:
         raise InputError(f"--wheels is {wheels}; needed is an even number, 2 or more")
     missing = [name for name in LENGTHS if getattr(args, name) is None]
     if missing:

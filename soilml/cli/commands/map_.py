@@ -7,13 +7,14 @@ from pathlib import Path
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_effects_option,
     add_row_options,
     folder_outputs,
-    number,
     whole_number_from,
 )
 
+SIZE = NumberFrom(0.01, 1000.0, "m")  # Of a cell, and how far a reading reaches
 HELP = "a map of the soil along a drive, and of the slopes that can be climbed"
 DESCRIPTION = """\
 Make a map of the soil from the rows of a drive with positions: its parameters
@@ -52,9 +53,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="trained file for this wheel (default: any_wheel)",
     )  # fmt: skip
     parser.add_argument("--slope", metavar="DEG", help="slopes in degrees (default: 0,5,10,15)")
-    parser.add_argument("--cell", type=number, metavar="M", help="side of a cell (default: 0.5)")
+    parser.add_argument("--cell", type=SIZE, metavar="M", help="side of a cell (default: 0.5)")
     parser.add_argument(
-        "--reach", type=number, metavar="M",
+        "--reach", type=SIZE, metavar="M",
         help="distance from a reading up to which the soil is known (default: 2)",
     )  # fmt: skip
     parser.add_argument(

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_effects_option,
     add_gear_option,
     add_output,
-    number,
 )
 from soilml.errors import InputError
 
@@ -54,14 +54,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--load", required=True, help="vertical loads in N")
     parser.add_argument(
-        "--speed", type=number, metavar="M_S", help="speed in m/s, below 0 in reverse"
+        "--speed",
+        type=NumberFrom(-100.0, 100.0, "m/s"),
+        metavar="M_S",
+        help="speed in m/s, below 0 in reverse",
     )
     parser.add_argument(
-        "--pass", dest="passes", type=number, help="number of the pass: 1 on undisturbed soil"
+        "--pass",
+        dest="passes",
+        type=NumberFrom(1.0, 1e4),
+        help="number of the pass: 1 on undisturbed soil",
     )
     parser.add_argument(
         "--slip-angle",
-        type=number,
+        type=NumberFrom(-1.6, 1.6, "rad"),
         metavar="RAD",
         help="angle between wheel plane and path, in rad",
     )
@@ -81,13 +87,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--hitch",
-        type=number,
+        type=NumberFrom(-10.0, 10.0, "m"),
         metavar="M",
         help="with --balance: height of the pull above the belt",
     )
     parser.add_argument(
         "--behind",
-        type=number,
+        type=NumberFrom(-10.0, 10.0, "m"),
         metavar="M",
         help="with --balance: centre of mass behind the middle of the track",
     )
@@ -99,13 +105,14 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
     import numpy as np
 
-    from soilml.cli.options import MAX_ROWS, available_effects, parse_numbers
+    from soilml.cli.options import available_effects, parse_numbers
     from soilml.cli.output import write_columns
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.fitting.simulation import simulate
     from soilml.fitting.uncarried_loads import missing_peak
+    from soilml.io.bounds import ROWS
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
@@ -119,7 +126,7 @@ def run(args: argparse.Namespace) -> int:
     case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
-    most = MOST_BALANCED if args.balance else MAX_ROWS
+    most = MOST_BALANCED if args.balance else ROWS.most
     if slips.size * loads.size > most:
         raise InputError(
             f"{slips.size} slips and {loads.size} loads are {slips.size * loads.size} rows; "

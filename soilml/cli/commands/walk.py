@@ -6,8 +6,8 @@ import argparse
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
+    NumberFrom,
     add_output,
-    number,
 )
 from soilml.errors import InputError
 
@@ -44,8 +44,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--stiffness", help="stiffnesses in N/m^3, in place of --ground")
     parser.add_argument("--slip", help="commanded slips; without it the wheel rolls freely")
     parser.add_argument("--offset", action="store_true", help="with the stress at the surface")
-    parser.add_argument("--mass", type=number, metavar="KG", help="carried (default: 3.75 kg)")
-    parser.add_argument("--speed", type=number, metavar="RAD_S", help="default: 0.3 rad/s")
+    parser.add_argument(
+        "--mass", type=NumberFrom(0.01, 1e5, "kg"), metavar="KG", help="carried (default: 3.75 kg)"
+    )
+    parser.add_argument(
+        "--speed", type=NumberFrom(1e-3, 100.0, "rad/s"), metavar="RAD_S", help="default: 0.3 rad/s"
+    )
     add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
     add_output(
@@ -70,6 +74,11 @@ def run(args: argparse.Namespace) -> int:
     if np.any(counts != counts.round()):
         raise InputError(f"--legs is {args.legs!r}; needed are whole numbers")
     slips = [np.nan] if args.slip is None else parse_numbers("--slip", args.slip).tolist()
+    for slip in slips:
+        if abs(slip) >= 1.0:
+            raise InputError(
+                f"--slip is {slip:g}; needed is 1 - v/(r omega), between -1 and 1, not per cent"
+            )
     given = {"mass": args.mass, "speed": args.speed}
     changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):

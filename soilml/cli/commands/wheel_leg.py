@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
+    NumberFrom,
     add_by_option,
     add_ignore_extra_option,
     add_output,
-    number,
 )
 from soilml.errors import InputError
 
@@ -30,9 +30,9 @@ from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
 (at midstance); blank where not measured. Each sensor has an estimate, with a
-standard deviation, and `fused` is that of all by eq. 30. It takes the errors of
-sensors as independent. Those of torque and sinkage are not: its standard
-deviations are then too small.
+standard deviation, and `fused` is that of all by the weights of eq. 30. Standard
+deviations include the error that all strides on a soil share, as large as on
+the four soils of the source (table VIII): more strides do not lessen it.
 
 On a known soil the same relations give the slip of each stride:
 
@@ -77,9 +77,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
     )
-    parser.add_argument("--torque-std", type=number, default=0.0, metavar="NM", help="std, N m")
     parser.add_argument(
-        "--vibration-std", type=number, default=0.0, metavar="M_S2", help="std, m/s^2"
+        "--torque-std", type=NumberFrom(0.0, 1e6, "N m"), default=0.0, metavar="NM", help="std, N m"
+    )
+    parser.add_argument(
+        "--vibration-std",
+        type=NumberFrom(0.0, 1e4, "m/s^2"),
+        default=0.0,
+        metavar="M_S2",
+        help="std, m/s^2",
     )
     add_by_option(parser)
     add_ignore_extra_option(parser)

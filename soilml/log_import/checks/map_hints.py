@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.log_import.checks.slip_definition import definition_by_speeds
 from soilml.log_import.checks.table_hints import MOST_TRACTION, falls_with_slip, traction_cause
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
 from soilml.log_import.units import spelling
@@ -55,6 +56,23 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
                 "slip-unit",
                 f"slip is {float(np.nanmedian(slip)):.3g} in the middle of the windows: probably "
                 "it is in per cent; write unit = '%' in [slip]",
+                ("slip",),
+            )
+        elif found := _by_speeds(wheel, windows):
+            definition, unit = found
+            lines = [f"definition = '{definition}'", *([f"unit = '{unit}'"] if unit else [])]
+            yield Remark(
+                "slip-definition",
+                "slip disagrees with the speeds of rim and travel, and agrees by another "
+                f"definition: write {' and '.join(lines)} in [slip]",
+                ("slip",),
+            )
+        elif (above := slip > 1.0).any():
+            yield Remark(
+                "slip-definition",
+                f"slip is above 1 in {int(above.sum())} of {slip.size} windows, which "
+                "1 - v/(r omega) cannot be: probably the log has (r omega - v)/v; write definition "
+                "= '(r omega - v)/v' in [slip]",
                 ("slip",),
             )
         elif falls_with_slip(windows):
@@ -108,6 +126,14 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
             f"{wheel.radius.value if wheel.radius else math.nan:g} m measured as diameter?",
             ("radius",),
         )
+
+
+def _by_speeds(wheel: WheelMap, windows: dict[str, Floats]) -> tuple[str, str] | None:
+    """The definition of slip that the speeds of a map confirm; None for the stated one."""
+    if not {"slip", "rim_speed", "speed"} <= windows.keys():
+        return None
+    slip, rim, travel = (windows[name] for name in ("slip", "rim_speed", "speed"))
+    return definition_by_speeds(slip, rim, travel, wheel.channels["slip"].definition)
 
 
 def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:

@@ -16,6 +16,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
+from soilml.log_import.checks.slip_definition import definition_by_speeds, other_definition_fits
 from soilml.remarks import Remark
 
 #: Range of T / (W r) of driving wheels on soil, and its usual value.
@@ -107,7 +108,21 @@ def falls_with_slip(columns: Mapping[str, Floats]) -> bool:
 def _definition(columns: Mapping[str, Floats], radius: Floats | float | None) -> Iterator[Remark]:
     named = {"slip": "slip", "torque": "torque_Nm", "load": "load_N"}
     held = {key: columns[name] for key, name in named.items() if name in columns}
-    if falls_with_slip(held):
+    rim = columns.get("rim_speed_m_s")
+    if rim is None and "wheel_speed_rad_s" in columns and radius is not None:
+        rim = columns["wheel_speed_rad_s"] * radius
+    found = None
+    if rim is not None and {"slip", "speed_m_s"} <= columns.keys():
+        found = definition_by_speeds(columns["slip"], rim, columns["speed_m_s"])
+    if found is not None:
+        definition, unit = found
+        yield Remark(
+            "slip-definition",
+            "slip disagrees with the speeds of rim and travel, and agrees as "
+            f"{definition}{' in per cent' if unit else ''}: needed is 1 - v/(r omega)",
+            ("slip", "speed_m_s"),
+        )
+    elif falls_with_slip(held):
         yield Remark(
             "slip-definition",
             "torque falls as slip grows: is slip the ratio of travel to rim speed, v/(r omega)? "
@@ -219,12 +234,14 @@ def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Itera
         )
     slip = columns.get("slip")
     if slip is not None and known.sum() >= 4 and np.ptp(slip[known]) > 0.2:
-        # at large slip a pull may fall, but not from small slip on
+        # a wheel that sinks with slip may lose pull from small slip on, but seldom all of it
         order = np.corrcoef(slip[known], ratio)[0, 1] if np.ptp(ratio) > 0.05 else 0.0
-        if order < -0.8 and float(np.min(slip[known])) < 0.25:
+        late = ratio[slip[known] >= np.median(slip[known])]
+        turned = order < -0.8 and float(np.mean(late)) < 0.0
+        if turned and float(np.min(slip[known])) < 0.25:
             yield Remark(
                 "sign",
-                "drawbar pull falls as slip grows: probably its sign is turned",
+                "drawbar pull falls below zero as slip grows: probably its sign is turned",
                 ("drawbar_pull_N",),
             )
 
@@ -266,7 +283,7 @@ def _angles(columns: Mapping[str, Floats], radius: Floats | float | None) -> Ite
 
 
 def table_remarks(table: Table, case: Case | None, radius: float | None = None) -> list[Remark]:
-    """A remark for each oddity of a table; see `table_hints`.
+    """A remark for each oddity of a table; see `table_hints` and `other_definition_fits`.
 
     The radius of the wheel (m) is that of the case, else `radius`; None where it is not known.
     """
@@ -277,6 +294,14 @@ def table_remarks(table: Table, case: Case | None, radius: float | None = None) 
     if not len(used):
         return []
     hints = table_hints(used.columns, radii)
+    told = any(hint.code == "slip-definition" for hint in hints)
+    if case is not None and not case.gears and not told and other_definition_fits(case, used):
+        text = (
+            "the rows fit the model far better where slip is taken as (r omega - v)/v: how was it "
+            "defined? Needed is 1 - v/(r omega), which is 0.5 where the rim goes twice as far as "
+            "the wheel travels; (r omega - v)/v is 1 there"
+        )
+        hints.append(Remark("slip-definition", text, ("slip",)))
     return [replace(hint, text=f"{table.source}: {hint.text}") for hint in hints]
 
 

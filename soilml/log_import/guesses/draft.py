@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -84,7 +83,7 @@ def keys_alike(wheels: Sequence[dict[str, Draft]]) -> dict[str, Draft]:
 def wheel_of(drafts: dict[str, Draft]) -> WheelMap:
     """The channels of a draft as a wheel with a radius of 1 m; raises `InputError`."""
     channels = {
-        role: take_channel(Settings(dict(draft.keys), f"draft [{role}]", Path()), role)
+        role: take_channel(Settings(dict(draft.keys), f"draft [{role}]"), role)
         for role, draft in drafts.items()
     }
     return WheelMap("", Uncertain(1.0), channels)

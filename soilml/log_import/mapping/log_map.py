@@ -139,9 +139,7 @@ def read_map(path: str | os.PathLike[str]) -> LogMap:
 
 def map_from(content: Mapping[str, Any]) -> LogMap:
     """A map from a dictionary with the content of the file; raises `InputError` likewise."""
-    from pathlib import Path
-
-    settings = Settings(dict(content), "map", Path())
+    settings = Settings(dict(content), "map")
     found = _take_map(settings, "map")
     settings.finish()
     return found
@@ -181,7 +179,7 @@ def _take_map(settings: Settings, source: str) -> LogMap:
         own = Settings(
             with_shared_keys(content, defaults),
             f"{settings.where} [wheels.{name}]",
-            settings.folder,
+            settings.files,
         )
         own_pattern = _take_gear_pattern(own) or pattern
         own_gear = own.text("gear", gear)
@@ -228,7 +226,7 @@ def _take_gears(settings: Settings) -> dict[str, Uncertain]:
         own = Settings(
             named.take(name, dict, f"a table [gears.{name}]"),
             f"{settings.where} [gears.{name}]",
-            settings.folder,
+            settings.files,
         )
         radius = _take_radius(own)
         if radius is not None:
@@ -284,7 +282,7 @@ def _take_files(settings: Settings) -> tuple[FileKind, ...]:
         own = Settings(
             settings.take(name, dict, f"a table [files.{name}]"),
             f"{settings.where} [files.{name}]",
-            settings.folder,
+            settings.files,
         )
         pattern, clock, delay = own.text("pattern"), own.text("clock", "same"), 0.0
         if clock not in ("same", "start"):

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError, MissingLibraryError
+from soilml.log_import.readers.bag_blocks import check_blocks
 from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
@@ -26,8 +27,10 @@ def read_bag(path: Path) -> list[Recording]:
     messages = _mcap_messages if path.suffix == ".mcap" else _ros_messages
     notes: list[Remark] = []
     try:
+        if path.is_file():
+            check_blocks(path)
         for topic, seconds, message in messages(path, notes):
-            topics.setdefault(topic, TopicColumns()).add(seconds, message)
+            topics.setdefault(topic, TopicColumns(path)).add(seconds, message)
     except (InputError, MissingLibraryError):
         raise
     except Exception as error:  # the libraries raise many kinds for damaged files

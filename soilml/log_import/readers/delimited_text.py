@@ -13,11 +13,13 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.io.bounds import LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
 from soilml.log_import.readers.text_layout import (
     BLOCK,
     MISSING,
     TextLayout,
+    check_columns,
     decode_text,
     find_blocks,
     find_layout,
@@ -47,6 +49,7 @@ def read_delimited_text(path: Path) -> list[Recording]:
 
     Raises `InputError` where the file has no samples.
     """
+    LOG_BYTES.check(path, path.stat().st_size)
     text, encoding = decode_text(path.read_bytes(), path)
     text = _GROUPED.sub("", text)
     notes = []
@@ -58,6 +61,7 @@ def read_delimited_text(path: Path) -> list[Recording]:
 def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> list[Recording]:
     """The table of lines of text, with what its reader has found; raises as its caller does."""
     notes = list(found)
+    check_columns(path, lines)
     try:
         layout = find_layout(lines)
     except csv.Error as error:
@@ -70,6 +74,7 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
             "sample a line, separated by comma, semicolon, tab or spaces"
         )
     layout = known_header(path, layout)
+    LOG_VALUES.check(path, len(lines) * len(layout.names))
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
     if layout.decimal_comma:

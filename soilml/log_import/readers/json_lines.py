@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
+from soilml.io.bounds import JSON_BYTES
 from soilml.log_import.readers.message_fields import TopicColumns
 from soilml.log_import.readers.text_layout import decode_text
 from soilml.log_import.recording import Recording
@@ -22,11 +23,12 @@ def read_json_log(path: Path) -> list[Recording]:
 
     Lines that are no object are left out. Raises `InputError` where it has no samples.
     """
+    JSON_BYTES.check(path, path.stat().st_size)
     text, _ = decode_text(path.read_bytes(), path)
     samples, bad = _samples(text)
     said = f"{bad} lines are no JSON objects and are left out"
     notes = (Remark("lines-left-out", said),) if bad else ()
-    found = TopicColumns()
+    found = TopicColumns(path)
     for number, sample in enumerate(samples):
         found.add(float(number), sample)
     columns = found.columns() if len(samples) >= _FEWEST else {}

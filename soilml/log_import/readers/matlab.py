@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,9 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.io.bounds import LOG_VALUES, PARTS
 from soilml.io.cell_text import read_number
+from soilml.log_import.readers.matlab_size import check_matlab_size
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 
@@ -26,7 +29,8 @@ def read_matlab(path: Path) -> list[Recording]:
 
     Raises `InputError` where the file is damaged or has no arrays.
     """
-    head = path.read_bytes()[:128]
+    with path.open("rb") as opened:
+        head = opened.read(128)
     if b"MATLAB 7.3" in head or head.startswith(b"\x89HDF"):
         leaves, about = _hdf5_leaves(path)
     else:
@@ -95,6 +99,7 @@ def _version_5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...
     need("scipy", "import")
     from scipy.io import loadmat
 
+    check_matlab_size(path)
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except Exception as error:  # scipy raises many kinds for damaged files
@@ -134,9 +139,18 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     leaves: list[tuple[str, Any]] = []
     about: list[str] = []
 
+    parts = total = 0
+
     def visit(name: str, item: Any) -> None:
+        nonlocal parts, total
+        parts += 1
+        PARTS.check(path, parts)
         if name.startswith("#") or not isinstance(item, h5py.Dataset):
             return
+        if item.external or item.is_virtual:  # which lie in other files
+            raise InputError(f"{path}: {name} is in another file; needed are all data in one")
+        total += item.size or 0
+        LOG_VALUES.check(path, max(total, math.prod(item.chunks or ())))
         place = name.replace("/", ".")
         if item.dtype.kind in "iufb" and item.attrs.get("MATLAB_class", b"") != b"char":
             values = np.squeeze(np.asarray(item))
@@ -148,6 +162,9 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     try:
         with h5py.File(path, "r") as opened:
             opened.visititems(visit)
-    except OSError as error:
-        raise InputError(f"{path} is not a complete HDF5 file: {error}") from None
+    except InputError:
+        raise
+    except Exception as error:  # h5py raises many kinds for damaged files
+        first = " ".join(str(error).split())
+        raise InputError(f"{path} is not a complete HDF5 file: {first}") from None
     return leaves, tuple(about)

@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.io.bounds import COLUMNS, LOG_VALUES
 
 _DEEPEST = 6
 _LONGEST = 24  # Longer arrays (images, point clouds, laser scans) are no channels
 
 
 class TopicColumns:
-    """The columns of one topic, filled message by message."""
+    """The columns of one topic of a file, filled message by message.
 
-    def __init__(self) -> None:
+    `add` raises `InputError` for more columns or values than a log may have.
+    """
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
         self.clock: list[float] = []
         self._stamps: list[float] = []
         self._cells: dict[str, list[float]] = {}
@@ -30,6 +36,8 @@ class TopicColumns:
         stamp = seconds + 1e-9 * row.pop("header.stamp.nanosec", math.nan)
         row.pop("header.seq", None)
         n = len(self.clock)
+        COLUMNS.check(self._file, len(self._cells.keys() | row.keys()))
+        LOG_VALUES.check(self._file, (n + 1) * len(self._cells))
         for name, value in row.items():
             if name not in self._cells:
                 self._cells[name] = [math.nan] * n

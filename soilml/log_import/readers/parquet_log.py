@@ -8,16 +8,18 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.io.parquet import read_parquet
+from soilml.io.bounds import LOG_VALUES
+from soilml.io.parquet import distinct_cells, read_parquet
 from soilml.log_import.recording import Recording
 
 
 def read_parquet_log(path: Path) -> list[Recording]:
     """The table of a Parquet file: numbers, times as seconds, text as text.
 
-    Raises `TableError` for a damaged file, `MissingLibraryError` without pyarrow.
+    Raises `TableError` for a damaged file and one of more than the bounds, `MissingLibraryError`
+    without pyarrow.
     """
-    found, _ = read_parquet(path)
+    found, _ = read_parquet(path, LOG_VALUES)
     columns: dict[str, Floats] = {}
     texts: dict[str, list[str]] = {}
     for name, column in found.items():
@@ -25,8 +27,19 @@ def read_parquet_log(path: Path) -> list[Recording]:
         if values is not None:
             columns[name] = values
         else:
-            texts[name] = ["" if cell is None else str(cell) for cell in column.to_pylist()]
+            texts[name] = _texts(column)
     return [Recording("", path, columns, texts)]
+
+
+def _texts(column: Any) -> list[str]:
+    """The cells of an Arrow column as text; equal ones are one object."""
+    import pyarrow as pa
+
+    if pa.types.is_nested(column.type) and not pa.types.is_dictionary(column.type):
+        return ["" if cell is None else str(cell) for cell in column.to_pylist()]
+    cells, code = distinct_cells(column)
+    shown = ["" if cell is None else str(cell) for cell in cells]
+    return [shown[i] for i in code.tolist()]
 
 
 def _numbers(column: Any) -> Floats | None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from soilml.errors import InputError
+from soilml.io.bounds import COLUMNS
 from soilml.log_import.units import known_unit
 
 _MARKS = (
@@ -143,6 +144,12 @@ def known_header(file: Path, layout: TextLayout) -> TextLayout:
         return layout
     names, units = zip(*header, strict=True)
     return replace(layout, names=names, units=units)
+
+
+def check_columns(file: Path, lines: Sequence[str]) -> None:
+    """Raise `InputError` for more columns than a log may have, before any cell is looked at."""
+    for line in lines[:_LOOKED]:
+        COLUMNS.check(file, max(len(line.split()), *(line.count(s) + 1 for s in _SEPARATORS)))
 
 
 def split_line(line: str, separator: str) -> list[str]:

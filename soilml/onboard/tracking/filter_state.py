@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import ABSENT_STD, OPERATING_NOISE, OPTIONAL_READINGS
+from soilml.onboard.state_checksum import state_checksum
 from soilml.onboard.tracking.misfit import ROWS_JUDGED, Rows
 from soilml.onboard.tracking.row_window import LEAST_ROWS, RecentRows, RowWindow, join
 
@@ -20,13 +21,18 @@ MOST_ROWS = 8  # Rows after which one that disagreed is a glitch
 #: new ones do not agree with each other.
 GIVE_UP_AFTER = 25
 #: Sensors that can be found stuck: those of torque, sinkage and pull, and those of slip and load
-#: where they have noise. Without noise they are set, and constant by intention.
+#: where they have noise and have changed in `ALIVE_AFTER` rows in succession. Otherwise they may be
+#: set, and constant by intention.
 WATCHED = ("torque", *OPTIONAL_READINGS, *OPERATING_NOISE)
 #: Exact repetitions in succession after which a sensor is stuck.
 REPETITIONS = 2
+#: Rows in succession, each with another reading than the row before, after which a slip or load is
+#: known to be a sensor's. A glitch or two in a load that is set are fewer.
+ALIVE_AFTER = 8
 Arrays = dict[str, NDArray[Any]]
 
-FORMAT = 3  # Version of the arrays
+FORMAT = 4  # Version of the arrays
+CHECKSUM = "checksum"  # Name of the array that has the checksum of the others
 
 
 @dataclass(frozen=True)
@@ -85,10 +91,15 @@ def joined(rows: Sequence[Rows]) -> Rows:
 
 @dataclass(frozen=True)
 class RepeatedReadings:
-    """The row before, and how often each watched reading was repeated in succession."""
+    """The row before, and how often each watched reading was repeated in succession.
+
+    times: Repetitions in succession of each of `WATCHED`.
+    changes: Rows in succession that changed it; once `ALIVE_AFTER`, so for good.
+    """
 
     previous: Rows | None = None
     times: tuple[int, ...] = (0,) * len(WATCHED)
+    changes: tuple[int, ...] = (0,) * len(WATCHED)
 
     def repeats(self, row: Rows) -> bool:
         """Whether a row is the row before once more."""
@@ -103,20 +114,29 @@ class RepeatedReadings:
         if before is None:
             return RepeatedReadings(row)
         # a wheel that stands repeats its slip and torque, whatever the load does
-        moves = bool(row["slip"][0] or row["torque"][0])
+        if not (row["slip"][0] or row["torque"][0]):
+            return RepeatedReadings(row, changes=self.changes)
+        equal = [bool(row[n][0] == before[n][0]) for n in WATCHED]
         return RepeatedReadings(
             row,
             tuple(
-                times + 1 if moves and _measured(row, n) and row[n][0] == before[n][0] else 0
-                for n, times in zip(WATCHED, self.times, strict=True)
+                min(times + 1, REPETITIONS) if same and _measured(row, n) else 0
+                for n, times, same in zip(WATCHED, self.times, equal, strict=True)
+            ),
+            tuple(
+                count if count == ALIVE_AFTER else 0 if same else count + 1
+                for count, same in zip(self.changes, equal, strict=True)
             ),
         )
 
     @property
     def stuck(self) -> str | None:
         """The first sensor that is stuck."""
-        names = (n for n, t in zip(WATCHED, self.times, strict=True) if t >= REPETITIONS)
-        return next(names, None)
+        for name, times, changes in zip(WATCHED, self.times, self.changes, strict=True):
+            alive = changes == ALIVE_AFTER or name not in OPERATING_NOISE
+            if times == REPETITIONS and alive:
+                return name
+        return None
 
 
 def _measured(row: Rows, name: str) -> bool:
@@ -169,7 +189,7 @@ class FilterState:
         recent = self.window.recent
         read = [row for one in recent for row in _one_by_one(one.rows)]
         names = list((rows or read or [{}])[0])
-        return {
+        arrays = {
             "format": np.asarray(FORMAT),
             "model": np.asarray(identity),
             "system": np.concatenate([empty, *(block.system for block in blocks)]),
@@ -184,6 +204,7 @@ class FilterState:
             "increases": np.asarray(self.increases, dtype=np.float64),
             "variance": np.asarray(self.variance),
             "repeated": np.asarray(self.repeated.times, dtype=np.int64),
+            "changes": np.asarray(self.repeated.changes, dtype=np.int64),
             "numbers": np.asarray(
                 [
                     self.window.length,
@@ -194,6 +215,7 @@ class FilterState:
                 dtype=np.int64,
             ),
         }
+        return arrays | {CHECKSUM: np.asarray(checksum_of(arrays))}
 
     @staticmethod
     def from_arrays(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterState:
@@ -214,6 +236,12 @@ class FilterState:
             ) from None
 
 
+def checksum_of(arrays: Mapping[str, Any]) -> int:
+    """The checksum of the other arrays of a state."""
+    names = sorted(name for name in arrays if name != CHECKSUM)
+    return state_checksum(*(part for name in names for part in (name, arrays[name])))
+
+
 def _one_by_one(rows: Rows) -> list[dict[str, float]]:
     """Several rows as one mapping each."""
     return [{n: float(v[i]) for n, v in rows.items()} for i in range(len(rows["slip"]))]
@@ -230,6 +258,8 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
             f"this state of a tracker is of {str(arrays['model'])!r}, which is another file, "
             f"wheel, prior or error of sensors than {identity!r}: begin with SoilTracker(estimator)"
         )
+    if int(arrays[CHECKSUM]) != checksum_of(arrays):
+        raise ValueError("its checksum does not match")
     ends = np.cumsum(arrays["lengths"])
     system = np.asarray(arrays["system"], dtype=start.system.dtype)
     if system.shape != (ends[-1] if len(ends) else 0, start.system.shape[1]):
@@ -256,7 +286,9 @@ def _read(arrays: Mapping[str, Any], identity: str, start: Memory) -> FilterStat
     question = RowsInQuestion(tuple(rows[1:]), flags, in_succession)
     if len(question.rows) != len(flags):
         raise ValueError(f"it has {len(question.rows)} rows in question and {len(flags)} flags")
-    repeated = RepeatedReadings(previous, tuple(int(n) for n in arrays["repeated"]))
+    repeated = RepeatedReadings(
+        previous, *(tuple(int(n) for n in arrays[name]) for name in ("repeated", "changes"))
+    )
     increases = tuple(float(value) for value in arrays["increases"])
     variance = float(arrays["variance"])
     if not 1.0 <= variance < np.inf:

@@ -14,6 +14,7 @@ from soilml.config.case import Case, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
+from soilml.io.named_files import NO_FILES
 from soilml.numerics.prior import Prior
 from soilml.parameters import located
 from soilml.physics.effects import EFFECTS, Effect
@@ -21,8 +22,8 @@ from soilml.physics.gears import Track, Wheel
 from soilml.physics.gears.base import Gear
 from soilml.physics.model import Model
 from soilml.physics.soils import soil, soil_catalogue
+from soilml.serve.answers.job_files import MODEL_FILE
 
-MODEL_FILE = "MODEL.toml"  # Name of a model file in messages
 #: Kinds of effects that the page offers; those of sensors belong to a log.
 _OPERATING: tuple[str, ...] = ("slip", "load")
 OFFERED_KINDS = ("soil", "wheel", "rig")
@@ -133,7 +134,7 @@ def case_of_text(text: str) -> Case:
         path = Path(folder) / MODEL_FILE
         path.write_text(text, encoding="utf-8")
         try:
-            return read_case(path, with_bias=True)
+            return read_case(path, with_bias=True, files=NO_FILES)
         except InputError as error:
             raise InputError(str(error).replace(str(path), MODEL_FILE)) from None
 

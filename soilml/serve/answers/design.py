@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
+from soilml.io.named_files import NamedFiles
 from soilml.log_import.guesses.draft import toml_value
 from soilml.optional_imports import tomllib
 from soilml.physics.soils import soil_catalogue
@@ -17,10 +18,9 @@ from soilml.report.page import Provenance, report_texts
 from soilml.rover_design.presentation import design_page, verdict
 from soilml.rover_design.report import design_report
 from soilml.rover_design.study import LEAST, DesignStudy, read_study
-from soilml.serve.answers.job_files import Tell, setting_file, write_files
+from soilml.serve.answers.job_files import MODEL_FILE, Tell, setting_file, write_files
 
 STUDY_FILE = "rover.toml"  # Name of the question in messages
-MODEL_FILE = "MODEL.toml"  # That of the page's model, beside a soil of measured rows
 #: Designs of the sweep and draws, by how thorough the answer is: the last is the command's default.
 EFFORTS = {"quick": (60, 300), "usual": (100, 500), "thorough": (250, 1000)}
 
@@ -210,7 +210,10 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     Raises `InputError` as `soilml design` does, and for other files than these.
     """
-    study = read_study(setting_file(STUDY_FILE, request.get("question")))
+    names = request.get("names") or []
+    # the soil of measured rows is that of the page's model and table
+    files = NamedFiles(names=(MODEL_FILE, *names), hint="drop the table of runs above")
+    study = read_study(setting_file(STUDY_FILE, request.get("question")), files)
     settings = {STUDY_FILE: str(request["question"])}
     if study.soil.rows is not None:
         settings[MODEL_FILE] = _model_of_rows(study, request)
@@ -244,13 +247,8 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 def _model_of_rows(study: DesignStudy, request: Mapping[str, Any]) -> str:
     """The text of the page's model, written to the file that a question about its rows names."""
     assert study.soil.rows is not None
-    model, runs = (path.name for path in study.soil.rows)
-    names = request.get("names") or []
-    if model != MODEL_FILE or runs not in names:
-        raise InputError(
-            f"{STUDY_FILE} [soil]: model {model} and runs {runs}; the page has {MODEL_FILE} and "
-            f"{names[0] if names else 'no table of runs: drop it above'}"
-        )
+    if str(study.soil.rows[0]) != MODEL_FILE:
+        raise InputError(f"{STUDY_FILE} [soil]: needed is model = {MODEL_FILE!r}, that of the page")
     setting_file(MODEL_FILE, request.get("model"))
     return str(request["model"])
 

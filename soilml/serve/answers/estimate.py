@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.config.case import Case, read_case
+from soilml.config.case import Case
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, SoilmlError
 from soilml.experiment_design import Advice
@@ -22,7 +22,7 @@ from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.quantities import COLUMNS, NOT_IDENTIFIED_ABOVE, QUANTITIES, WEAKLY_IDENTIFIED_ABOVE
 from soilml.remarks import Remark, texts
 from soilml.report.page import json_text
-from soilml.serve.answers.job_files import Tell, setting_file, write_files
+from soilml.serve.answers.job_files import MODEL_FILE, Tell, page_case, write_files
 from soilml.serve.answers.logs import table_summary
 from soilml.traction.by_load import LoadPrediction
 from soilml.traction.report import PullReport, pull_report
@@ -43,8 +43,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     Raises `SoilmlError` as `soilml identify` does; where only the pull or the
     advice cannot be had, the answer says why.
     """
-    model = setting_file("MODEL.toml", request.get("model"))
-    case = read_case(model, with_bias=True)
+    case = page_case(request)
     tell("reading the table")
     table = read_rows(request)
     remarks = table_remarks(table, case)
@@ -166,7 +165,7 @@ def pull_of_gears(case: Case, table: Table) -> dict[str, Any]:
     Raises `InputError` where rows do not name their gear.
     """
     if "gear" not in table:
-        raise InputError("MODEL.toml has several gears, and the table no column gear")
+        raise InputError(f"{MODEL_FILE} has several gears, and the table no column gear")
     text = "the soil below each wheel is that of its own rows"
     own_soil = Remark("soil-per-gear", text, tuple(case.gears), "note")
     loads, warnings = [], [own_soil]
@@ -177,7 +176,7 @@ def pull_of_gears(case: Case, table: Table) -> dict[str, Any]:
             loads += [one | {"gear": name, "measured": own["measured"]} for one in own["loads"]]
             warnings += own["warnings"]
     if not loads:
-        raise InputError(f"no row has a gear of MODEL.toml: {', '.join(case.gears)}")
+        raise InputError(f"no row has a gear of {MODEL_FILE}: {', '.join(case.gears)}")
     return {"loads": loads, "warnings": list(dict.fromkeys(warnings))}
 
 

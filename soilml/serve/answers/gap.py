@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from soilml.config.case import read_case
 from soilml.gap import STATUSES, GapReport, gap
 from soilml.gap.presentation import gap_files
 from soilml.gap.report.page import (
@@ -18,7 +17,7 @@ from soilml.gap.report.page import (
 from soilml.remarks import texts
 from soilml.report.numbers import format_estimate, format_p_value
 from soilml.serve.answers.estimate import read_rows
-from soilml.serve.answers.job_files import Tell, setting_file, write_files
+from soilml.serve.answers.job_files import MODEL_FILE, Tell, page_case, write_files
 
 _SHOWN_RUNS = 5  # Most next runs that the page shows; the report has all
 
@@ -28,14 +27,13 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     Raises `SoilmlError` as `soilml gap` does.
     """
-    model = setting_file("MODEL.toml", request.get("model"))
-    case = read_case(model, with_bias=True)
+    case = page_case(request)
     table = read_rows(request)
     stage = f"analysing {len(table)} rows"
     tell(stage, 0.0)
     report = gap(case, table, progress=lambda share: tell(stage, min(share, 1.0)))
     tell("drawing the report")
-    files = gap_files(report, model.name, table.source)
+    files = gap_files(report, MODEL_FILE, table.source)
     return verdict(report) | {"rows": len(table), "files": write_files(files)}
 
 

@@ -5,21 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from soilml.config.case import Case, read_case
 from soilml.errors import InputError
+from soilml.io.named_files import NO_FILES
 
-#: The folder of what a job has written, inside its own: no written file can replace a read one.
-OUTPUT = "out"
+#: Folders of a job: of the files that it reads, in which it works, and of what it has written. No
+#: written file can replace a read one, and a dropped file may have any name.
+READ, WRITTEN = "read", "written"
+MODEL_FILE = "MODEL.toml"  # Name of the page's model file in messages
 #: A function of the present stage in words, and of the share that is done, if it is known.
 Tell = Callable[..., None]
 
 
 def write_files(texts: Mapping[str, str]) -> list[str]:
     """Write texts by name into the folder of outputs; the names."""
-    folder = Path(OUTPUT)
+    folder = Path("..") / WRITTEN
     folder.mkdir(exist_ok=True)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return list(texts)
+
+
+def page_case(request: Mapping[str, object]) -> Case:
+    """The case of the page's model file, which may name no file; raises as `read_case` does."""
+    file = setting_file(MODEL_FILE, request.get("model"))
+    return read_case(file, with_bias=True, files=NO_FILES)
 
 
 def setting_file(name: str, text: object) -> Path:

@@ -9,19 +9,17 @@ from soilml import Operating, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import FitError, InputError
 from soilml.experiment_design import (
-    abstention_message,
     advise,
     candidate_grid,
     is_identified,
     samples_of_prior,
     samples_of_rows,
 )
-from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
+from soilml.experiment_design.presentation import advice_as_json
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.remarks import texts
 
 SOIL = {"cohesion": 900.0, "friction_angle": 0.6, "shear_modulus": 0.012}
 GRID = candidate_grid([0.05, 0.2, 0.6], [30.0, 60.0, 120.0])
@@ -130,25 +128,6 @@ def test_undeclared_noise_is_refused(case):
         advise(silent, samples_of_prior(select_free(case, None), 64), GRID)
     with pytest.raises(InputError, match="measured channels"):
         advise(case, samples_of_prior(select_free(case, None), 64), GRID, channels=("sinkage",))
-
-
-def test_messages_name_parameters_that_are_not_identified(case):
-    assert is_identified(np.asarray([0.3, 0.8, 0.81])).tolist() == [True, True, False]
-    text = abstention_message("friction_angle", 0.92)
-    assert text == "friction angle: not identified by these rows, 92% of the prior's width remains"
-    assert abstention_message("n", 1.03).endswith("all of the prior's width remains")
-    found = after(case, [0.6] * 3, [60.0] * 3, count=2)
-    said = " | ".join(texts(next_row_remarks(found)))
-    assert "cohesion: not identified by these rows" in said and "a repetition leaves" in said
-    assert (
-        "Most informative next: slip" in said and "best next row for all parameters: slip" in said
-    )
-
-
-def test_messages_name_several_rows_where_one_does_not_suffice(case):
-    loud = replace(case, noise={"torque_Nm": Noise(share=0.4)})
-    found = advise(loud, samples_of_prior(select_free(loud, None), 400), GRID, count=3)
-    assert "3 rows leave" in " ".join(texts(next_row_remarks(found)))
 
 
 def test_the_summary_has_slip_load_channels_and_every_fraction(case):

@@ -1,18 +1,15 @@
 """Expected widths are those of brute force, and behave as information does."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from soilml import Operating, read_case
-from soilml.config.measurement_noise import Noise
 from soilml.experiment_design.expected_variance import (
     PredictedReadings,
     expected_variance,
     predicted_readings,
 )
-from soilml.experiment_design.parameter_samples import ParameterSamples, samples_of_prior
+from soilml.experiment_design.parameter_samples import samples_of_prior
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.numerics.prior import Prior
 
@@ -60,15 +57,6 @@ def test_one_parameter_is_left_as_wide_as_quadrature_says(std):
     assert found == pytest.approx(integrated(bent, std), rel=0.04)
 
 
-def test_noise_far_below_the_distance_of_samples_does_not_claim_certainty():
-    samples = line(60)
-    found = np.mean(
-        [remaining_fraction(line(60, k), line(60, k).u[:, 0], 1e-4, seed=k) for k in range(8)]
-    )
-    assert 0.5 / 60 < found < 5.0 / 60  # the distance of samples; far above the noise, 3.5e-4
-    assert samples.remaining_fraction[0] == pytest.approx(1.0, abs=0.01)
-
-
 def test_a_wheel_that_is_stuck_tells_on_which_outcomes_it_is():
     samples = line(1000)
     u = samples.u[:, 0]
@@ -77,20 +65,6 @@ def test_a_wheel_that_is_stuck_tells_on_which_outcomes_it_is():
     assert remaining_fraction(samples, blind, 1.0) == pytest.approx(expected, rel=0.05)
     lone = np.where(u == u.min(), np.nan, 0.0)
     assert remaining_fraction(samples, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
-
-
-def test_a_gaussian_is_left_as_its_precisions_add():
-    rng = np.random.default_rng(3)
-    prior = Prior(0.0, 1.0)
-    u = np.clip(0.5 + 0.05 * rng.standard_normal(4000), 0.0, 1.0)[:, None]
-    weights = rng.random(4000)
-    samples = ParameterSamples(
-        (Coordinate("a", "1", prior, 0.5, False),), u, weights / weights.sum()
-    )
-    expected = samples.remaining_fraction[0] / np.sqrt(2.0)  # a reading as sharp as the samples
-    sharp = samples.remaining_fraction[0] * prior.std
-    found = np.mean([remaining_fraction(samples, u[:, 0], sharp, seed=k) for k in range(6)])
-    assert found == pytest.approx(expected, rel=0.03)
 
 
 def test_less_noise_never_leaves_more_and_endless_noise_leaves_all():
@@ -137,17 +111,3 @@ def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
         np.testing.assert_allclose(
             np.sqrt(found[k]), np.sqrt(np.mean(variance, axis=0)), atol=0.045
         )
-
-
-def test_noise_of_slip_makes_a_row_tell_less(model_file):
-    case = read_case(model_file)
-    shaky = replace(case, noise=case.noise | {"slip": Noise(constant=0.05)})
-    samples = samples_of_prior(select_free(case, None), 400)
-    at = Operating(slip=np.asarray([0.05]), load=np.asarray([60.0]))
-    steep = [
-        (outcomes := expected_variance(samples, 1)).remaining_variance(
-            outcomes.log_likelihood(predicted_readings(c, samples, at), ("torque",), 0)
-        )
-        for c in (case, shaky)
-    ]
-    assert steep[1][2] > 1.2 * steep[0][2]  # the shear modulus shows where slip is small

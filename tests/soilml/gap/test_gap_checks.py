@@ -8,7 +8,7 @@ from gap_sets import MODEL, case_of, driven, fit_problem
 
 from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.checks import check_readings, estimate_repeat_noise, without_copies
+from soilml.gap.checks import check_readings, estimate_repeat_noise
 from soilml.gap.evidence.directions import smooth_basis
 from soilml.gap.evidence.outliers import outliers
 from soilml.io.table import Table
@@ -83,36 +83,6 @@ def test_loads_that_scatter_about_one_level_are_reported_as_one():
     loads = 20.0 * (1.0 + np.random.default_rng(3).uniform(-0.08, 0.08, 8))
     table = driven(case_of(), loads=tuple(loads))
     assert any("one load only" in reason for reason in texts(check(table).naming_obstacles))
-
-
-def test_exact_copies_are_excluded_and_the_rest_is_analysed():
-    table = driven(case_of())
-    again = joined(table, table.rows(np.asarray([2, 5])))
-    kept, (remark,) = without_copies(again)
-    assert len(kept) == len(table) and remark.severity == "note"
-    np.testing.assert_array_equal(kept["torque_Nm"], table["torque_Nm"])
-    assert remark.text == "2 rows are exact copies of others and were excluded; 32 are analysed"
-    kept, (remark,) = without_copies(joined(table, table))
-    assert len(kept) == len(table) and remark.severity == "warning"
-    found = [gap(case_of(), rows) for rows in (table, joined(table, table))]
-    assert found[0].sentence == found[1].sentence
-    assert found[1].notes[0].code == "duplicate-rows"
-
-
-def test_a_run_that_repeats_another_one_exactly_is_a_copy():
-    table = driven(case_of(), loads=(60.0,))
-    other = Table(table.columns | {"run": np.full(len(table), "again")})
-    kept, (remark,) = without_copies(joined(table, other))
-    assert len(kept) == len(table) and remark.about == ("again",)
-    assert remark.text.endswith("8 are analysed: run again repeats another run")
-    torque = other["torque_Nm"] + np.eye(len(other))[0]
-    assert without_copies(joined(table, Table(other.columns | {"torque_Nm": torque})))[1] == []
-    assert without_copies(joined(table.rows(np.arange(2)), other.rows(np.arange(2))))[1] == []
-
-
-def test_repeated_rows_with_other_readings_are_no_duplicates():
-    table = joined(driven(case_of(), seed=1), driven(case_of(), seed=2))
-    assert without_copies(table)[1] == []
 
 
 @pytest.mark.parametrize(

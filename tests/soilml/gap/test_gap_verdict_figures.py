@@ -8,7 +8,7 @@ import pytest
 from soilml import Table
 from soilml.errors import InputError
 from soilml.gap import checks
-from soilml.gap.checks import CheckedData, Consequence, without_copies
+from soilml.gap.checks import CheckedData, Consequence
 from soilml.gap.design.run_kinds import LISTED, check_costs, rank_by_cost
 from soilml.gap.design.run_options import (
     HIGHEST_SLIP,
@@ -177,14 +177,6 @@ def test_noise_and_life_of_a_channel(values, std, expected):
     given = readings(values)
     given = stub(**vars(given) | {"std": np.full(len(values), std), "channels": ("torque",)})
     assert severities(checks._check_channels, readings=given) == expected
-
-
-def test_the_first_of_equal_rows_stays():
-    table = made({"slip": [0.1, 0.2, 0.1, 0.1], "torque_Nm": [1.0, 2.0, 1.0, 3.0]})
-    kept, remarks = without_copies(table)
-    assert (kept["slip"].tolist(), kept["torque_Nm"].tolist()) == ([0.1, 0.2, 0.1], [1.0, 2.0, 3.0])
-    assert texts(remarks) == ["1 row is an exact copy of another and was excluded; 3 are analysed"]
-    assert without_copies(kept)[0] is kept
 
 
 def test_repeats_give_the_noise_by_their_degrees_of_freedom():

@@ -1,6 +1,5 @@
 """A set of files is replaced as one, whatever stops or kills the process."""
 
-import errno
 import json
 import os
 import signal
@@ -10,7 +9,6 @@ import sys
 import pytest
 
 from soilml.errors import InputError
-from soilml.io import atomic_files
 from soilml.io.atomic_files import atomic_outputs, save_text
 
 #: Writes two files; the named moment of the exchange then sends the named signal to the process.
@@ -114,22 +112,3 @@ def test_permissions_are_kept_and_a_read_only_file_is_not_replaced(folder):
     with pytest.raises(InputError, match="read-only"):
         save_text(folder / "one", "newer")
     assert (folder / "one").read_text() == "new"
-
-
-def test_this_process_remembers_what_it_replaced(folder):
-    before = len(atomic_files.replaced)
-    save_text(folder / "one", "new")
-    assert atomic_files.replaced[before:] == [str(folder / "one")]
-    assert not atomic_files.is_writing()
-
-
-def test_a_disk_without_room_for_a_line_keeps_no_journal(folder, monkeypatch):
-    def full(self, text):
-        raise OSError(errno.ENOSPC, "No space left on device")
-
-    before = sorted(path.name for path in folder.iterdir())
-    monkeypatch.setattr(atomic_files.Swap, "_write", full)
-    with pytest.raises(InputError, match="No space left on device"):
-        save_text(folder / "new.txt", "new")
-    assert sorted(path.name for path in folder.iterdir()) == before
-    assert not atomic_files.is_writing()

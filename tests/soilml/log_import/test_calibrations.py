@@ -1,20 +1,14 @@
 """Logs that state calibrations and constants, whose wheels share columns, that know only slip."""
 
 import datetime
-from pathlib import Path
 
 import numpy as np
 import pytest
 from foreign_rigs import RADIUS, RADIUS_EDIT, drive, law, noisy, table
 
 from soilml.errors import InputError
-from soilml.io.toml_settings import Settings
 from soilml.log_import import import_log, init_map
-from soilml.log_import.channels.runs import spread_over_seconds
-from soilml.log_import.guesses.behaviour import time_unit
-from soilml.log_import.guesses.constants import stated_constants, stated_scale
-from soilml.log_import.mapping.log_map import shared_keys, with_shared_keys
-from soilml.log_import.readers.text_layout import find_layout
+from soilml.log_import.guesses.constants import stated_constants
 
 SLIPS = (0.1, 0.25, 0.45)
 
@@ -73,25 +67,6 @@ def test_speeds_of_carriages_that_differ_are_read_from_each_head(tmp_path):
     check(rows, d.stages)
 
 
-@pytest.mark.parametrize(
-    ("line", "value"),
-    [
-        ("Torque cell: 1.98 mV/V at 20 N m", "10.101 N m"),
-        ("Torque cell 5 Nm per mV/V", "5 Nm"),
-        ("Torque: 1 V = 3 N m", ""),
-        ("Load: 1 mV/V = 300 N", ""),
-    ],
-)
-def test_calibrations_in_the_head(line, value):
-    assert stated_scale("torque", "mV/V", "torque", "N m", [line])[0] == value
-
-
-def test_of_several_calibrations_that_of_the_channel():
-    lines = ["CH1: 1 V = 50 N", "CH2: 1 V = 90 N"]
-    assert stated_scale("Fx ch2", "mV", "drawbar_pull", "N", lines)[0] == "0.09 N"
-    assert stated_scale("Fx", "mV", "drawbar_pull", "N", lines)[0] == ""
-
-
 def test_a_sensor_in_volts_asks_for_its_calibration(tmp_path):
     d = drive(np.random.default_rng(1), SLIPS, [60] * 3)
     path = tmp_path / "log.csv"
@@ -140,12 +115,6 @@ def test_motors_by_number_share_the_mass(tmp_path):
     check(rows, d.stages)
 
 
-def test_wheels_that_the_head_states():
-    assert stated_constants(["rover mass 22 kg, 4 wheels"])["wheels"][0] == "4"
-    assert stated_constants(["Wheels: 6"])["wheels"][0] == "6"
-    assert "wheels" not in stated_constants(["wheel radius 0.15 m"])
-
-
 def test_slip_in_per_cent_that_counts_braking_up(tmp_path):
     """A force sensor of six axes and `i`, below zero where the wheel drives; nothing else."""
     rng = np.random.default_rng(63)
@@ -187,27 +156,6 @@ def test_kappa_is_slip_over_the_travel(tmp_path):
     check(rows, d.stages)
 
 
-def test_clocks_in_whole_seconds_and_in_days(tmp_path):
-    d = drive(np.random.default_rng(65), SLIPS, [60] * 3, rate=10)
-    whole, days = np.floor(d.t + 36000.6), 45812.375 + d.t / 86400
-    for name, clock in (("whole", whole), ("days", days)):
-        columns = [f"{x:.9f}" for x in clock]
-        lines = [f"{a},{b}" for a, b in zip(columns, table((d.omega, d.v, d.torque, d.load)),
-                                            strict=True)]  # fmt: skip
-        (tmp_path / f"{name}.csv").write_text("\n".join(["time,omega,v,torque,Fz", *lines]))
-        rows, text = imported(tmp_path, tmp_path / f"{name}.csv", [RADIUS_EDIT])
-        assert f'column = "time"\nunit = "{"d" if name == "days" else "s"}"' in text
-        check(rows, d.stages)
-    np.testing.assert_allclose(np.diff(spread_over_seconds(whole)), 0.1, atol=0.03)
-    assert spread_over_seconds(d.t) is d.t and time_unit(d.t) == "s"
-
-
-def test_units_in_a_comment_and_names_with_another_separator():
-    samples = ["0.0 1.0 2.0", "0.1 1.0 2.0", "0.2 1.1 2.1"]
-    found = find_layout(["# units: s, rad/s, N mm", "# t,omega,T", *samples])
-    assert (found.names, found.units) == (("t", "omega", "T"), ("s", "rad/s", "N mm"))
-
-
 def test_a_sinkage_that_no_wheel_has_at_rest_is_tared(tmp_path):
     d = drive(np.random.default_rng(66), SLIPS, [60] * 3)
     for name, sinkage, tared in (("high", 50 + 1000 * d.sinkage, True),
@@ -235,12 +183,3 @@ def test_stated_numbers_are_in_plain_digits(tmp_path):
     given["load"] = {"file_name": r"load_(\d+)N"}
     with pytest.raises(InputError, match="finds no number in the name of the run"):
         import_log(file, given | {"torque": {"column": "M"}})
-
-
-def test_a_wheel_whose_load_a_line_of_the_head_states_does_not_take_the_shared_column():
-    shared = {"load": {"column": "Fz", "unit": "N", "noise": "1 N"}}
-    head = {"load": {"head": r"load (\d+)"}}
-    assert with_shared_keys(head, shared) == {"load": {"unit": "N", "noise": "1 N", **head["load"]}}
-    settings = Settings(dict(head), "map", Path())
-    assert shared_keys(settings, {"left": {"load": {"scale": 2.0}}}) == head
-    assert "load" in settings  # it serves wheels without a load of their own as well

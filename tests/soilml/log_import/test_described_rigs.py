@@ -9,10 +9,8 @@ from foreign_rigs import table
 from guessed_channels import RIGHT, SILENT, judged, judged_rigs
 
 from soilml.log_import import import_log, init_map
-from soilml.log_import.guesses.constants import constants_in_name
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import side_lines
-from soilml.log_import.readers.text_layout import name_and_unit
 
 
 @pytest.mark.slow
@@ -21,40 +19,6 @@ def test_channels_of_a_described_rig(writer, tmp_path):
     logs, truth = writer(np.random.default_rng(11), tmp_path)
     found = judged(logs, truth)
     assert set(found.values()) == {RIGHT}, found
-
-
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("WHEELDIAMETER25.0_GEARRATIO6", {"diameter": "25.0 cm", "gear_ratio": "6"}),
-        ("run3_R130mm_GR14", {"radius": "130 mm", "gear_ratio": "14"}),
-        ("D26cm_sand", {"diameter": "26 cm"}),
-        ("radius_0.13_b", {"radius": "0.13 m"}),
-        ("trial2_r1_d3", {}),  # repeats and days
-        ("gearless", {}),
-    ],
-)
-def test_constants_in_names_of_files(name, expected):
-    assert {key: value for key, (value, _) in constants_in_name(name).items()} == expected
-
-
-@pytest.mark.parametrize(
-    ("cell", "expected"),
-    [
-        ("Motor Position (before gearbox - degrees)", ("Motor Position before gearbox", "degrees")),
-        ("speed (rpm, before gearbox)", ("speed before gearbox", "rpm")),
-        ("wheel angle [in degrees]", ("wheel angle", "degrees")),
-        ("M z, N mm", ("M z", "N mm")),
-        ("Carriage travel - millimetres", ("Carriage travel", "millimetres")),
-        ("Force (vertical)", ("Force vertical", "")),
-        ("T (% of rated)", ("T", "% of rated")),
-        ("torque/mNm", ("torque", "mNm")),
-        ("rotation/(deg/s)", ("rotation", "deg/s")),
-        ("left/right", ("left/right", "")),
-    ],
-)
-def test_units_in_words(cell, expected):
-    assert name_and_unit(cell) == expected
 
 
 @pytest.mark.parametrize("kind", ["json", "csv", "txt", "own"])

@@ -5,7 +5,6 @@ import pytest
 from foreign_rigs import RADIUS_EDIT, WRITERS, drive, law, nearest_stage, table
 
 from soilml.log_import import import_log, init_map
-from soilml.log_import.guesses.columns import words_of
 from soilml.log_import.readers import read_log
 
 #: Error of the zero of a sinkage: the wheel had sunk in before it started.
@@ -80,8 +79,3 @@ def test_a_column_of_text_is_named_in_the_map(tmp_path):
                                       zip(rows, d.torque, strict=True))]  # fmt: skip
     (tmp_path / "log.csv").write_text("\n".join(lines))
     assert "torque: text, such as '0.00 Nm approx'" in init_map(tmp_path / "log.csv")
-
-
-def test_words_of_any_script():
-    assert words_of("挂钩牵引力 DP_2") == ["挂钩牵引力", "dp", "2"]
-    assert words_of("Velocità_ruota") == ["velocità", "ruota"]

@@ -9,12 +9,6 @@ import pytest
 from soilml import Estimator
 from soilml.errors import InputError
 from soilml.log_import import import_log
-from soilml.log_import.windows.stances import (
-    amplitude,
-    midstances_of_height,
-    stances_of,
-    without_spikes,
-)
 from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.quantities import Z_90, column
 
@@ -112,45 +106,3 @@ def test_without_the_table_its_channels_are_unknown(logs, tmp_path):
     table = table_of(rig.MAP, "wheel_leg")
     with pytest.raises(InputError, match="unknown key"):
         imported(logs, tmp_path, (table, "[wheel]\nradius = 0.18\n"))
-
-
-def test_a_fast_oscillation_has_no_wild_samples_and_a_glitch_has():
-    time = np.arange(0.0, 5.0, 0.005)
-    noise = 0.02 * np.random.default_rng(1).standard_normal(time.size)
-    shaken = np.where(time > 2.5, 3.0 * np.sin(2 * np.pi * 20.0 * time), 0.0) + noise
-    assert without_spikes(shaken)[1] == 0
-    wild = shaken.copy()
-    wild[[100, 300, 301, 700]] += [5.0, -5.0, -4.0, 20.0]
-    cleaned, count = without_spikes(wild)
-    assert count == 4 and np.isnan(cleaned[[100, 300, 301, 700]]).all()
-
-
-def test_stances_end_halfway_between_legs_and_a_rest_is_left_out():
-    time = np.arange(0.0, 60.0, 0.01)
-    angle = 0.3 * np.where(time < 20.0, time, np.maximum(20.0, time - 15.0))
-    found = stances_of(time, angle, 2 * np.pi / 5)
-    ends = [np.interp([s.start, s.stop], time, angle) for s in found]
-    np.testing.assert_allclose(np.diff(ends, axis=1), 2 * np.pi / 5, rtol=0.01)
-    assert [s.why.code for s in found if s.why] == ["at-rest"]
-
-
-def test_midstances_are_where_the_hub_is_highest_and_a_flat_height_has_none():
-    time = np.arange(0.0, 40.0, 0.02)
-    since = 0.3 * time - 2 * np.pi / 5 * np.round(0.3 * time / (2 * np.pi / 5))
-    noise = 1e-3 * np.random.default_rng(2).standard_normal(time.size)
-    found = midstances_of_height(time, 0.18 * np.cos(since) + noise)
-    off = np.angle(np.exp(5j * 0.3 * found)) / 5
-    assert len(found) >= 7 and np.abs(off).max() < 0.05
-    assert midstances_of_height(time, np.ones(time.size)).size == 0
-
-
-def test_the_largest_acceleration_is_that_of_the_wave_and_not_of_the_noise():
-    time = np.arange(0.0, 2.0, 0.005)
-    draw = np.random.default_rng(3).standard_normal
-    errors = []
-    for _ in range(200):
-        wave = 2.0 * np.exp(-3.0 * time) * np.sin(2 * np.pi * 5.0 * time)
-        value, std = amplitude(wave + 0.1 * draw(time.size), 0.1)
-        errors.append((value - wave.max()) / std)
-    assert abs(np.mean(errors)) < 1.0 and 0.7 < np.std(errors) < 1.3
-    assert np.isnan(amplitude(np.full(400, np.nan), 0.1)[0])

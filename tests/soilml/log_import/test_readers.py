@@ -1,15 +1,10 @@
 """Text logs in the dialects of loggers, units and values with uncertainties."""
 
-import math
-
 import numpy as np
 import pytest
 
 from soilml.errors import InputError, MissingLibraryError, SoilmlError
-from soilml.log_import.mapping.uncertain_value import parse_uncertain
 from soilml.log_import.readers import read_log
-from soilml.log_import.readers.delimited_text import time_of_day
-from soilml.log_import.units import dimension, factor, unit_in_name
 from soilml.remarks import texts
 
 PLAIN = "t,F,M\n0.0,1.5,-2\n0.1,1.6,-3\n0.2,,-4\n0.3,1.8,-5\n0.4,1.9,-6\n"
@@ -84,13 +79,6 @@ def test_a_log_without_header_numbers_its_columns(tmp_path):
     assert list(recording.columns) == ["column_1", "column_2", "column_3"]
 
 
-def test_times_of_day_are_seconds():
-    assert np.ptp(time_of_day(["2024-05-01T10:00:00.25Z", "2024-05-01 10:00:01.5"])) == 1.25
-    assert np.ptp(time_of_day(["23:59:59.5", "00:00:00.5"])) == 1.0
-    assert np.ptp(time_of_day(["01.05.2024 10:00:00", "01.05.2024 10:00:02"])) == 2.0
-    assert time_of_day(["sand_1", "sand_2"]) is None
-
-
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
@@ -130,65 +118,6 @@ def test_bags_without_their_libraries_name_the_extra(tmp_path, monkeypatch):
     (tmp_path / "a.bag").write_bytes(b"")
     with pytest.raises(MissingLibraryError, match=r"pip install 'soilml\[logs\]'"):
         read_log(tmp_path / "a.bag")
-
-
-@pytest.mark.parametrize(
-    ("unit", "ours", "expected"),
-    [
-        ("Nm", "N m", 1.0),
-        ("mNm", "N m", 1e-3),
-        ("N*mm", "N m", 1e-3),
-        ("Ncm", "N m", 0.01),
-        ("kgf·cm", "N m", 0.0980665),
-        ("rpm", "rad/s", math.pi / 30),
-        ("1/min", "rad/s", math.pi / 30),
-        ("U/min", "rad/s", math.pi / 30),
-        ("Hz", "rad/s", 2 * math.pi),
-        ("°/s", "rad/s", math.pi / 180),
-        ("deg/s", "rad/s", math.pi / 180),
-        ("mm/s", "m/s", 1e-3),
-        ("km/h", "m/s", 1 / 3.6),
-        ("m s^-1", "m/s", 1.0),
-        ("%", "1", 0.01),
-        ("kgf", "N", 9.80665),
-        ("kN", "N", 1e3),
-        ("mA", "A", 1e-3),
-        ("µs", "s", 1e-6),
-        ("turns", "rad", 2 * math.pi),
-        ("mN m/A", "N m/A", 1e-3),
-    ],
-)
-def test_units_as_logs_write_them(unit, ours, expected):
-    assert factor(unit, ours, "x") == pytest.approx(expected, rel=1e-9)
-    assert dimension(unit) == ours
-
-
-def test_units_of_another_kind_are_refused_with_a_hint():
-    with pytest.raises(InputError, match="kg are a mass; write kgf"):
-        factor("kg", "N", "[load]")
-    with pytest.raises(InputError, match="counts_per_turn"):
-        factor("counts", "rad", "[wheel_angle]")
-    with pytest.raises(InputError, match="unit 'parsnips' is not known"):
-        factor("parsnips", "N", "[load]")
-    with pytest.raises(InputError, match="does not give rad/s"):
-        factor("%", "rad/s", "[wheel_speed]")
-
-
-def test_values_have_units_and_uncertainties():
-    found = parse_uncertain("38.5 mN m/A +- 5 %", "N m/A", "x")
-    assert found.value == pytest.approx(0.0385) and found.relative == pytest.approx(0.05)
-    found = parse_uncertain("150 mm ± 1 mm", "m", "x")
-    assert (found.value, found.std) == (pytest.approx(0.15), pytest.approx(0.001))
-    assert parse_uncertain("0.7 +- 0.05", "1", "x").std == 0.05
-    assert parse_uncertain(3, "m", "x").std == 0.0
-    assert parse_uncertain("about 3", "m", "x") is None
-    assert parse_uncertain("\uff12 m", "m", "x") is None
-    assert parse_uncertain("1e999", "m", "x") is None
-
-
-def test_units_at_the_end_of_names():
-    names = ("torque_Nm", "v_mm_s", "time_ms", "omega_rad_s", "F_z", "pos_x", "current_mA")
-    assert [unit_in_name(n) for n in names] == ["Nm", "mm/s", "ms", "rad/s", "", "", "mA"]
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,6 @@ from soilml.errors import InputError
 from soilml.io.text_tables import csv_text
 from soilml.log_import import import_log, init_map
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns import candidates_of
-from soilml.log_import.guesses.roles import assign, axle_of
-from soilml.log_import.readers.message_fields import protobuf_fields
-from soilml.log_import.recording import Recording
 from soilml.remarks import about, texts
 
 SLIPS = (0.1, 0.3, 0.5)
@@ -169,31 +165,6 @@ def test_a_load_that_each_struct_states_for_itself(tmp_path):
     assert found.table["load_N"].tolist() == [60.0, 100.0]
 
 
-def test_topics_that_hold_two_quantities():
-    """fx of /force_torque is a force, and velocity of /wheel_state a rotation."""
-    d = drive(np.random.default_rng(90), slips=(0.1, 0.5))
-    records = [
-        Recording("/wheel_state", None, {"velocity": d.rim, "current": d.torque}, clock=d.time),
-        Recording("/force_torque", None, {"fx": 9.7 + d.torque, "fz": -d.load}, clock=d.time),
-        Recording("/carriage", None, {"position_mm": d.place}, clock=d.time),
-    ]
-    found = {role: c.address for role, c in assign(candidates_of(records)).shared.items()}
-    assert found == {"wheel_speed": "/wheel_state:velocity", "position": "/carriage:position_mm",
-                     "motor_current": "/wheel_state:current", "load": "/force_torque:fz",
-                     "drawbar_pull": "/force_torque:fx"}  # fmt: skip
-
-
-def test_a_force_that_comes_and_goes_is_no_angle_that_starts_again():
-    """Up and down by 6.1, as an angle in rad would jump; and two letters of six wheels."""
-    on = np.repeat([0.0, 6.1, 0.0], [60, 800, 60])
-    names = [f"effort.{side}" for side in ("fl", "fr", "ml", "mr", "rl", "rr")]
-    rng = np.random.default_rng(91)
-    columns = {name: noisy(rng, on, 0.02) for name in names}
-    found = assign(candidates_of([Recording("/joint_states", None, columns)]))
-    assert {axle_of(name) for name in found.wheels} == {"front", "middle", "rear"}
-    assert all("torque" in own for own in found.wheels.values())
-
-
 @pytest.mark.slow
 def test_the_table_of_an_earlier_import_is_no_log(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -242,16 +213,6 @@ def test_a_wrong_unit_is_refused_with_its_cause(old, new, cause, tmp_path):
              (old, new)]  # fmt: skip
     with pytest.raises(InputError, match=cause):
         imported(tmp_path, write_csv(tmp_path / "log.csv", columns), edits)
-
-
-def test_fields_of_a_protobuf_message_that_are_not_set():
-    """A message without its nested one, with a list of messages, and zeros."""
-    descriptor_pb2 = pytest.importorskip("google.protobuf.descriptor_pb2")
-    message = descriptor_pb2.DescriptorProto(name="A")
-    message.field.add(name="x", number=3)
-    found = protobuf_fields(message)
-    assert found["name"] == "A" and "options" not in found
-    assert found["field"][0]["number"] == 3 and found["field"][0]["oneof_index"] == 0
 
 
 def test_plate_tests_are_sent_to_the_bevameter(tmp_path):

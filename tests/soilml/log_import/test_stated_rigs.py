@@ -8,11 +8,7 @@ from foreign_rigs import drive, law, nearest_stage, table
 from stated_rigs import WRITERS, a_lever
 
 from soilml.log_import import import_log, init_map
-from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.readers import read_log
-from soilml.log_import.readers.missing_codes import without_codes
-from soilml.log_import.readers.text_layout import name_and_unit
-from soilml.log_import.recording import Recording
 from soilml.remarks import about, texts
 
 
@@ -39,60 +35,6 @@ def test_a_guessed_map_with_few_edits_gives_the_truth(writer, tmp_path):
         if "sinkage_m" in rows:
             assert rows["sinkage_m"][i] == pytest.approx(sinkage, abs=2e-4)
     assert met == set(stages)
-
-
-@pytest.mark.parametrize(
-    ("cell", "expected"),
-    [
-        ("Zeit / s", ("Zeit", "s")),
-        ("Drehmoment / (N·m)", ("Drehmoment", "N·m")),
-        ("Kraft in N", ("Kraft", "N")),
-        ("stuck in sand", ("stuck in sand", "")),
-        ("Fz [N]", ("Fz", "N")),
-        ("m/s", ("m/s", "")),
-        ("left / right", ("left / right", "")),
-    ],
-)
-def test_name_and_unit_of_a_header(cell, expected):
-    assert name_and_unit(cell) == expected
-
-
-def test_slope_of_accelerations_and_of_a_quaternion_agree():
-    """A turn by yaw, then by pitch, then by roll; gravity in the axes of the vehicle."""
-    yaw, up, roll = 0.7, 0.2, -0.1
-    a, b, c = (np.asarray([np.cos(v / 2), np.sin(v / 2)]) for v in (yaw, -up, roll))
-
-    def product(p, q):
-        w = p[0] * q[0] - p[1:] @ q[1:]
-        return np.append(w, p[0] * q[1:] + q[0] * p[1:] + np.cross(p[1:], q[1:]))
-
-    turn = product(
-        product([a[0], 0, 0, a[1]] * np.ones(4), np.asarray([b[0], 0, b[1], 0])),
-        np.asarray([c[0], c[1], 0, 0]),
-    )
-    w, x, y, z = (3.0 * part * np.ones(1) for part in turn)  # of any length
-    assert slope_of([x, y, z, w])[0] == pytest.approx(up)
-    gravity = (np.sin(up), np.sin(roll) * np.cos(up), np.cos(roll) * np.cos(up))
-    assert slope_of([9.8 * part * np.ones(1) for part in gravity])[0] == pytest.approx(up)
-    assert slope_of([np.asarray([0.3])])[0] == 0.3
-
-
-@pytest.mark.parametrize(
-    ("values", "left"),
-    [
-        ([1.0, 2.0, -9999.0, 1.5, -9999.0], 3),
-        ([1.0, 2.0, -9999.0, 1.5, 1.2], 5),  # once: an outlier, and not a code
-        ([990.0, 995.0, 999.0, 999.0, 993.0], 5),  # a reading like its neighbours
-        ([0.1, 0.2, 65535.0, 65535.0, 0.15], 3),
-        ([5.0, 6.0, 1000.0, 1000.0, 5.5], 5),  # no code
-        ([9999.0, 9999.0, 9999.0], 3),
-        ([1.0, 1e308, -1e30, 1.2, 9.9e29], 3),
-    ],
-)
-def test_codes_of_missing_readings(values, left, tmp_path):
-    found = without_codes(Recording("", tmp_path, {"a": np.asarray(values)}))
-    assert int(np.isfinite(found.columns["a"]).sum()) == left
-    assert bool(found.notes) == (left < len(values))
 
 
 @pytest.mark.slow

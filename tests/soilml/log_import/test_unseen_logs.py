@@ -7,10 +7,6 @@ from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns import candidates_of
-from soilml.log_import.guesses.constants import stated_constants
-from soilml.log_import.guesses.roles import assign
-from soilml.log_import.recording import Recording
 from soilml.remarks import about
 
 SLIPS = (0.1, 0.3, 0.5)
@@ -45,26 +41,6 @@ def test_a_place_in_x_y_and_z_is_one_place(tmp_path):
     assert len(found.table) == 12
     np.testing.assert_allclose(found.table["slip"], np.tile(SLIPS, 4), atol=0.02)
     np.testing.assert_allclose(found.table["torque_Nm"], np.tile(torque_law(SLIPS), 4), rtol=0.08)
-
-
-def test_joints_of_a_ros_rover_are_wheels():
-    """Names where the place of the wheel stands between words; quaternions are no forces."""
-    d = drive(np.random.default_rng(71), slips=(0.2,))
-    joints = {}
-    for w in WHEELS:
-        joints |= {f"velocity.{w}_wheel_joint": d.rim / RADIUS,
-                   f"velocity.{w}_steer_joint": 0.001 * d.time,
-                   f"effort.{w}_wheel_joint": d.torque,
-                   f"effort.{w}_steer_joint": d.load}  # fmt: skip
-    imu = {f"orientation.{axis}": 0.5 + 0.01 * d.rim for axis in "xyzw"}
-    records = [Recording("/joint_states", None, joints, clock=d.time),
-               Recording("/imu", None, imu, clock=d.time)]  # fmt: skip
-    found = assign(candidates_of(records))
-    assert sorted(found.wheels) == sorted(WHEELS)
-    for name, own in found.wheels.items():
-        assert own["wheel_speed"].name == f"velocity.{name}_wheel_joint"
-        assert own["torque"].name == f"effort.{name}_wheel_joint"
-    assert "load" not in found.roles()
 
 
 @pytest.mark.parametrize("array", [True, False])
@@ -159,28 +135,6 @@ def test_thousands_are_read(german, tmp_path):
     found, _ = imported(tmp_path, path, [("# radius", "radius")])
     np.testing.assert_allclose(found.table["slip"], 0.2, atol=0.02)
     np.testing.assert_allclose(found.table["torque_Nm"], torque_law(0.2), rtol=0.08)
-
-
-def test_a_steady_force_beside_one_that_varies_is_the_load():
-    d = drive(np.random.default_rng(76), slips=SLIPS, seconds=5)
-    columns = {"Force": d.load, "Force#2": 5.0 * d.torque}
-    record = Recording("", None, columns, units={"Force": "N", "Force#2": "N"})
-    found = assign(candidates_of([record]))
-    assert found.shared["load"].name == "Force"
-    assert found.shared["drawbar_pull"].name == "Force#2"
-
-
-@pytest.mark.parametrize(
-    "line, name, value",
-    [
-        ("Raddurchmesser;0,2 m", "diameter", "0.2 m"),
-        ("Getriebe:;64:1", "gear_ratio", "64"),
-        ("Gear ratio = 1:64", "gear_ratio", "64"),
-        ("mass_kg,24", "mass", "24 kg"),
-    ],
-)
-def test_constants_in_the_head(line, name, value):
-    assert stated_constants([line])[name][0] == value
 
 
 def test_a_commanded_slip_is_offered_and_the_rotation_is_asked_for(tmp_path):

@@ -3,16 +3,8 @@
 import numpy as np
 import pytest
 
-from soilml.numerics import surface_sampling
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.surface_sampling import surface_sample
-from soilml.numerics.surrogate_density import (
-    SamplingBox,
-    Scaling,
-    fit_surface,
-    monomials,
-    term_count,
-)
 
 pytestmark = pytest.mark.slow
 
@@ -108,49 +100,3 @@ def test_a_start_that_is_off_is_left():
     sample = surface_sample(density, 2, start)
     mean, covariance, _ = moments_by_grid(Bent(1e-3), (0.6, 0.3), 0.03)
     assert np.abs(sample.mean(sample.u) - mean).max() < 0.1 * np.sqrt(np.diag(covariance)).min()
-
-
-def test_leave_one_out_errors_are_those_of_fits_without_the_point():
-    rng = np.random.default_rng(3)
-    u = rng.random((30, 2))
-    y = np.stack([np.exp(u[:, 0]), np.sin(3.0 * u[:, 1])], axis=1)
-    scaling = SamplingBox.cube(2).scaling
-    surface, errors = fit_surface(scaling, 3, u, y)
-    assert surface(u) == pytest.approx(y, abs=0.05)
-    for i in (0, 7, 29):
-        others = np.arange(30) != i
-        without, _ = fit_surface(scaling, 3, u[others], y[others])
-        assert errors[i] == pytest.approx((y[i] - without(u[[i]]))[0], rel=1e-6)
-
-
-def test_monomials_are_all_up_to_the_degree():
-    z = np.asarray([[2.0, 3.0, 5.0]])
-    assert sorted(monomials(z, 2)[0]) == [1, 2, 3, 4, 5, 6, 9, 10, 15, 25]
-    assert [term_count(3, d) for d in (1, 2, 6)] == [4, 10, 84]
-
-
-def test_a_scaling_gives_unit_covariance_and_can_be_undone():
-    rng = np.random.default_rng(0)
-    u = rng.standard_normal((500, 3)) @ np.asarray([[1.0, 0.9, 0.0], [0.0, 0.1, 0.2], [0, 0, 3.0]])
-    weights = rng.random(500)
-    weights /= weights.sum()
-    scaling = Scaling.of(u, weights)
-    z = scaling(u)
-    assert weights @ z == pytest.approx(np.zeros(3), abs=1e-9)
-    assert (z.T * weights) @ z == pytest.approx(np.eye(3), abs=1e-6)
-    assert scaling.back(z) == pytest.approx(u, abs=1e-9)
-
-
-def test_the_last_round_only_tests_and_the_one_before_asks_for_the_density_itself(monkeypatch):
-    powers = []
-    approach = surface_sampling._approached
-
-    def noted(surrogate, errors, least_power, rng):
-        powers.append(least_power)
-        return approach(surrogate, errors, least_power, rng)
-
-    monkeypatch.setattr(surface_sampling, "_approached", noted)
-    assert surface_sample(Bent(1e-3, kink=2.0), 2) is None
-    assert len(powers) == surface_sampling.MOST_ROUNDS - 1
-    assert powers[-1] == 1.0
-    assert set(powers[:-1]) == {surface_sampling.LEAST_POWER}

@@ -7,7 +7,6 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.features import compute_features, flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import (
     PoolingCalibration,
     PoolingRule,
@@ -17,15 +16,11 @@ from soilml.onboard.gaussian_pooling import (
     pool_within_prior,
 )
 from soilml.onboard.multi_sensor import (
-    CONTRADICTION,
     SAME_PRIOR,
-    _contradictory,
-    _fuse_by_variance,
-    _mean_correlation,
     fuse_estimates,
 )
 from soilml.onboard.set_contract import ABSENT_READING, ABSENT_STD
-from soilml.onboard.set_posterior import SetPosterior, _broadcast, constant_noise_factor
+from soilml.onboard.set_posterior import SetPosterior, constant_noise_factor
 
 SETS = SetPosterior(
     terms=4,
@@ -35,24 +30,6 @@ SETS = SetPosterior(
     sets_only=True,
 )
 ROWS = {"slip": np.asarray([0.1, 0.2]), "torque": np.asarray([10.0, -5.0]), "load": 60.0}
-
-
-def test_the_entry_of_a_file_is_read_part_by_part():
-    entry = {
-        "terms": 20,
-        "noise": {"torque": [0.1, 0.02]},
-        "context": {"radius": [0.05, 0.3]},
-        "alone": True,
-    }
-    found = SetPosterior.of(entry)
-    assert found.noise == {"torque": (0.1, 0.02)} and found.terms == 20
-    assert found.context_ranges == {"radius": (0.05, 0.3)} and found.sets_only
-    assert found.columns == 21 and found.missing_context == ("radius",)
-    known = found.with_context({"radius": 0.3}, {"torque": (0.0, 0.05)})
-    assert known.missing_context == () and known.noise == {"torque": (0.0, 0.05)}
-    for radius in (0.049, 0.301):
-        with pytest.raises(InputError, match=r"the range of this file is 0.05 to 0.3"):
-            found.with_context({"radius": radius}, {})
 
 
 def test_standard_deviations_are_those_of_the_noise_model_or_as_measured():
@@ -90,17 +67,6 @@ def test_torques_with_constant_noise_are_reduced_where_their_logarithm_is_taken(
     )
     for sets, given in unchanged:
         assert sets.rows(ROWS | given)["torque"].tolist() == ROWS["torque"].tolist()
-
-
-@pytest.mark.parametrize("kind, constant, log_torque", [
-    ("one wheel", 0.0, True), ("one wheel", 0.1, False), ("any wheel", 0.1, True),
-])  # fmt: skip
-def test_torque_has_a_logarithm_unless_a_file_for_one_wheel_has_constant_noise(
-    kind, constant, log_torque
-):
-    noise = {"torque": [constant, 0.02]}
-    entry = {"terms": 4, "noise": noise, "context": {}, "alone": True, "kind": kind}
-    assert SetPosterior.of(entry).log_torque is log_torque
 
 
 @pytest.mark.parametrize("constant, share", [(0.05, 0.0), (0.1, 0.0), (0.06, 0.08), (0.15, 0.02)])
@@ -142,40 +108,6 @@ def test_a_noise_is_two_numbers_of_zero_or_more():
     assert SETS.with_context({}, {"torque": (0.0, 0.0)}).noise["torque"] == (0.0, 0.0)
 
 
-def test_readings_take_the_shape_of_the_others():
-    assert _broadcast("sinkage", 0.01, (2, 2)).tolist() == [0.01] * 4
-    with pytest.raises(InputError, match=r"sinkage has shape \(3,\), the readings have \(2,\)"):
-        _broadcast("sinkage", [0.0, 0.0, 0.0], (2,))
-    with pytest.raises(InputError, match="sinkage is inf"):
-        _broadcast("sinkage", [0.0, np.inf], (2,))
-    slip, load = flatten_readings(["slip", "load"], {"slip": [[0.1], [0.2]], "load": [60.0, 70.0]})[
-        0
-    ]
-    assert slip.tolist() == [0.1, 0.1, 0.2, 0.2] and load.tolist() == [60.0, 70.0] * 2
-    with pytest.raises(InputError, match=r"given: slip \(3,\), load \(2,\)"):
-        flatten_readings(["slip", "load"], {"slip": [0.1] * 3, "load": [60.0] * 2})
-    found = compute_features(["slip", "torque/load"], {"slip": slip, "torque": load, "load": load})
-    assert found.tolist() == [[s, 1.0] for s in slip]
-
-
-@pytest.mark.parametrize("name, value", [
-    ("slip", 1.0), ("slip", -1.0), ("load", 0.0), ("torque", np.inf), ("load", np.nan),
-])  # fmt: skip
-def test_readings_out_of_their_range_are_refused(name, value):
-    for given in (value, [value]):
-        with pytest.raises(InputError, match=f"{name} is"):
-            flatten_readings([name], {name: given})
-
-
-def test_copies_of_rows_are_those_that_agree_in_every_reading():
-    rows = SETS.rows({"slip": [0.1, 0.1, 0.2, 0.1], "torque": [1.0, 2.0, 1.0, 1.0], "load": 60.0})
-    kept = without_copies(rows)
-    assert kept["slip"].tolist() == [0.1, 0.1, 0.2] and kept["torque"].tolist() == [1.0, 2.0, 1.0]
-    assert {len(values) for values in kept.values()} == {3}
-    other = without_copies(rows | {"sinkage": np.asarray([1.0, 1.0, 1.0, 2.0])})
-    assert len(other["slip"]) == 4
-
-
 PRIOR = PriorSummary(
     np.asarray([1.0, 10.0]),
     np.asarray([0.5, 4.0]),
@@ -190,32 +122,6 @@ def estimates(mean, std, in_range, prior=PRIOR):
     return Estimate.gaussian(
         *(("a", "b"), ("1", "1"), prior, mean, covariance, std, np.asarray(in_range), np.ones(2))
     )
-
-
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_estimates_contradict_each_other_beyond_four_standard_deviations(sign):
-    std = np.full((2, 1, 2), 0.1)
-    for apart, contradict in ((0.99, False), (1.01, True)):
-        mean = np.zeros((2, 1, 2))
-        mean[1, 0, 1] = sign * apart * CONTRADICTION * np.hypot(0.1, 0.1)
-        covariance = std[..., None] ** 2 * np.eye(2)
-        used = np.ones((2, 1), dtype=bool)
-        assert _contradictory(mean, covariance, used).tolist() == [contradict]
-        used[0] = False
-        assert _contradictory(mean, covariance, used).tolist() == [False]
-
-
-def test_correlations_are_averaged_and_standard_deviations_fused():
-    covariance = np.asarray([[[[4.0, 1.0], [1.0, 1.0]]], [[[1.0, -0.1], [-0.1, 1.0]]]])
-    correlation = _mean_correlation(covariance)
-    assert correlation[0] == pytest.approx(np.asarray([[1.0, 0.2], [0.2, 1.0]]))
-    mean = np.asarray([[[1.0, 10.0]], [[2.0, 12.0]]])
-    fused_mean, fused, low, high = _fuse_by_variance(mean, covariance, PRIOR, "inverse-variance")
-    std = np.asarray([np.sqrt(0.8), np.sqrt(0.5)])
-    assert fused_mean[0] == pytest.approx([(1.0 / 4.0 + 2.0) / 1.25, 11.0])
-    assert fused[0] == pytest.approx(correlation[0] * np.outer(std, std))
-    assert 0.5 * (low + high) == pytest.approx(fused_mean)
-    assert (high - low)[0] == pytest.approx(2.0 * 1.645 * std, rel=1e-3)
 
 
 def test_fused_rows_keep_shape_ends_and_reasons():
@@ -258,18 +164,6 @@ def test_an_estimate_of_no_rows_is_empty_and_its_errors_are_not_shown():
 
 
 CONDITIONS = RunConditions(("slip",), np.asarray([0.0]), np.asarray([0.5]), np.asarray([0.1]))
-
-
-def test_variation_is_a_cubic_of_the_ratio_of_standard_deviations():
-    slip, weights = np.asarray([0.1, 0.14, 0.18]), np.asarray([1.0, 0.5, 1.0])
-    mean = np.average(slip, weights=weights)
-    variance = np.sum(weights * (slip - mean) ** 2) / (2.5 - 1.0)
-    ratio = np.sqrt(variance) / 0.1
-    found = CONDITIONS.variation({"slip": slip}, weights)
-    assert found == pytest.approx([3.0 * ratio**2 - 2.0 * ratio**3]) and 0.05 < found[0] < 0.9
-    few = CONDITIONS.variation({"slip": slip[:2]}, np.asarray([0.6, 0.6]))
-    ratio = np.sqrt(1.2 * 0.02**2 / 0.5) / 0.1  # of at least half a degree of freedom
-    assert few == pytest.approx([3.0 * ratio**2 - 2.0 * ratio**3])
 
 
 def calibration(limit=9.0):

@@ -8,7 +8,7 @@ import pytest
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
-from soilml.onboard.joint_errors import are_comparable, joint_errors
+from soilml.onboard.joint_errors import joint_errors
 from soilml.onboard.multi_sensor import fuse_estimates
 
 pytestmark = pytest.mark.slow
@@ -202,16 +202,6 @@ def test_estimates_of_different_loads_are_refused():
     with pytest.raises(InputError, match=r"loads 21 N and 40 N"):
         fuse_estimates(at)
     assert fuse_estimates([at[0], at[0]]).estimate.in_range.all()
-
-
-def test_files_of_other_data_are_fused_as_before():
-    one, other = Sensors().files()[0], Sensors(seed=5).files()[1]
-    assert not are_comparable([one, other])
-    pair = [estimate([0.3], 0.05, one), estimate([0.34], 0.05, other)]
-    assert fuse_estimates(pair).rule == "prior-once"
-    with pytest.raises(InputError, match="do not carry their errors on common rows"):
-        fuse_estimates(pair, "correlated")
-    assert not are_comparable([one, None]) and are_comparable([one, one])
 
 
 def test_what_a_file_carries_is_read_back_as_it_was_written():

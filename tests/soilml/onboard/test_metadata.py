@@ -11,7 +11,6 @@ from soilml import Estimator
 from soilml.cli import main
 from soilml.errors import ModelFileError
 from soilml.onboard import model_file
-from soilml.onboard.metadata import is_plain_name
 from soilml.onboard.model_file import metadata_checksum, released_models, serialise_metadata
 
 RUNS = "run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.3,60,2.6\n"
@@ -131,12 +130,6 @@ def test_a_file_with_a_set_posterior_needs_no_pooling_of_rows(tmp_path):
 @pytest.mark.parametrize("name", released_models())
 def test_released_files_signed_again_are_read(tmp_path, name):
     assert Estimator.load(signed(released_models()[name], tmp_path / "m.onnx")).names
-
-
-def test_plain_names():
-    assert is_plain_name("grousers") and is_plain_name("Räder 3\u00a0b")
-    for name in ("", "a\nb", "\x1b[2J", "\u202e", "\ud800", 5, ["a"], None):
-        assert not is_plain_name(name)
 
 
 def test_a_file_of_sets_alone_needs_no_calibration_of_single_rows(tmp_path):

@@ -102,17 +102,6 @@ def test_tensors_are_found_wherever_the_format_has_them():
         assert not refers_to_files(found.SerializeToString())
 
 
-@pytest.mark.parametrize("number", [b"\x71" + b"\xff" * 8, b"\x75" + b"\xff" * 4])
-def test_numbers_of_eight_and_of_four_bytes_are_passed_over(number):
-    """Field 14, which ONNX does not have, before the graph."""
-    outside = onnx.TensorProto(data_location=onnx.TensorProto.EXTERNAL)
-    model = onnx.ModelProto(graph=onnx.GraphProto(initializer=[outside]))
-    assert refers_to_files(number + model.SerializeToString())
-    assert not refers_to_files(number + onnx.ModelProto(producer_name="p").SerializeToString())
-    with pytest.raises(ValueError, match="ends early"):
-        refers_to_files(number[:-1])
-
-
 @pytest.mark.parametrize(
     "content",
     [

@@ -9,13 +9,13 @@ from conftest import simulated_run
 from soilml import Estimator
 from soilml.errors import InputError
 from soilml.onboard.memory import LEAST_SINGULAR_VALUE, PACKED_EVERY, Memory, check_memory
-from soilml.onboard.tracking.filter_state import FilterState
+from soilml.onboard.tracking.filter_state import CHECKSUM, FilterState, checksum_of
 from soilml.onboard.tracking.row_window import RowWindow
 from soilml.onboard.tracking.soil_tracker import Event
 
 
 def test_a_memory_must_have_finite_numbers_of_its_file():
-    good = Memory(np.ones((2, 3)), np.ones(3, np.float32), "file")
+    good = Memory(np.ones((2, 3)), np.ones(3, np.float32), "file").sealed()
     assert check_memory(good, 3, "file", "a.onnx") is good and good.rows == 1
     nan, inf = np.asarray([np.nan, 1.0, 1.0]), np.asarray([np.inf, -np.inf, 1.0])
     for bad in (
@@ -29,6 +29,37 @@ def test_a_memory_must_have_finite_numbers_of_its_file():
             check_memory(bad, 3, "file", "a.onnx")
     with pytest.raises(InputError, match="another file, wheel, prior"):
         check_memory(good, 3, "other", "a.onnx")
+    with pytest.raises(InputError, match="has format '1'; this version of soilml reads format '2'"):
+        check_memory(replace(good, format="1"), 3, "file", "a.onnx")
+
+
+def flipped(array, rng):
+    """The array with one bit flipped."""
+    found = bytearray(array.tobytes())
+    found[rng.integers(len(found))] ^= 1 << int(rng.integers(8))
+    return np.frombuffer(bytes(found), array.dtype).reshape(array.shape)
+
+
+@pytest.mark.parametrize("keep", [0, 8])
+def test_a_memory_in_which_a_bit_has_flipped_is_refused(keep, wheel_set_file, wheel_posterior):
+    estimator, rng = Estimator.load(wheel_set_file), np.random.default_rng(0)
+    run, _ = simulated_run(wheel_posterior, 12)
+    memory = estimator.start(keep)
+    for first in (0, 4, 8):
+        part = {name: values[first : first + 4] for name, values in run.items()}
+        _, memory = estimator.step(memory, **part)
+    row = {name: values[:1] for name, values in run.items()}
+    for k in range(1000):
+        if keep:
+            kept, rows = memory.kept, dict(memory.kept.rows)
+            name = list(rows)[k % len(rows)]
+            bad = replace(memory, kept=replace(kept, rows=rows | {name: flipped(rows[name], rng)}))
+        else:
+            part = "counts" if k % 4 == 0 else "system"
+            bad = replace(memory, **{part: flipped(getattr(memory, part), rng)})
+        with pytest.raises(InputError, match="this memory is damaged"):
+            estimator.step(bad, **row)
+    assert estimator.step(memory, **row)[1].rows == 13
 
 
 @pytest.mark.parametrize("part", ["system", "counts"])
@@ -45,6 +76,9 @@ def test_a_state_of_a_tracker_must_have_finite_numbers(part):
     assert [(one.rows, one.known) for one in again.window.recent] == [(row, 1)]
     arrays[part] = arrays[part].astype(float)
     arrays[part][0, 1] = np.inf
+    with pytest.raises(InputError, match="its checksum does not match"):
+        FilterState.from_arrays(arrays, "file", start)
+    arrays[CHECKSUM] = checksum_of(arrays)
     with pytest.raises(InputError, match="numbers that are not finite"):
         FilterState.from_arrays(arrays, "file", start)
 
@@ -132,7 +166,7 @@ def test_answers_after_packing_are_those_before(whole_file):
     rows = sets.rows({"slip": slip, "torque": torque, "load": load})
     _, long = sets.update(estimator.session, rows, estimator.start())
     whole, _ = sets.update(estimator.session, sets.rows(one), long)
-    packed, after = estimator.step(long.packed(), **one)
+    packed, after = estimator.step(long.packed().sealed(), **one)
     assert len(long.packed().system) < len(long.system)
     assert packed.mean == pytest.approx(whole[0], abs=2e-3 * packed.std.min())
     assert packed.std == pytest.approx(whole[1], rel=2e-3)
@@ -169,4 +203,4 @@ def test_what_cannot_be_kept_is_refused(wheel_set_file):
     memory = estimator.start(keep=4)
     other = replace(memory.kept, before=replace(memory.kept.before, file="another"))
     with pytest.raises(InputError, match="this memory is of 'another'"):
-        estimator.step(replace(memory, kept=other), slip=0.3, torque=2.0, load=60.0)
+        estimator.step(replace(memory, kept=other).sealed(), slip=0.3, torque=2.0, load=60.0)

@@ -1,19 +1,18 @@
 """Estimates of the sinkage, the equilibrium next to one, and readings to first order."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from soilml import EFFECTS, Model, Operating, Status, Wheel, soil
 from soilml.physics.contact import Force
-from soilml.physics.equilibrium import equilibrium_forces, without_unsolved
-from soilml.physics.forces import apply_input_effects, forces_at_sinkage, load_at_sinkage
+from soilml.physics.equilibrium import without_unsolved
+from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.linear_response import linear_response
-from soilml.physics.load_case import LoadCase, merge_rows
-from soilml.physics.model import flattened, in_chunks_near
-from soilml.physics.sinkage_estimate import SinkageEstimate, coarse_estimate, forces_near
-from soilml.physics.sinkage_search import equilibrium_near
+from soilml.physics.load_case import LoadCase
+from soilml.physics.model import flattened
+from soilml.physics.sinkage_estimate import SinkageEstimate
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Wheel(radius=0.15, width=0.12)
@@ -24,81 +23,6 @@ CHANNELS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
 def batch(slip=SLIP, load=60.0, ground=SAND, effects=()):
     at = Operating(slip=np.asarray(slip), load=load * np.ones(len(slip)))
     return flattened(LoadCase(WHEEL, ground, at, effects))[0]
-
-
-def power(case, sinkage):
-    """d ln W / d ln z, by a difference."""
-    above, below = (load_at_sinkage(case, sinkage * np.exp(h)) for h in (1e-4, -1e-4))
-    return np.log(above / below) / 2e-4
-
-
-@pytest.mark.parametrize("load", [1.0, 60.0, 300.0])
-def test_few_points_give_the_sinkage_to_a_few_thousandths(load):
-    case = batch(load=load)
-    exact = equilibrium_forces(case).sinkage
-    found = coarse_estimate(case)
-    assert not found.nearest and found.log_sinkage.dtype == np.float64
-    np.testing.assert_allclose(found.log_sinkage, np.log(exact), atol=0.01)
-    np.testing.assert_allclose(found.slope, power(case, exact), rtol=0.1)
-
-
-def test_a_load_far_beyond_the_hub_has_no_estimate_or_one_at_the_hub():
-    found = coarse_estimate(batch(load=1e6)).log_sinkage
-    assert (np.isnan(found) | (found <= np.log(0.15) + 1e-6)).all()
-
-
-@pytest.mark.parametrize("off", [-0.3, 1e-3, 0.4])
-def test_secant_steps_end_at_the_equilibrium_with_the_slope_of_the_load(off):
-    case = batch()
-    exact = equilibrium_forces(case)
-    slope = power(case, exact.sinkage)
-    found, found_slope = forces_near(case, SinkageEstimate(np.log(exact.sinkage) + off, slope))
-    assert (found.status == Status.OK).all()
-    for name in (*CHANNELS, "load"):
-        np.testing.assert_allclose(
-            getattr(found, name), getattr(exact, name), rtol=1e-8, err_msg=name
-        )
-    np.testing.assert_allclose(found_slope, slope, rtol=0.02)
-
-
-def test_steps_that_leave_the_vicinity_or_the_wheel_are_not_solved():
-    case = batch()
-    exact = np.log(equilibrium_forces(case).sinkage)
-    far = SinkageEstimate(exact - [0.0, 8.0, 0.0, 8.0], np.ones(4))
-    found, _ = forces_near(case, far)
-    assert found.status.tolist() == [0, Status.NOT_CONVERGED] * 2
-    unknown = SinkageEstimate(np.full(4, np.nan), np.ones(4))
-    assert (forces_near(case, unknown)[0].status == Status.NOT_CONVERGED).all()
-    # a narrower strip of soil would carry the load only below the hub
-    heavy = batch(load=1.1 * float(load_at_sinkage(batch(), np.full(4, 0.15)).max()))
-    found, _ = forces_near(heavy, SinkageEstimate(np.full(4, np.log(0.149)), np.full(4, 1.3)))
-    assert (found.status == Status.NOT_CONVERGED).all()
-
-
-def test_rows_far_from_the_estimate_are_searched_unless_the_nearest_is_asked_for():
-    case = batch()
-    exact = equilibrium_forces(case)
-    estimate = SinkageEstimate(np.log(exact.sinkage) - [0.0, 8.0, 0.01, 8.0], np.full(4, 1.5))
-    found = equilibrium_near(case, estimate)
-    np.testing.assert_allclose(found.sinkage, exact.sinkage, rtol=1e-7)
-    np.testing.assert_allclose(found.torque, exact.torque, rtol=1e-7)
-    nearest = equilibrium_near(case, replace(estimate, nearest=True))
-    assert nearest.status.tolist() == [0, Status.NOT_CONVERGED] * 2
-    in_rows = in_chunks_near(case, equilibrium_forces, replace(estimate, nearest=True))
-    np.testing.assert_array_equal(np.isnan(in_rows.torque), [False, True] * 2)
-    np.testing.assert_allclose(
-        in_chunks_near(case, equilibrium_forces, None).torque, exact.torque, rtol=1e-12
-    )
-
-
-def test_rows_that_were_solved_apart_are_put_back_in_order():
-    def numbered(start, count):
-        return Force(**{f.name: start + np.arange(count) for f in fields(Force)})
-
-    keep = np.asarray([False, True, True, False, True])
-    merged = merge_rows(numbered(0, 5), keep, numbered(10, 2))
-    for field in fields(Force):
-        assert getattr(merged, field.name).tolist() == [10, 1, 2, 11, 4]
 
 
 def test_rows_without_equilibrium_are_blank_but_for_load_and_status():

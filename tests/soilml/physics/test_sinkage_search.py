@@ -8,11 +8,11 @@ from conftest import input_box, solved
 
 from soilml import EFFECTS, Model, Operating, Soil, Status, Track, Wheel, soil
 from soilml.errors import InputError
-from soilml.physics import sinkage_estimate, sinkage_search
+from soilml.physics import sinkage_search
 from soilml.physics.contact import Resolution
 from soilml.physics.equilibrium import sensor_readings
 from soilml.physics.forces import load_at_sinkage
-from soilml.physics.load_case import LoadCase, rows
+from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened, in_chunks
 
 SAND = soil("wong1989/dry_sand")
@@ -56,35 +56,6 @@ def test_the_three_searches_find_the_same_sinkage():
             np.testing.assert_allclose(getattr(force, name), reference, rtol=1e-6, atol=1e-7)
 
 
-def test_ordinary_rows_need_few_evaluations(monkeypatch):
-    counts = dict.fromkeys(("coarse", "full"), 0)
-    coarse, full = sinkage_estimate.load_at_sinkage, sinkage_estimate.forces_at_sinkage
-
-    def counted_coarse(*args, **options):
-        counts["coarse"] += 1
-        assert args[0].resolution is Resolution.COARSE and args[1].dtype == np.float32
-        return coarse(*args, **options)
-
-    def counted_full(*args, **options):
-        counts["full"] += 1
-        return full(*args, **options)
-
-    monkeypatch.setattr(sinkage_estimate, "load_at_sinkage", counted_coarse)
-    monkeypatch.setattr(sinkage_estimate, "forces_at_sinkage", counted_full)
-    assert not sinkage_search.first_equilibrium(box()).status.any()
-    assert 2 <= counts["coarse"] <= 4
-    assert 2 <= counts["full"] <= 4
-
-
-def test_driving_alone_lets_the_load_rise_all_the_way():
-    rises = sinkage_search.load_rises_with_sinkage
-    assert rises(batch([0.0, 0.5], 60.0))
-    assert not rises(batch([-0.01, 0.5], 60.0))
-    assert rises(batch(0.3 + np.zeros(1), 60.0, effects=(EFFECTS["slip-sinkage"](n1=0.1),)))
-    for name in ("exit-angle", "depth-cohesion", "bulldozing"):
-        assert not rises(batch([0.3], 60.0, effects=(EFFECTS[name](),)))
-
-
 def test_a_load_above_that_at_the_hub_is_too_heavy_and_one_below_is_not():
     at_hub = float(load_at_sinkage(batch([0.3], 60.0), np.asarray([0.15]))[0])
     case = batch(np.full(3, 0.3), at_hub * np.asarray([0.5, 0.999, 1.001]))
@@ -116,42 +87,6 @@ def test_a_row_that_nothing_carries_states_the_largest_load(slip):
     for sinkage, load in zip(below.sinkage, (0.3 * most, 0.99 * most), strict=True):
         first = every[np.argmax(carried >= load)]
         assert sinkage == pytest.approx(first, rel=5e-3)
-
-
-def test_the_largest_load_below_a_sinkage_is_found_coarsely():
-    case = batch(np.asarray([0.3, -0.9, -0.8]), 60.0)
-    sinkage = np.asarray([0.03, 0.05, 0.08])
-    index = np.asarray([0, 2])
-    found = sinkage_search._largest_load_below(case, sinkage, index)
-    for i, load in zip(index, found, strict=True):
-        smaller = sinkage[i] * np.linspace(0.01, 0.9, 200)
-        one = rows(case, np.full(200, i))
-        most = load_at_sinkage(one, smaller).max()
-        assert load == pytest.approx(most, rel=0.1)
-
-
-def test_a_row_whose_load_falls_with_sinkage_is_in_doubt():
-    doubt = sinkage_search._load_may_fall_with_sinkage
-    sinkage = np.full(3, 0.03)
-    slips = np.asarray([0.3, -1e-4, -0.9])
-    assert doubt(batch(slips, 60.0), sinkage).tolist() == [False, False, True]
-    on_stress = batch(slips, 60.0, effects=(EFFECTS["depth-cohesion"](),))
-    assert doubt(on_stress, sinkage).all()
-    pull = batch(slips[:2], 60.0, effects=(EFFECTS["load-transfer"](ratio=0.3),))
-    assert doubt(pull, sinkage[:2]).all()
-    none = batch(slips[:2], 60.0, effects=(EFFECTS["bulldozing"](share=1.0),))
-    assert not doubt(none, sinkage[:2]).any()
-
-
-def test_a_peak_is_refined_between_its_neighbours():
-    grid = np.stack([np.arange(5.0), 10.0 * np.arange(5.0)], axis=1)
-    found = sinkage_search._refined_about(grid, np.asarray([2, 4]))
-    assert found.shape == (17, 2)
-    np.testing.assert_allclose(found[:, 0], np.linspace(1.0, 3.0, 17))
-    np.testing.assert_allclose(found[:, 1], np.linspace(30.0, 40.0, 17))
-    np.testing.assert_allclose(
-        sinkage_search._refined_about(grid, np.asarray([0, 0]))[[0, -1], 0], [0.0, 1.0]
-    )
 
 
 @pytest.mark.parametrize("gear", [WHEEL, Track(radius=0.1, width=0.12, base=0.6)])

@@ -5,7 +5,7 @@ import numpy as np
 
 matplotlib.use("Agg")
 
-from soilml.report.column_panels import ColumnPanels, column_label
+from soilml.report.column_panels import ColumnPanels
 
 COLUMNS = {
     "slip": [0.3, 0.1, 0.1, 0.3],
@@ -37,9 +37,3 @@ def test_columns_of_one_panel_are_told_apart_by_style():
     names = [text.get_text() for text in panel.get_legend().get_texts()]
     assert set(names) == {"front share", "rear share", "60 N", "90 N"}
     assert panels.shape == (1, 1)
-
-
-def test_units_of_columns_are_words():
-    assert column_label("stiffness_N_m3") == (1.0, "stiffness, N/m³")
-    assert column_label("turned_rad")[1] == "turned, °"
-    assert column_label("vibration_m_s2") == (1.0, "vibration, m/s²")

@@ -11,7 +11,7 @@ from soilml import Case, Grousers, Model, Wheel, soil
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS
 from soilml.identification.averaged import EFFECT, ERRORS, EXACT, LAW, LAWS
-from soilml.rover_design.performance import SWEPT, Outcomes, evaluate, lugs_needed
+from soilml.rover_design.performance import Outcomes, evaluate, lugs_needed
 from soilml.rover_design.study import read_study
 from soilml.rover_design.uncertainty import possible_tests, variance_shares
 from soilml.rover_design.worlds import LUG_SHEARING, draw_worlds
@@ -76,15 +76,6 @@ def test_a_wider_wheel_with_higher_lugs_climbs_better(study):
     assert np.all(np.diff(wider, axis=0) > 0.0)
     higher = evaluate(study, designs(0.08, [0.0, 0.005, 0.012]), worlds).margin
     assert np.all(np.diff(higher, axis=0) > 0.0)
-
-
-def test_quick_equilibria_are_those_of_the_full_search(study):
-    worlds = draw_worlds(study.soil, 150, 0.6)
-    own = designs([0.05, 0.12], [0.0, 0.012])
-    quick = evaluate(study, own, worlds, shares=SWEPT, quick=True)
-    full = evaluate(study, own, worlds, shares=SWEPT)
-    assert quick.margin == pytest.approx(full.margin, rel=1e-6, abs=1e-6)
-    assert quick.energy == pytest.approx(full.energy, rel=1e-5, nan_ok=True)
 
 
 def test_limits_of_torque_and_energy_belong_to_the_goal(study):

@@ -7,9 +7,8 @@ import pytest
 from design_files import STUDY
 
 from soilml import design
-from soilml.rover_design.search import Designs, best_design, meets, pareto_front, swept
+from soilml.rover_design.search import Designs, best_design, meets, pareto_front
 from soilml.rover_design.study import read_study
-from soilml.rover_design.worlds import draw_worlds
 
 
 @pytest.fixture
@@ -58,14 +57,6 @@ def test_a_design_with_too_few_lugs_does_not_count(study):
     )
     assert best_design(study, own) == 1
     assert pareto_front(study, own).tolist() == [1]
-
-
-def test_a_sweep_is_a_grid_with_its_ends(study):
-    found = swept(study, draw_worlds(study.soil, 50, 0.6), 20)
-    assert set(found.dimensions["lug_height"]) == {0.0, 0.01}
-    width = np.unique(found.dimensions["width"])
-    assert len(width) == 10 and width[0] == 0.05 and width[-1] == 0.12
-    assert np.all(found.dimensions["mass"] == 12.0)
 
 
 @pytest.mark.slow

@@ -2,7 +2,6 @@
 
 import math
 
-import numpy as np
 import pytest
 from design_files import STUDY
 
@@ -79,10 +78,3 @@ def test_options_change_the_question(tmp_path):
     assert list(changed.soil.entries) == ["scott1970/apollo12"]
     with pytest.raises(InputError, match="--slope is 2 rad"):
         with_changes(changed, slope=2.0)
-
-
-def test_counted_dimensions_take_whole_steps():
-    six = Dimension((4.0, 8.0), searched=True).at(np.linspace(0.0, 1.0, 7), step=2)
-    assert set(six) == {4.0, 6.0, 8.0}
-    listed = Dimension((0.0, 0.01)).at(np.asarray([0.0, 0.49, 0.5, 1.0]))
-    assert listed.tolist() == [0.0, 0.0, 0.01, 0.01]

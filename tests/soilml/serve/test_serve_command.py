@@ -27,7 +27,7 @@ def test_a_port_in_use_is_one_line(capsys):
 @pytest.mark.parametrize("port", ["-1", "70000"])
 def test_a_port_that_does_not_exist_is_one_line(port, capsys):
     assert main(["serve", "--no-browser", "--port", port]) == 2
-    assert f"--port is {port}; needed is a number from 0 to 65535" in capsys.readouterr().err
+    assert f"{port!r} given; needed is a whole number from 0 to 65535" in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -13,20 +13,6 @@ from soilml.serve.uploads import LARGEST_FILE, LARGEST_SUM, STALLED_AFTER, Uploa
 COUNT = LARGEST_SUM // LARGEST_FILE
 
 
-def test_files_that_are_still_coming_count_with_their_whole_size(tmp_path):
-    uploads = Uploads(tmp_path)
-    coming = [uploads.place("a.csv", LARGEST_FILE) for _ in range(COUNT)]
-    with pytest.raises(InputError, match="1024 MB together"):
-        uploads.place("b.csv", 1)
-    uploads.drop(coming[0])
-    assert not coming[0].path.parent.exists()
-    coming[1].path.write_bytes(b"short")
-    assert uploads.find(uploads.add(coming[1]).key) == coming[1]
-    uploads.place("b.csv", LARGEST_FILE)
-    with pytest.raises(InputError, match="1024 MB together"):
-        uploads.place("c.csv", LARGEST_FILE)  # the short one counts with what it has
-
-
 def test_the_page_takes_no_more_at_a_time_than_in_all(page):
     def answer(opened):
         """What is said to the head of a large file, before its content is sent."""

@@ -133,6 +133,11 @@ def test_currents_and_rotation_are_torques_and_rim_speeds(case, drive):
         ({"rim_speed_m_s": np.zeros(96)}, "all wheels stand still"),
         ({"slope_rad": np.full(96, 12.0)}, "a slope in rad"),
         ({"rim_speed_m_s": np.full(96, np.nan)}, "the cell is blank"),
+        (
+            {"rim_speed_m_s": np.where(np.arange(96) == 5, 1e20, 0.1)},
+            "row 6, .* a speed between -100 and 100",
+        ),
+        ({"load_N": np.where(np.arange(96) == 5, 0.0, 70.0)}, "row 6, .* needed is a load above"),
         ({"torque_Nm": np.full(96, np.nan)}, "has no value"),
         ({"wheel": ["left"] * 96}, "wheels of .rover. are: front-left"),
         ({"time_s": np.arange(96.0)}, "one row for each of the 4 wheels"),

@@ -10,14 +10,11 @@ from soilml import Estimator, Model, Operating, Wheel, read_case, soil, soil_map
 from soilml.cli import main
 from soilml.errors import FitError, InputError, TableError
 from soilml.io.text_tables import csv_text
-from soilml.soil_maps.ability import SLIP_LIMIT, SLIPS, map_ability
 from soilml.soil_maps.drive import read_map_drive
 from soilml.soil_maps.field import FieldSetting, SoilField
-from soilml.soil_maps.local_soils import LocalSoils, observation, soil_values
+from soilml.soil_maps.local_soils import LocalSoils
 from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files, read_elevation
-from soilml.soil_maps.workflow import HEADINGS, parameter_moments
-from soilml.traction.draws import SoilDraws
-from soilml.traction.rover_performance import on_slopes
+from soilml.soil_maps.workflow import HEADINGS
 
 tifffile = pytest.importorskip("tifffile")
 
@@ -158,38 +155,6 @@ def test_stretches_held_out_are_predicted_better_than_by_one_soil(found):
     assert set(found.held_out.mean) == {"map", "tracker", "one soil"}
 
 
-def test_weights_of_all_places_agree_with_draws_of_one(rover, found, monkeypatch):
-    case, soils, slope = read_case(rover), found.soils, np.deg2rad([15.0])
-    some = np.linspace(0, len(found.score) - 1, 8).astype(int)
-    monkeypatch.setattr("soilml.soil_maps.ability.DRAWS", 2000)
-    ability = map_ability(case, soils, found.score[some], found.covariance[some], slope)
-    for at in (0, 7):
-        rng = np.random.default_rng(5)
-        root = np.linalg.cholesky(found.covariance[some[at]])
-        score = found.score[some[at]] + rng.standard_normal((2000, 3)) @ root.T
-        draws = SoilDraws(tuple(c.path for c in soils.free), soil_values(soils.free, score))
-        _, one = on_slopes(case, draws, slope, SLIP_LIMIT * SLIPS)
-        climbs = one["margin"][:, 0] >= 0.0
-        assert ability.climbed[at, 0] == pytest.approx(climbs.mean(), abs=0.05)
-        if climbs.mean() > 0.3:
-            mean = one["slip"][climbs, 0].mean()
-            assert ability.slip[at, 0] == pytest.approx(mean, rel=0.1)
-    assert np.ptp(ability.climbed) > 0.2
-
-
-def test_an_observation_and_the_prior_give_the_posterior_again():
-    rng = np.random.default_rng(0)
-    root = 0.3 * rng.standard_normal((3, 3)) + 0.4 * np.eye(3)
-    covariance, mean = root @ root.T, np.asarray([0.8, -0.4, 0.2])
-    y, error = observation(mean, covariance)
-    again = np.linalg.inv(np.eye(3) + np.linalg.inv(error))
-    assert again == pytest.approx(covariance, rel=1e-6)
-    assert again @ np.linalg.solve(error, y) == pytest.approx(mean, rel=1e-6)
-    # what is as wide as the prior, or wider, is no observation
-    y, error = observation(np.asarray([0.1, 0.0, 0.0]), np.diag([1.0, 1.3, 0.25]))
-    assert y[:2].tolist() == [0.0, 0.0] and np.all(np.diag(error)[:2] > 100.0)
-
-
 @pytest.mark.parametrize("as_read", [False, True])
 def test_the_field_is_the_conditional_normal(monkeypatch, as_read):
     """Beside the joint covariance of places and stretches, written out."""
@@ -234,12 +199,6 @@ def test_a_stretch_of_another_patch_says_less(monkeypatch):
         spread.append((float(mean[0, 0]), float(covariance[0, 0, 0])))
     (near, narrow), (alone, wide) = spread
     assert wide > narrow and 0.0 < alone < near
-
-
-def test_moments_in_units_are_those_of_the_prior_where_nothing_is_known(found):
-    mean, std = parameter_moments(found.soils, np.zeros((1, 3)), np.eye(3)[None])
-    assert mean[0] == pytest.approx([1500.0, 0.610865, 0.0175], rel=1e-3)
-    assert std[0] == pytest.approx([866.0, 0.10077, 0.00722], rel=2e-3)
 
 
 def test_a_geotiff_lies_where_its_cells_are(tmp_path):
@@ -322,10 +281,14 @@ def test_bad_rows_are_refused_in_one_line(rover, estimator, table, error, said):
 
 def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
     case = read_case(rover)
-    with pytest.raises(InputError, match="both must be above zero"):
-        soil_map(case, two_soils(), estimator, cell=0.0)
-    with pytest.raises(InputError, match=r"would have .* cells of 0.001 m"):
-        soil_map(case, two_soils(), estimator, cell=0.001)
+    with pytest.raises(InputError, match=r"would have .* cells of 0.01 m"):
+        soil_map(case, two_soils(), estimator, cell=0.01, reach=1000.0)
+    for size in (0.0, 1e-9, 1e9, np.nan, np.inf):
+        for sizes in ({"cell": size}, {"reach": size}):
+            with pytest.raises(InputError, match=r"needed are 0.01 to 1000 m"):
+                soil_map(case, two_soils(), estimator, **sizes)
+    with pytest.raises(InputError, match="no cell of 100 m has its middle within 2 m"):
+        soil_map(case, two_soils(60), estimator, cell=100.0)
     with pytest.raises(InputError, match="has no set posterior"):
         soil_map(case, two_soils(), Estimator.load("wheel_lssvm"))
     (tmp_path / "dem.tif").write_text("no picture")
@@ -356,16 +319,3 @@ def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     (tmp_path / "drive.csv").write_text(text)
     assert main(words) == 2
     assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_a_drive_of_many_rows_has_few_stretches():
-    """The field takes the cube of their number."""
-    from soilml.soil_maps.drive import MapDrive
-    from soilml.soil_maps.local_soils import MOST_STRETCHES, FollowedRows, _stretches
-
-    n = 20_000
-    x = np.linspace(0.0, 500.0, n)
-    drive = MapDrive({}, np.column_stack([x, x]), x, np.zeros(n, int), np.arange(n), "drive")
-    parts = _stretches(drive, FollowedRows(np.ones(n, bool), np.zeros(n, int), np.ones(n, int), 0))
-    assert MOST_STRETCHES - 5 <= len(parts) <= MOST_STRETCHES + 1
-    assert sum(map(len, parts)) == n

@@ -10,7 +10,7 @@ from soilml import Operating, read_case
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.quantiles import quantile_band
-from soilml.physics.soils.gravity_law import CONSTANT, PROPORTIONAL, GravityChange, GravityLawDraws
+from soilml.physics.soils.gravity_law import GravityChange
 from soilml.traction import SoilDraws, predict_traction
 from soilml.traction.gravity import draws_at_gravity
 from soilml.traction.report import pull_report
@@ -24,27 +24,6 @@ SOIL |= {"cohesion": 500.0, "kc": 990.0, "n": 1.1}
 @pytest.fixture
 def case(model_file):
     return read_case(model_file)
-
-
-def test_the_ends_of_the_open_law_are_the_schools():
-    ends = GravityLawDraws(np.asarray([0.0, 1.0]), np.zeros(2), np.zeros(2))
-    found = GravityChange(EARTH, MOON).parameters(SOIL, ends)
-    for i, law in enumerate(SCHOOLS):
-        change = GravityChange(EARTH, MOON, law)
-        school = change.parameters(SOIL, change.draws(1))
-        for name, value in SOIL.items():
-            scaled = name == "unit_weight" or (name == "kphi" and law == "proportional")
-            assert school[name] == pytest.approx(value * (MOON / EARTH if scaled else 1.0))
-            assert np.broadcast_to(found[name], 2)[i] == np.ravel(school[name])[0]
-    exponent = GravityChange(EARTH, MOON).draws(1000).exponent
-    shares = np.mean(exponent == 0.0), np.mean(exponent == 1.0)
-    assert shares == pytest.approx((CONSTANT, PROPORTIONAL), abs=0.002)
-
-
-def test_under_the_gravity_of_the_tests_nothing_changes(case):
-    change, draws = GravityChange(3.7, 3.7), SoilDraws(("kphi",), np.asarray([[1e6], [2e6]]))
-    assert draws_at_gravity(case, draws, change) is draws
-    assert change.parameters(SOIL, change.draws(1)) == SOIL
 
 
 def test_draws_are_those_of_a_model_with_the_changed_soil(case):

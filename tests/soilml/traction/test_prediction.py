@@ -9,7 +9,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.remarks import texts
 from soilml.traction import SoilDraws, predict_traction, prior_draws, quantile_band
-from soilml.traction.by_load import MeasuredRange, measured_loads, predictions_by_load, slip_grid
+from soilml.traction.by_load import MeasuredRange, predictions_by_load, slip_grid
 
 SLIPS = np.asarray([0.1, 0.3, 0.6])
 EVERYWHERE = MeasuredRange((0.0, 0.99), (1.0, 1e4))
@@ -138,12 +138,6 @@ def test_soils_that_do_not_carry_the_load_are_left_out_and_counted(case):
     assert remarked(one.warnings, "do not carry 60 N")
     assert np.isfinite(quantile_band(one.posterior.pull).lower).all()
     assert np.isnan(one.posterior.steepest_slope[2]) and np.isnan(one.posterior.best_slip[2])
-
-
-def test_almost_equal_loads_count_as_one():
-    found = measured_loads(np.asarray([61.0, 30.0, 59.0, 31.0]))
-    assert found == pytest.approx([30.5, 60.0])
-    assert measured_loads(np.asarray([10.0, 20.0, 40.0, 80.0, 160.0])) == [10.0, 40.0, 160.0]
 
 
 def test_slips_end_at_the_limit():

@@ -68,30 +68,12 @@ def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):
     assert without.std(axis=0) == pytest.approx(0.5, rel=0.07)
 
 
-def test_beyond_its_range_the_error_is_as_at_the_end(case):
-    found = draw_model_errors(case, rows(case), SAME_SOIL, SLIP, [60.0])[0]
-    draw, slip = np.arange(2000), np.full(2000, 0.3)
-    at_end, beyond = (
-        found.at("drawbar_pull", "", draw, slip, np.full(2000, load)) for load in (60.0, 600.0)
-    )
-    np.testing.assert_array_equal(at_end, beyond)
-
-
 def test_a_share_is_of_the_measured_range_or_of_the_predicted_one(case):
     share = replace(case, discrepancy={"drawbar_pull_N": Discrepancy(share=0.02)})
     known = drawn(share, rows(case, error=0.0), [60.0])[0]
     predicted = drawn(share, rows(case), [60.0])[0]
     assert known == pytest.approx(predicted)
     assert known > 0.0
-
-
-def test_none_is_drawn_where_none_is_declared(case):
-    torque_only = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.02)})
-    channels = ("drawbar_pull",)
-    assert (
-        draw_model_errors(torque_only, rows(case), SAME_SOIL, SLIP, [60.0], channels=channels)
-        is None
-    )
 
 
 def test_a_learned_remainder_widens_with_the_distance_from_its_range(case):

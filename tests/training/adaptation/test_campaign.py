@@ -8,7 +8,6 @@ from conftest import MODEL
 
 from datagen.recipe import read_recipe
 from soilml import SlipSinkage, read_case
-from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
@@ -19,8 +18,6 @@ from training.adaptation.campaign import (
     recipe_text,
     split_runs,
     untrainable_effects,
-    with_fitted_soil,
-    with_noise_of_log,
 )
 from training.set_posterior.families.recipe_family import RecipeFamily
 
@@ -70,18 +67,6 @@ def test_ranges_have_a_margin_and_leave_braking_out(case):
         DrivenRange.of(Table(table.columns | {"slip": -table["slip"]}), case)
 
 
-def test_noise_of_the_log_fills_what_is_not_declared(case):
-    bare = replace(case, noise={})
-    assert with_noise_of_log(bare, log(torque_Nm_std=0.07)).noise["torque_Nm"].constant == 0.07
-    declared = with_noise_of_log(case, log(torque_Nm_std=0.07)).noise["torque_Nm"]
-    assert declared == case.noise["torque_Nm"]
-    assert with_noise_of_log(case, log(slip_std=0.01)).noise["slip"].constant == 0.01
-    with pytest.raises(InputError, match="noise of torque_Nm is not known"):
-        with_noise_of_log(bare, log())
-    with pytest.raises(InputError, match="no row has torque_Nm"):
-        with_noise_of_log(case, Table(log().columns | {"torque_Nm": np.full(32, np.nan)}))
-
-
 def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     model = replace(case.model, effects=(SlipSinkage(n1=0.4),))
     prior = {**case.prior, "slip-sinkage.n1": Prior(0.3, 0.5)}
@@ -94,17 +79,6 @@ def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     assert recipe.case.prior == prior and recipe.case.model == model
     family = RecipeFamily.of(recipe, ("cohesion", "friction_angle", "shear_modulus"))
     assert len(family.axes) == 4
-
-
-def test_bias_is_written_where_there_is_some(case, tmp_path):
-    bias = {
-        "torque_Nm": Noise(share=0.02),
-        "slip": Noise(constant=0.0),
-        "load_N": Noise(share=0.01),
-    }
-    path = tmp_path / "recipe.toml"
-    path.write_text(recipe_text(replace(case, bias=bias), DrivenRange.of(log(), case), 500, 1))
-    assert set(read_recipe(path).bias) == {"torque_Nm", "load_N"}
 
 
 def test_unknowns_beyond_what_a_file_has_are_fixed_and_said(case):
@@ -124,8 +98,3 @@ def test_effects_that_need_more_than_slip_and_load_cannot_be_trained(case):
     effects = (SlipSinkage(n1=0.4), EFFECTS["multipass"]())
     own = replace(case, model=replace(case.model, effects=effects))
     assert untrainable_effects(own) == {"multipass": ("pass",)}
-
-
-def test_fitted_values_replace_those_that_the_case_has(case):
-    fitted = with_fitted_soil(case, {"kphi": 2e6, "slip-sinkage.n1": 0.3})
-    assert fitted.soil.kphi == 2e6 and fitted.prior == case.prior

@@ -3,7 +3,7 @@
 import pytest
 
 from soilml.errors import InputError
-from training.adaptation.steps import RECORD, ResumableSteps
+from training.adaptation.steps import ResumableSteps
 
 
 class Work:
@@ -52,17 +52,3 @@ def test_a_step_that_fails_is_not_done(work):
     with pytest.raises(InputError):
         work.run(fail=True)
     assert work.run() == [] and work.calls == 2
-
-
-@pytest.mark.parametrize("text", ["", "[1]", '{"copy": 3}', '{"copy": {"inputs": 1}}', "\x00"])
-def test_a_damaged_record_repeats_every_step(work, text):
-    work.run()
-    (work.folder / RECORD).write_text(text)
-    work.run()
-    assert work.calls == 2
-
-
-def test_a_missing_input_is_named(work):
-    (work.folder / "in.txt").unlink()
-    with pytest.raises(InputError, match="there is no such file"):
-        work.run()

@@ -7,9 +7,8 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL
 
 from soilml import ExitAngle, Noise, SlipSinkage, read_case, simulate
-from soilml.fitting.shared_errors import USUAL_SENSOR_ERRORS
 from soilml.io.table import Table
-from training.adaptation.supported_errors import CHECKED, DRIFT, OPEN, supported_errors
+from training.adaptation.supported_errors import supported_errors
 from training.set_posterior.error_scales import USUAL_SCALES
 
 pytestmark = pytest.mark.slow
@@ -53,47 +52,6 @@ def test_rows_that_it_does_not_predict_support_the_usual_ones(case, effect):
     kept_back = rows_of(case, effect)
     scales = supported_scales(case, kept_back, whole_of(kept_back, case, effect))
     assert scales.probabilities[0] < 0.05
-
-
-def test_those_rows_count_that_leave_larger_errors(case):
-    good = rows_of(case)
-    bad = rows_of(case, SlipSinkage(n1=0.3))
-    scales = supported_scales(case, good, whole_of(bad, case))
-    assert scales.probabilities[0] < 0.05
-    assert supported_scales(case, bad, whole_of(good, case)).probabilities[0] < 0.05
-
-
-def test_rows_that_tell_nothing_leave_about_the_usual_probabilities(case):
-    torque = ("run", "slip", "load_N", "torque_Nm")
-    few = rows_of(case).rows(np.arange(0, 14, 7))
-    few = Table({k: few[k] for k in torque}, "few")
-    scales = supported_scales(case, few, few)
-    assert scales.probabilities[0] < 2.0 * CHECKED.probability
-
-
-def test_a_share_of_the_prior_remains(case):
-    kept_back = rows_of(case)
-    scales = supported_scales(case, kept_back, kept_back)
-    rest = 1.0 - CHECKED.probability
-    least = OPEN * rest * np.asarray(USUAL_SCALES.probabilities)
-    assert (scales.probabilities[1:] >= least * (1.0 - 1e-9)).all()
-
-
-def with_slip_error(table, error):
-    return Table(table.columns | {"slip": table["slip"] - error}, table.source)
-
-
-def test_sensors_that_the_rows_find_right_have_small_errors(case):
-    rows = whole_of(rows_of(case), case)
-    sensors = supported_errors(case, rows, rows).sensors
-    usual = USUAL_SENSOR_ERRORS["slip_bias"]
-    assert DRIFT["slip_bias"] * usual < sensors["slip_bias"] < 0.7 * usual
-
-
-def test_an_error_that_the_rows_show_stays_in_the_file(case):
-    rows = with_slip_error(whole_of(rows_of(case), case), 0.03)
-    sensors = supported_errors(case, rows, rows).sensors
-    assert "slip_bias" not in sensors  # at least the usual error, which is the file's own
 
 
 def test_channels_that_were_not_measured_and_declared_errors_keep_theirs(case):

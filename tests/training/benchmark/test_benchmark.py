@@ -1,7 +1,6 @@
 """The fixed benchmark: sets, Bayes limit, scores of methods, acceptance goals."""
 
 import json
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,16 +16,11 @@ from training.benchmark.acceptance import goals
 from training.benchmark.bayes_limit import UNMODELLED_EFFECTS, benchmark_sets, exact_posterior
 from training.benchmark.bayes_limit_file import load_limit, packaged_limit, save_limit
 from training.benchmark.designs import (
-    design_of,
-    generate_design_sets,
     select_channels,
-    set_hash,
 )
 from training.benchmark.methods import (
     MethodKind,
-    classify_estimator,
     gaussian_estimate,
-    model_file_method,
 )
 from training.benchmark.suite import (
     LIMIT_LABEL,
@@ -37,7 +31,6 @@ from training.benchmark.suite import (
 
 pytestmark = pytest.mark.slow
 
-FEW = 4
 EXPORTED = Path(__file__).parents[3] / "exported"
 
 
@@ -73,29 +66,10 @@ def select(results, method, effect=""):
     return [r for r in results if r.method == method and r.effect == effect]
 
 
-def test_the_recipe_has_the_designs_of_the_benchmark(recipe):
-    designs = [design_of(block) for block in recipe.blocks]
-    assert [d.rows for d in designs] == [1, 3, 6, 8, 16, 3, 6, 8, 16, 18]
-    for sets in generate_design_sets(recipe, SHEAR, FEW):
-        for table in sets.tables:
-            assert len(table) == sets.design.rows
-            assert len(np.unique(table["load_N"])) == sets.design.loads
-    grid = sets.tables[0]  # the last design
-    assert len(np.unique(grid["slip"])) == 6
-    assert len(np.unique(np.stack([grid["slip"], grid["load_N"]]), axis=1).T) == 18
-
-
 def test_no_released_model_was_trained_on_the_benchmark(recipe):
     files = sorted(EXPORTED.glob("*.onnx"))
     seeds = [json.loads(Estimator.load(file).metadata["recipe"]).get("seed") for file in files]
     assert files and recipe.seed not in [*seeds, read_recipe("wheel_test").seed]
-
-
-def test_the_first_sets_do_not_depend_on_their_number(recipe):
-    few, more = generate_design_sets(recipe, SHEAR, 2), generate_design_sets(recipe, SHEAR, 5)
-    for one, other in zip(few, more, strict=True):
-        for a, b in zip(one.tables, other.tables, strict=False):
-            assert set_hash(a, recipe.case) == set_hash(b, recipe.case)
 
 
 def test_the_packaged_limit_is_the_exact_posterior(recipe):
@@ -169,29 +143,12 @@ def test_the_exact_posterior_scores_as_the_limit(results):
         assert exact.joint_coverage90 == pytest.approx(limit.joint_coverage90)
 
 
-def test_an_oracle_beats_the_limit_and_the_prior_does_not(results):
-    for oracle, prior in zip(select(results, "oracle"), select(results, "prior"), strict=True):
-        assert (oracle.rmse_ratio < 1e-4).all()
-        assert prior.log_score == 0.0
-        if prior.design.rows > 3:
-            assert prior.rmse_ratio[2] > 1.0
-
-
 def test_only_an_oracle_has_a_higher_log_score_than_the_limit(results):
     for name in ("prior", "noisy"):
         for other, limit in zip(select(results, name), select(results, LIMIT_LABEL), strict=True):
             assert other.log_score < limit.log_score
     for oracle, limit in zip(select(results, "oracle"), select(results, LIMIT_LABEL), strict=True):
         assert oracle.log_score > limit.log_score > 0.0
-
-
-def test_the_jackknife_agrees_with_the_bootstrap(results):
-    result = select(results, "noisy")[-1]
-    rng = np.random.default_rng(0)
-    own, limit = result.error**2, (result.limit_mean - result.truth) ** 2
-    resampled = rng.integers(0, result.sets, (4000, result.sets))
-    ratios = np.sqrt(own[resampled].sum(axis=1) / limit[resampled].sum(axis=1))
-    np.testing.assert_allclose(result.rmse_ratio_std, ratios.std(axis=0), rtol=0.6)
 
 
 def test_an_unmodelled_effect_raises_rmse_and_flags(results):
@@ -213,48 +170,6 @@ def test_the_exact_posterior_meets_the_goals_and_the_prior_misses_them(results):
     by_criterion = {g.criterion: g for g in goals(prior) if g.method == "mine"}
     assert not by_criterion["every size: RMSE / limit <= 1.05"].met
     assert not next(g for what, g in by_criterion.items() if what.startswith("18 rows")).met
-
-
-def test_a_model_file_is_one_method_whose_kind_is_in_its_metadata(small_model):
-    single = model_file_method("small", Estimator.load(small_model))
-    assert (single.label, single.kind) == ("small", MethodKind.REGRESSION)
-    of_sets = model_file_method("wheel", Estimator.load(EXPORTED / "wheel.onnx"))
-    assert (of_sets.label, of_sets.kind) == ("wheel", MethodKind.SET_POSTERIOR)
-
-
-@pytest.mark.parametrize(
-    ("file", "kind"),
-    [
-        ("wheel", MethodKind.SET_POSTERIOR),
-        ("any_wheel", MethodKind.SET_POSTERIOR),
-        ("kls1_wheel", MethodKind.SET_POSTERIOR),
-        ("wheel_lssvm", MethodKind.REGRESSION),
-        ("wheel_mlp", MethodKind.REGRESSION),
-        ("wheel_linear", MethodKind.LINEAR_REGRESSION),
-    ],
-)
-def test_the_kind_of_a_file_is_read_from_its_metadata(tmp_path, file, kind):
-    for name in (file, "my_mlp", "prior", "linear, pooled"):
-        copied = shutil.copy(EXPORTED / f"{file}.onnx", tmp_path / f"{name}.onnx")
-        assert classify_estimator(Estimator.load(copied)) is kind
-
-
-def test_goals_do_not_depend_on_the_name_of_a_file(tmp_path):
-    names = {"wheel": "my_mlp", "wheel_mlp": "wheel", "wheel_linear": "best_lssvm"}
-    copies = {
-        name: Estimator.load(shutil.copy(EXPORTED / f"{file}.onnx", tmp_path / f"{name}.onnx"))
-        for file, name in names.items()
-    }
-    released = {file: Estimator.load(EXPORTED / f"{file}.onnx") for file in names}
-    found = goals(benchmark(released, max_sets=3, analytic=()))
-    again = goals(benchmark(copies, max_sets=3, analytic=()))
-    assert [replace(g, method=names.get(g.method, g.method)) for g in found] == again
-    assert {g.method for g in found} == {LIMIT_LABEL, "wheel", "wheel_mlp"}
-    criteria = [g.criterion for g in found if g.method == "wheel"]
-    assert len(criteria) == 6 and criteria[0] == "every size: RMSE / limit <= 1.05"
-    assert [g.criterion for g in found if g.method == "wheel_mlp"] == [
-        "1 row: RMSE / limit <= 1.01"
-    ]
 
 
 def test_two_methods_of_one_name_are_refused():

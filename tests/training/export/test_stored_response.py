@@ -7,8 +7,7 @@ import pytest
 
 from soilml.errors import ModelFileError
 from soilml.onboard.estimator import Estimator
-from training.export.stored_response import _scales, write_anew
-from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
+from training.export.stored_response import write_anew
 
 pytestmark = pytest.mark.slow
 
@@ -25,12 +24,6 @@ def test_the_answers_are_the_same(whole_file, tmp_path, size):
     assert after.run(**ROWS).mean == pytest.approx(before.run(**ROWS).mean, rel=1e-3)
     assert after.run(**ROWS).std == pytest.approx(before.run(**ROWS).std, rel=1e-3)
     np.testing.assert_array_equal(after(**ROWS).mean, before(**ROWS).mean)
-
-
-def test_the_errors_of_its_model_stay_those_of_the_file():
-    own = ErrorScales((ErrorScale(1.0, bearing=0.5, channels=0.5, laws=1.0),))
-    assert _scales({"model_error_scales": own.as_list()}) == own
-    assert _scales({}) == USUAL_SCALES
 
 
 def test_a_file_without_sets_is_refused(small_model):

@@ -6,7 +6,7 @@ import pytest
 from compiled_c import ROOT
 
 from training.export_c.c_file import write_c
-from training.export_c.program import GRAIN, Program, SharedParts, plan_memory
+from training.export_c.program import Program, SharedParts, plan_memory
 from training.export_c.tensor import Size, total
 
 
@@ -51,31 +51,6 @@ def test_no_two_live_tensors_overlap():
                     or plan.offsets[b] + size[b] <= plan.offsets[a]
                 )
                 assert apart or not together, (a, b)
-
-
-def test_memory_is_shared():
-    program = program_of(0)
-    plan = plan_memory(program, frozenset())
-    needed = sum(total(shape).most(program.bounds) for _, shape in program.memory.values())
-    assert sum(plan.lengths.values()) < 0.6 * needed
-
-
-def test_tensors_are_packed_close():
-    """Largest first leaves holes; other orders are tried until the array is short."""
-    for seed in range(20):
-        program = program_of(seed)
-        plan, life = plan_memory(program, frozenset()), lives(program, frozenset())
-        for kind, length in plan.lengths.items():
-            own = {
-                name: -(-total(shape).most(program.bounds) // GRAIN) * GRAIN
-                for name, (other, shape) in program.memory.items()
-                if other == kind
-            }
-            most = max(
-                sum(size for name, size in own.items() if life[name][0] <= at <= life[name][1])
-                for at in range(len(program.statements))
-            )
-            assert length <= 1.05 * most
 
 
 @pytest.mark.slow

@@ -59,26 +59,6 @@ def test_a_bad_number_of_rows_changes_nothing(wheel, memory):
     assert bytes(memory) == before
 
 
-def test_a_damaged_memory_is_refused_as_it_is_or_used(wheel, memory):
-    """A memory that was stored, some bytes of which have changed since."""
-    rng, stored, refused = np.random.default_rng(6), bytes(memory), 0
-    rows = wheel.rows(**{k: [v] for k, v in READING.items()})
-    small = type(memory).factor.size  # what is behind the factor
-    for k in range(3000):
-        found = bytearray(stored)
-        for place in rng.integers(small if k % 2 else 0, len(found), rng.integers(1, 5)):
-            found[place] ^= int(rng.integers(1, 256))
-        ctypes.memmove(ctypes.byref(memory), bytes(found), len(found))
-        estimate, given = wheel.new("set_estimate"), bytes(wheel.new("set_estimate"))
-        if wheel.call("set_answer", memory, estimate, wheel.work) < 0:
-            assert bytes(estimate) == given
-        assert bytes(memory) == bytes(found)
-        if wheel.call("set_step", memory, rows, 1, None, wheel.work) < 0:
-            assert bytes(memory) == bytes(found)
-            refused += 1
-    assert 100 < refused < 2900
-
-
 def test_numbers_beyond_float_change_nothing(wheel, memory):
     before = bytes(memory)
     row = wheel.row(**READING, torque_bias=3e38, torque_std=1e-30)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from training.export.one_step import _without_branches
-from training.onnx_graph.builder import SHORTCUT, Graph, session_of
-from training.onnx_graph.value import Value, constant, shortcut, shortcuts, stack_rows
+from training.onnx_graph.builder import Graph, session_of
+from training.onnx_graph.value import Value, constant, shortcut, shortcuts
 
 
 def test_a_constant_and_a_node_are_added_once():
@@ -26,14 +25,6 @@ def test_what_no_output_needs_is_left_out():
     assert [node.op_type for node in model.graph.node] == ["Add"]
     assert unused.name not in {node.output[0] for node in model.graph.node}
     assert len(model.graph.initializer) == 1
-
-
-def test_parts_of_a_matrix_become_that_matrix_again():
-    graph = Graph()
-    matrix = Value(graph, "x")
-    parts = matrix.split(2, axis=0)
-    assert stack_rows(parts).name == "x"
-    assert stack_rows(parts[::-1]).name != "x"
 
 
 @pytest.fixture
@@ -73,19 +64,3 @@ def test_a_shortcut_has_several_values(x, expected):
     assert [node.op_type for node in model.graph.node].count("If") == 1
     found = session_of(model).run(None, {"x": np.asarray([x], np.float32)})
     assert tuple(float(value[0]) for value in found) == expected
-
-
-def test_a_branch_gives_no_value_twice():
-    with pytest.raises(ValueError, match="the same value as two of its outputs"):
-        two_ways(lambda g: [g["x"] * 2.0, g["x"] * 2.0])
-
-
-def test_without_branches_the_general_way_is_left(model):
-    assert model.graph.node[2].doc_string == SHORTCUT
-    nodes, constants, renamed = _without_branches(model.graph.node)
-    assert "If" not in {node.op_type for node in nodes}
-    assert [node.op_type for node in nodes].count("Add") == 1
-    values = {one.name: one for one in constants}
-    (added,) = [node for node in nodes if node.op_type == "Add"]
-    assert np.frombuffer(values[added.input[1]].raw_data, np.float32) == 3.0
-    assert len(renamed) == 2

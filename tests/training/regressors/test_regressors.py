@@ -9,7 +9,7 @@ from training.regressors.exact_solution import KernelEigensystem
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
-from training.regressors.nystrom_features import RidgeEigensystem, select_by_renyi_entropy
+from training.regressors.nystrom_features import RidgeEigensystem
 from training.regressors.rbf_expansion import rbf
 
 ALL = [LSSVM(), FixedSizeLSSVM(), LinearGaussian(), GaussianMLP()]
@@ -138,12 +138,3 @@ def test_training_stops_early_when_held_out_rows_get_worse():
     x, y, _ = curve(40, noise=1.0)
     regressor = GaussianMLP(hidden=(64, 64), epochs=400, patience=5, batch=8).fit(x, y)
     assert len(regressor.history_) < 400
-
-
-def test_selected_rows_spread_more_than_random_ones():
-    x = np.random.default_rng(0).normal(size=(1500, 2))
-    chosen = select_by_renyi_entropy(x, 40, 0.7, seed=0)
-    random = np.random.default_rng(1).permutation(1500)[:40]
-    assert len(np.unique(chosen)) == 40
-    assert rbf(x[chosen], x[chosen], 0.7).sum() < 0.8 * rbf(x[random], x[random], 0.7).sum()
-    assert len(select_by_renyi_entropy(x[:10], 40, 0.7, seed=0)) == 10

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from soilml.processes import limited_workers
 from training.regressors.rbf_expansion import rbf
 from training.regressors.tiled_cholesky import TILE, TiledCholesky
 
@@ -22,19 +21,6 @@ def test_solution_and_diagonal_of_the_inverse_are_those_of_the_whole_matrix(rows
     np.testing.assert_allclose(
         factor.inverse_diagonal(no_progress), np.diag(inverse), rtol=1e-9, atol=1e-11
     )
-
-
-@pytest.mark.slow
-def test_the_number_of_threads_changes_no_bit_and_progress_reaches_its_end():
-    x = np.random.default_rng(1).normal(size=(3 * TILE, 2))
-    found, steps = [], []
-    for threads in (1, 3):
-        with limited_workers(threads):
-            factor = TiledCholesky.of(x, 0.5, 10.0, lambda *done: steps.append(done))
-            found.append((factor.solve(x), factor.inverse_diagonal(no_progress)))
-    for one, three in zip(*found, strict=True):
-        np.testing.assert_array_equal(one, three)
-    assert steps == 2 * [(1, 3), (2, 3), (3, 3)]
 
 
 def test_a_matrix_that_is_not_positive_definite_is_an_error():

@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from training.onnx_graph.builder import FLOAT, Graph, session_of
-from training.onnx_graph.value import Value
-from training.set_posterior.posterior_summary import prior_summary, variance_of_few_points
+from training.set_posterior.posterior_summary import prior_summary
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 
@@ -72,19 +70,3 @@ def test_mean_interval_and_covariance_are_consistent(wheel_posterior):
         assert np.linalg.eigvalsh(covariance / spread).min() > 0.0
         assert (answer["set_low"] < answer["set_mean"]).all()
         assert (answer["set_mean"] < answer["set_high"]).all()
-
-
-def test_the_variance_of_few_points_has_the_error_of_their_mean():
-    graph = Graph()
-    variance_of_few_points(Value(graph, "weights")).named("factor")
-    session = session_of(graph.model({"weights": [1, "points"]}, {"factor": (FLOAT, [1])}))
-
-    def factor(weights):
-        return session.run(None, {"weights": np.asarray([weights], np.float32)})[0][0]
-
-    # variance of n points around their mean, over that of a further value from this mean
-    points = np.random.default_rng(0).standard_normal((200_000, 5))
-    ratio = np.mean((points[:, 4] - points[:, :4].mean(axis=1)) ** 2) / points[:, :4].var(1).mean()
-    assert factor([0.25] * 4) == pytest.approx(ratio, rel=0.02)
-    assert factor([0.4, 0.3, 0.2, 0.1]) > factor([0.25] * 4)
-    assert factor([1.0, 0.0]) == pytest.approx(39.0, rel=1e-4)

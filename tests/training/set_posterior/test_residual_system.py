@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from soilml.onboard.set_contract import COMMON_ERROR_INPUTS, ERROR_COLUMNS, MEMORY_INPUTS
 from training.onnx_graph.builder import Graph, session_of
-from training.onnx_graph.value import Value, constant
-from training.set_posterior.graph import ROW_INPUTS
+from training.onnx_graph.value import Value
 from training.set_posterior.monomials import monomials
-from training.set_posterior.residual_system import add_residual_rows
-from training.set_posterior.sensor_errors import integrate_out_errors, whiten_rows
+from training.set_posterior.sensor_errors import integrate_out_errors
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 
@@ -60,73 +57,6 @@ def test_common_errors_are_integrated_out_of_the_likelihood():
     assert found @ found == pytest.approx((a @ b) @ dense, rel=1e-5)
     steady = np.concatenate([a, 0.0 * g], axis=1).astype(np.float32)
     assert session.run(None, {"system": steady})[0] == pytest.approx(a, abs=1e-6)
-
-
-def test_errors_of_a_row_are_integrated_out_of_its_channels_alone():
-    rng = np.random.default_rng(0)
-    a, g, b = rng.normal(size=(3, 4, 5)), rng.normal(size=(3, 4, 2)), rng.normal(size=5)
-    graph = Graph()
-    whiten_rows(Value(graph, "system"), Value(graph, "errors")).named("out")
-    shapes = {"system": [5, "readings"], "errors": [2, "readings"]}
-    session = session_of(graph.model(shapes, {"out": (1, [5, "readings"])}))
-    feed = {"system": a.reshape(12, 5).T, "errors": g.reshape(12, 2).T}
-    found = session.run(None, {name: value.astype(np.float32) for name, value in feed.items()})[0]
-    found = (b @ found).reshape(3, 4)
-    for row in range(4):
-        covariance = np.eye(3) + g[:, row] @ g[:, row].T
-        own = a[:, row] @ b
-        expected = own @ np.linalg.solve(covariance, own)
-        assert found[:, row] @ found[:, row] == pytest.approx(expected, rel=1e-5)
-
-
-#: Errors, and their sizes: small enough for the residuals to be linear in them.
-ERRORS = {"slip": 0.001, "load": 0.01, "torque": 0.01}
-COLUMN = {"slip": "slip_bias", "load": "load_gain", "torque": "torque_gain"}
-
-
-@pytest.mark.parametrize("name", ERRORS)
-@pytest.mark.parametrize("x", [None, (0.5, -0.6, 0.4)])
-def test_columns_of_common_errors_are_changes_of_the_residuals(wheel_posterior, sets, name, x):
-    response, size = wheel_posterior.response, ERRORS[name]
-    own = sets.rows(int(np.argmax(sets.readings["sinkage_std"][:, 0] < 1.0)))
-    own["torque_bias"] = 0.0 * own["slip"]
-    at_soil = monomials(np.asarray(x or (0.0, 0.0, 0.0)), response.terms)
-    graph, inputs = Graph(), {}
-    for key in wheel_posterior.inputs:
-        if key not in MEMORY_INPUTS:
-            given = Value(graph, key)
-            inputs[key] = given.reshape(1, -1) if key in ROW_INPUTS else given
-    _, rows = add_residual_rows(wheel_posterior.family, response, inputs)
-    basis = None if x is None else constant(graph, at_soil[:, None])
-    rows.compressed(rows.columns_at(basis)).named("out")
-    shapes = {key: wheel_posterior.inputs[key] for key in inputs}
-    session = session_of(graph.model(shapes, {"out": (1, ["m", "columns"])}))
-
-    def residuals(changed, error):
-        """Residuals and columns of errors, on the scales of the channels."""
-        feed = {key: np.zeros(1 if key in COMMON_ERROR_INPUTS else 6) for key in inputs}
-        feed |= own | changed | {COLUMN[name]: np.full(1, error)}
-        noise = [
-            feed["torque_std"] / feed["torque"],
-            feed["sinkage_std"] / feed["sinkage"],
-            feed["drawbar_pull_std"] / feed["load"],
-        ]
-        std = np.hypot(noise, response.error[:, None]).reshape(-1, 1)
-        feed = {key: values.astype(np.float32) for key, values in feed.items()}
-        system = session.run(None, feed)[0].astype(np.float64) * std
-        return system[:, : len(response.terms)] @ at_soil, system[:, len(response.terms) :]
-
-    up, down = (
-        residuals({name: own[name] + e if name == "slip" else own[name] * (1.0 + e)}, 0.0)[0]
-        for e in (size, -size)
-    )
-    columns = residuals({}, 2.0 * size)[1]
-    found = columns[:, ERROR_COLUMNS.index(COLUMN[name])]
-    # the sign of an error with a symmetric prior is arbitrary
-    expected = down - up if name == "torque" else up - down
-    assert found == pytest.approx(expected, rel=0.02, abs=0.02 * np.abs(expected).max())
-    others = np.delete(columns, ERROR_COLUMNS.index(COLUMN[name]), axis=1)
-    assert not others.any()
 
 
 def test_a_row_out_of_range_by_its_noise_is_left_out_and_not_counted(wheel_posterior, session):

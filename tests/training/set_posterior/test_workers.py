@@ -1,15 +1,11 @@
 """Training and comparison on several processes: the numbers are those of one."""
 
-from contextvars import copy_context
-
 import numpy as np
 import pytest
 
 from datagen.recipe import read_recipe
-from soilml.processes import FORKS, limited_workers, prepare_worker, process_map, usable_cores
+from soilml.processes import FORKS, limited_workers
 from soilml.quantities import SHEAR
-from training.benchmark.bayes_limit import benchmark_sets
-from training.benchmark.methods import analytic_method
 from training.set_posterior import response_surface, validation
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.monomials import monomial_terms, monomials
@@ -24,21 +20,6 @@ def of_both(function):
         with limited_workers(workers):
             found.append(function())
     return found
-
-
-def cores_there(_):
-    return usable_cores()
-
-
-def test_a_limit_holds_inside_its_block_and_tasks_start_no_workers():
-    copy_context().run(prepare_worker)  # as a worker thread of this process may have done
-    with limited_workers(3):
-        assert usable_cores() == 3
-        with process_map(cores_there, range(4)) as found:
-            assert list(found) == [1] * 4
-    with limited_workers(1), process_map(cores_there, range(4)) as found:
-        assert list(found) == [1] * 4
-    assert usable_cores() >= 1
 
 
 def test_polynomials_of_designs_are_the_same(monkeypatch):
@@ -79,14 +60,3 @@ def test_limits_and_figures_of_a_set_posterior_are_the_same(wheel_posterior, mon
         assert one.sets == three.sets == 10
         np.testing.assert_array_equal(one.relative, three.relative)
         np.testing.assert_array_equal(one.cover90, three.cover90)
-
-
-@pytest.mark.slow
-def test_analytic_estimates_are_the_same_and_failures_too():
-    recipe = read_recipe("benchmark")
-    tables = [one.table for one in benchmark_sets(recipe, SHEAR, 2)][:10]
-    method = analytic_method(recipe.case, "nonlinear", SHEAR)
-    one, three = of_both(lambda: method.estimate_sets(tables, len(SHEAR)))
-    np.testing.assert_array_equal(one.mean, three.mean)
-    np.testing.assert_array_equal(one.covariance, three.covariance)
-    assert one.seconds > 0.0 and three.seconds > 0.0

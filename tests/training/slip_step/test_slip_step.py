@@ -3,59 +3,36 @@
 import ctypes
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from slip_step_fixtures import SLIP_EXAMPLE, SOILS
 
-from soilml import read_case, read_table
 from soilml.cli import main
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.slip_stream import FLAGS, SlipStream
-from soilml.slip_filter.drive import WIDE, _after, read_drive
+from soilml.slip_filter.drive import WIDE, _after
 from soilml.slip_filter.filter import SlipFilter
 from soilml.slip_filter.force_table import force_table
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "slip"
-SOILS = 256
-
 
 @pytest.fixture(scope="module")
-def case():
-    return read_case(EXAMPLE / "rover.toml")
-
-
-@pytest.fixture(scope="module")
-def drive(case):
-    return read_drive(read_table(EXAMPLE / "drive.csv"), case)
-
-
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """rover.onnx, rover.c and rover.h."""
-    work = tmp_path_factory.mktemp("slip_step")
-    words = ["export-slip", str(EXAMPLE / "rover.toml"), str(work / "rover.onnx")]
-    assert main([*words, "--c", str(work / "rover.c"), "--soils", str(SOILS)]) == 0
-    return work
-
-
-@pytest.fixture(scope="module")
-def stream(folder):
-    return SlipStream.load(folder / "rover.onnx")
-
-
-@pytest.fixture(scope="module")
-def answers(case, drive, stream):
+def answers(slip_case, slip_drive, slip_stream):
     """What Python and the graph say of each row of the drive, and their beliefs after it."""
-    load = case.rover.loads(np.deg2rad(np.linspace(-25.0, 25.0, 21)))
-    table = force_table(case, (float(load.min()), float(load.max())), SOILS)
-    assert stream.load_range == pytest.approx((table.load[0], table.load[-1]))
-    filter_ = SlipFilter(table, case.rover.weight, case.drive)
-    belief, state, found = filter_.start(), stream.start(), []
-    for i in range(len(drive.time)):
-        row = drive.rim_speed[i], drive.torque[i], drive.load[i], float(drive.slope[i])
+    load = slip_case.rover.loads(np.deg2rad(np.linspace(-25.0, 25.0, 21)))
+    table = force_table(slip_case, (float(load.min()), float(load.max())), SOILS)
+    assert slip_stream.load_range == pytest.approx((table.load[0], table.load[-1]))
+    filter_ = SlipFilter(table, slip_case.rover.weight, slip_case.drive)
+    belief, state, found = filter_.start(), slip_stream.start(), []
+    for i in range(len(slip_drive.time)):
+        row = (
+            slip_drive.rim_speed[i],
+            slip_drive.torque[i],
+            slip_drive.load[i],
+            float(slip_drive.slope[i]),
+        )
         one, belief = filter_.step(belief, *row)
-        other, state = stream.step(state, *row)
+        other, state = slip_stream.step(state, *row)
         found.append((one, other, belief, state))
     return found
 
@@ -99,62 +76,68 @@ def test_the_flags_are_those_of_the_batch(answers):
     assert {"no-soil", "not-determined"} <= seen
 
 
-def test_rows_that_are_passed_over_change_nothing(drive, stream):
-    row = {"rim_speed": drive.rim_speed[0], "torque": drive.torque[0], "load": drive.load[0]}
-    first, state = stream.step(stream.start(), **row, slope=0.0)
+def test_rows_that_are_passed_over_change_nothing(slip_drive, slip_stream):
+    row = {
+        "rim_speed": slip_drive.rim_speed[0],
+        "torque": slip_drive.torque[0],
+        "load": slip_drive.load[0],
+    }
+    first, state = slip_stream.step(slip_stream.start(), **row, slope=0.0)
     assert first.answered
-    stand, after = stream.step(state, np.zeros(4), np.zeros(4), row["load"], 0.0)
+    stand, after = slip_stream.step(state, np.zeros(4), np.zeros(4), row["load"], 0.0)
     assert stand.flags == ("standing",) and not stand.answered
     assert np.array_equal(after.grounds, state.grounds)
     turning = row["rim_speed"] * np.asarray([1.0, 1.0, 1.0, -1.0])
-    passed, after = stream.step(state, turning, row["torque"], row["load"], 0.0)
+    passed, after = slip_stream.step(state, turning, row["torque"], row["load"], 0.0)
     assert passed.flags == ("passed-over",) and np.array_equal(after.grounds, state.grounds)
-    faster, _ = stream.step(state, 3.0 * row["rim_speed"], row["torque"], row["load"], 0.0)
+    faster, _ = slip_stream.step(state, 3.0 * row["rim_speed"], row["torque"], row["load"], 0.0)
     assert faster.flags == ("passed-over",)  # 0.2 m/s faster within a second
 
 
-def test_backward_is_forward_seen_from_the_other_side(drive, stream):
-    rim, torque, load = drive.rim_speed[45], drive.torque[45], drive.load[45]
-    ahead, _ = stream.step(stream.start(), rim, torque, load, 0.1)
-    back, _ = stream.step(stream.start(), -rim, -torque, load, -0.1)
+def test_backward_is_forward_seen_from_the_other_side(slip_drive, slip_stream):
+    rim, torque, load = slip_drive.rim_speed[45], slip_drive.torque[45], slip_drive.load[45]
+    ahead, _ = slip_stream.step(slip_stream.start(), rim, torque, load, 0.1)
+    back, _ = slip_stream.step(slip_stream.start(), -rim, -torque, load, -0.1)
     assert back.speed == pytest.approx(-ahead.speed) and np.allclose(back.slips, ahead.slips)
     assert np.allclose(back.speeds, -ahead.speeds[::-1])
 
 
-def test_a_torque_that_is_missing_is_left_out(drive, stream):
-    rim, torque, load = drive.rim_speed[45], drive.torque[45].copy(), drive.load[45]
-    whole, _ = stream.step(stream.start(), rim, torque, load, 0.1)
+def test_a_torque_that_is_missing_is_left_out(slip_drive, slip_stream):
+    rim, torque, load = slip_drive.rim_speed[45], slip_drive.torque[45].copy(), slip_drive.load[45]
+    whole, _ = slip_stream.step(slip_stream.start(), rim, torque, load, 0.1)
     torque[1:] = np.nan
-    one, state = stream.step(stream.start(), rim, torque, load, 0.1)
+    one, state = slip_stream.step(slip_stream.start(), rim, torque, load, 0.1)
     assert one.speed_std > whole.speed_std and np.isfinite(state.grounds).all()
 
 
-def test_loads_are_those_of_the_rover(case, stream):
+def test_loads_are_those_of_the_rover(slip_case, slip_stream):
     for slope, roll in ((0.0, 0.0), (0.2, 0.0), (-0.1, 0.15), (0.25, -0.1)):
-        assert stream.loads(slope, roll) == pytest.approx(case.rover.loads(slope, roll), rel=1e-6)
+        assert slip_stream.loads(slope, roll) == pytest.approx(
+            slip_case.rover.loads(slope, roll), rel=1e-6
+        )
 
 
-def test_wrong_input_is_one_line(stream, drive, tmp_path, capsys):
-    state, rim, load = stream.start(), drive.rim_speed[0], drive.load[0]
+def test_wrong_input_is_one_line(slip_stream, slip_drive, tmp_path, capsys):
+    state, rim, load = slip_stream.start(), slip_drive.rim_speed[0], slip_drive.load[0]
     with pytest.raises(InputError, match="needed are 4 numbers, of front-left"):
-        stream.step(state, rim[:3], rim, load, 0.0)
+        slip_stream.step(state, rim[:3], rim, load, 0.0)
     with pytest.raises(InputError, match="slope is not finite"):
-        stream.step(state, rim, rim, load, np.nan)
-    with pytest.raises(InputError, match="above zero"):
-        stream.step(state, rim, rim, 0.0 * load, 0.0)
-    wheel = EXAMPLE.parents[1] / "exported" / "wheel.onnx"
+        slip_stream.step(state, rim, rim, load, np.nan)
+    with pytest.raises(InputError, match="load is 0; possible is 1e-06 to"):
+        slip_stream.step(state, rim, rim, 0.0 * load, 0.0)
+    wheel = SLIP_EXAMPLE.parents[1] / "exported" / "wheel.onnx"
     with pytest.raises(ModelFileError, match="no file of soilml export-slip"):
         SlipStream.load(wheel)
-    with pytest.raises(ModelFileError, match="cannot be read"):
+    with pytest.raises(ModelFileError, match="there is no such file"):
         SlipStream.load(tmp_path / "none.onnx")
-    model = EXAMPLE.parent / "wheel" / "model.toml"
+    model = SLIP_EXAMPLE.parent / "wheel" / "model.toml"
     assert main(["export-slip", str(model), str(tmp_path / "a.onnx")]) == 2
     assert "no [rover]" in capsys.readouterr().err and not (tmp_path / "a.onnx").exists()
 
 
-def test_on_board_it_needs_numpy_and_onnxruntime_alone(folder):
+def test_on_board_it_needs_numpy_and_onnxruntime_alone(slip_files):
     code = "import sys; from soilml.onboard.slip_stream import SlipStream as S; "
-    code += f"s = S.load({str(folder / 'rover.onnx')!r}); s.start(); "
+    code += f"s = S.load({str(slip_files / 'rover.onnx')!r}); s.start(); "
     code += "print(*{m.split('.')[0] for m in sys.modules})"
     words = [sys.executable, "-c", code]
     loaded = set(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split())
@@ -187,29 +170,33 @@ class Answer(ctypes.Structure):
 
 
 @pytest.mark.slow
-def test_c_computes_the_numbers_of_the_graph(folder, drive, stream):
+def test_c_computes_the_numbers_of_the_graph(slip_files, slip_drive, slip_stream):
     strict = "-std=c99 -Wall -Wextra -Wconversion -pedantic -Wfloat-equal -Werror"
     words = ["gcc", *strict.split(), "-O2", "-shared", "-fPIC", "rover.c", "-lm", "-o", "rover.so"]
-    subprocess.run(words, cwd=folder, check=True)
-    library = ctypes.CDLL(str(folder / "rover.so"))
+    subprocess.run(words, cwd=slip_files, check=True)
+    library = ctypes.CDLL(str(slip_files / "rover.so"))
     sizes = dict(
         line.split()[1:]
-        for line in (folder / "rover.h").read_text().splitlines()
+        for line in (slip_files / "rover.h").read_text().splitlines()
         if "_BYTES" in line
     )
     c_state = ctypes.create_string_buffer(int(sizes["ROVER_STATE_BYTES"]))
     work = ctypes.create_string_buffer(int(sizes["ROVER_WORK_BYTES"]) + 64)
     library.rover_start(c_state)
-    state = stream.start()
+    state = slip_stream.start()
     begun = np.frombuffer(c_state, np.float32)
     assert np.array_equal(begun[: state.grounds.size].reshape(state.grounds.shape), state.grounds)
-    for i in range(len(drive.time)):
-        other, state = stream.step(
-            state, drive.rim_speed[i], drive.torque[i], drive.load[i], float(drive.slope[i])
+    for i in range(len(slip_drive.time)):
+        other, state = slip_stream.step(
+            state,
+            slip_drive.rim_speed[i],
+            slip_drive.torque[i],
+            slip_drive.load[i],
+            float(slip_drive.slope[i]),
         )
-        row, answer = Row(slope=drive.slope[i], elapsed=1.0), Answer()
-        row.rim_speed[:], row.torque[:] = drive.rim_speed[i], drive.torque[i]
-        row.load[:] = drive.load[i]
+        row, answer = Row(slope=slip_drive.slope[i], elapsed=1.0), Answer()
+        row.rim_speed[:], row.torque[:] = slip_drive.rim_speed[i], slip_drive.torque[i]
+        row.load[:] = slip_drive.load[i]
         code = library.rover_step(c_state, ctypes.byref(row), ctypes.byref(answer), work)
         assert code == (0 if other.answered else 1)
         assert answer.flags == sum(1 << FLAGS.index(name) for name in other.flags)
@@ -221,3 +208,12 @@ def test_c_computes_the_numbers_of_the_graph(folder, drive, stream):
     before = bytes(c_state)
     assert library.rover_step(c_state, ctypes.byref(row), ctypes.byref(answer), work) == -1
     assert bytes(c_state) == before
+    library.rover_identity.restype = library.rover_message.restype = ctypes.c_char_p
+    told = library.rover_identity().decode()
+    assert all(
+        slip_stream.metadata[name] in told
+        for name in ("graph_sha256", "metadata_sha256", "case_sha256")
+    )
+    texts = {library.rover_message(code) for code in (0, 1, -1, -2, -3)}
+    assert len(texts) == 5 and library.rover_message(7) == b"unknown code"
+    assert int(sizes["ROVER_WORK_BYTES"]) < 300_000  # of 512 grounds; once 570 kB

@@ -1,6 +1,8 @@
 """Rows of a drive, one by one: glitches, another soil, stuck sensors, drift, a stored state."""
 
 import sys
+import tracemalloc
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,10 +17,22 @@ from driven_days import SLIP_STD, Kind, simulate_day
 
 from soilml import Estimator, SoilTracker
 from soilml.errors import InputError
-from soilml.onboard.tracking import Event, soil_tracker
-from soilml.onboard.tracking.filter_state import FilterState
+from soilml.onboard.tracking import Event, read_state, soil_tracker, write_state
+from soilml.onboard.tracking.filter_state import CHECKSUM, FilterState, checksum_of
 from soilml.onboard.tracking.misfit import CHANGE_QUANTILE, MOST_VARIANCE, chi_squared_limit
 from soilml.onboard.tracking.row_window import RowWindow
+
+
+class Lost:
+    """An array that cannot be had."""
+
+    def __array__(self, *_, **__):
+        raise OSError("lost")
+
+
+def sealed(arrays):
+    """The arrays with the checksum of what they have now."""
+    return arrays | {CHECKSUM: np.asarray(checksum_of(arrays))}
 
 
 @pytest.fixture(scope="module")
@@ -135,6 +149,36 @@ def test_a_stuck_slip_is_told_where_slip_has_noise(estimator, wheel_posterior):
     assert Event.STUCK not in {exact.read(**row | {"slip": slip}).event for row in rows[:9]}
 
 
+@pytest.mark.parametrize("glitches", [0, 2])
+def test_a_constant_load_with_declared_noise_is_not_stuck(estimator, wheel_posterior, glitches):
+    """Two rows were used, and none after them."""
+    noisy = estimator.on(noise={"slip": (0.02, 0.0), "load": (0.5, 0.01)})
+    tracker, rows = SoilTracker(noisy), rows_of(wheel_posterior, 40)
+    ratio = [60.0 / row["load"] for row in rows]  # a wheel of another load has such a torque
+    rows = [
+        row | {"load": 60.0, "torque": row["torque"] * r}
+        for row, r in zip(rows, ratio, strict=True)
+    ]
+    for i in range(glitches):
+        rows[10 + i]["load"] = 200.0 + i
+    states = driven(tracker, rows)
+    events = [state.event for state in states]
+    assert Event.STUCK not in events
+    assert states[-1].rows_remembered >= 38 - glitches
+    again = SoilTracker.restore(noisy, tracker.save())
+    assert again.read(**rows[0] | {"slip": 0.3}).event is not Event.STUCK
+
+
+def test_a_load_that_a_sensor_reads_is_stuck_when_it_repeats(estimator, wheel_posterior):
+    noisy = estimator.on(noise={"load": (0.5, 0.01)})
+    tracker, rows = SoilTracker(noisy), rows_of(wheel_posterior, 30)
+    driven(tracker, rows[:20])
+    tracker = SoilTracker.restore(noisy, tracker.save())
+    stuck = [tracker.read(**row | {"load": rows[19]["load"]}) for row in rows[20:30]]
+    assert {state.event for state in stuck[1:]} == {Event.STUCK}
+    assert "load repeats" in stuck[-1].words
+
+
 def test_noise_above_that_stated_widens_the_estimate_up_to_a_limit(estimator, wheel_posterior):
     rng, rows = np.random.default_rng(0), rows_of(wheel_posterior, 60)
     widths = {}
@@ -234,8 +278,10 @@ def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator)
     for name in arrays:
         with pytest.raises(InputError, match="this state of a tracker is damaged"):
             SoilTracker.restore(estimator, {k: v for k, v in arrays.items() if k != name})
-    with pytest.raises(InputError, match="its system has shape"):
+    with pytest.raises(InputError, match="its checksum does not match"):
         SoilTracker.restore(estimator, arrays | {"system": arrays["system"][:-1]})
+    with pytest.raises(InputError, match="its system has shape"):
+        SoilTracker.restore(estimator, sealed(arrays | {"system": arrays["system"][:-1]}))
     for name, value in (
         ("format", np.inf),
         ("repeated", np.ma.array([1], mask=[1])),
@@ -244,12 +290,55 @@ def test_a_state_of_another_file_or_a_damaged_one_is_refused(settled, estimator)
         ("added", np.zeros(99)),
         ("counts", np.full(arrays["counts"].shape, -np.inf)),
     ):
-        with pytest.raises(InputError, match="this state of a tracker is damaged"):
-            SoilTracker.restore(estimator, arrays | {name: value})
+        for bad in (arrays | {name: value}, sealed(arrays | {name: value})):
+            with pytest.raises(InputError, match="this state of a tracker is damaged"):
+                SoilTracker.restore(estimator, bad)
     with pytest.raises(InputError, match="has format 0"):
         SoilTracker.restore(estimator, arrays | {"format": np.asarray(0)})
     with pytest.raises(InputError, match="give the length that it was made with"):
         SoilTracker.restore(estimator, arrays, length=1000)
+
+
+def test_a_state_in_which_a_bit_has_flipped_is_refused(settled, estimator):
+    arrays, rng = settled.save(), np.random.default_rng(0)
+    names = [name for name in arrays if arrays[name].size and arrays[name].dtype.kind in "iufb"]
+    for k in range(200):
+        own = arrays[names[k % len(names)]]
+        found = bytearray(own.tobytes())
+        found[rng.integers(len(found))] ^= 1 << int(rng.integers(8))
+        bad = np.frombuffer(bytes(found), own.dtype).reshape(own.shape)
+        with pytest.raises(InputError, match="this state of a tracker"):
+            SoilTracker.restore(estimator, arrays | {names[k % len(names)]: bad})
+    restored = SoilTracker.restore(estimator, arrays).state
+    assert restored.rows_remembered == settled.state.rows_remembered
+
+
+def test_a_state_file_is_written_whole_and_bounded_before_it_is_read(settled, estimator, tmp_path):
+    """A small file whose content is large once took its memory before it was refused."""
+    path = tmp_path / "state.npz"
+    write_state(path, settled.save())
+    assert [file.name for file in tmp_path.iterdir()] == ["state.npz"]
+    before = path.read_bytes()
+    with pytest.raises(OSError, match="lost"):
+        write_state(path, settled.save() | {"system": Lost()})
+    assert path.read_bytes() == before
+    assert SoilTracker.restore(estimator, read_state(path)).state.rows_remembered == 40
+    with zipfile.ZipFile(tmp_path / "large.npz", "w", zipfile.ZIP_DEFLATED, compresslevel=1) as out:
+        out.writestr("system.npy", bytes(64 << 20))
+    tracemalloc.start()
+    with pytest.raises(InputError, match="holds 64 MB; a state of a tracker has at most 8 MB"):
+        read_state(tmp_path / "large.npz")
+    assert tracemalloc.get_traced_memory()[1] < 8 << 20
+    tracemalloc.stop()
+    (tmp_path / "long.npz").write_bytes(bytes(9 << 20))
+    for name, text in (
+        ("long.npz", "holds 9 MB"),
+        ("none.npz", "cannot be read: No such file"),
+        ("bad.npz", "is damaged, or no state of a tracker"),
+    ):
+        (tmp_path / "bad.npz").write_bytes(before[: len(before) // 2])
+        with pytest.raises(InputError, match=text):
+            read_state(tmp_path / name)
 
 
 def test_restart_forgets_the_soil(settled):

@@ -11,7 +11,6 @@ from reference import equilibrium, forces, travel_ratio
 from soilml import EFFECTS, ExitAngle, LinearWheel, Model, Operating, Status, Wheel, soil
 from soilml.errors import InputError
 from soilml.numerics.root_finding import rising_root
-from soilml.physics.gears.rigid_wheel import displacement_direction, displacement_slip
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
@@ -148,16 +147,6 @@ def test_the_printed_law_has_the_driving_formula_and_the_sign_of_the_slip(gear):
     np.testing.assert_allclose(contact.shear_displacement, expected, rtol=1e-9, atol=1e-15)
     assert contact.shear_direction.tolist() == [-1.0, -1.0, 1.0]
     assert contact.travel_ratio.tolist() == (1.0 - at.slip).tolist()
-
-
-def test_the_displacement_of_a_braking_wheel_has_its_own_travel_ratio():
-    slip = np.asarray([-0.8, -0.5, -1e-12, 0.0, 0.3])
-    found = displacement_slip(slip, "displacement-sign")
-    np.testing.assert_allclose(1.0 - found, [travel_ratio(s) for s in slip], rtol=1e-15)
-    assert displacement_slip(slip, "slip-sign") is slip
-    moved = np.asarray([[1e-3], [-1e-3]]) * np.ones(5)
-    direction = displacement_direction(moved, slip, "displacement-sign")
-    assert direction.tolist() == [[1] * 5, [-1, -1, -1, 1, 1]]  # what drives is not turned round
 
 
 RESTS = [  # radius, width, c, phi, K, kphi, n, slip, load

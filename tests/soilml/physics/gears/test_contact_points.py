@@ -6,10 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import LinearWheel, Midstance, Operating, Track, Wheel, soil
-from soilml.physics.contact import Contact, stress
-from soilml.physics.effects.track_grousers import TrackGrousers
-from soilml.physics.load_case import LoadCase
+from soilml import LinearWheel, Midstance, Operating, Track, soil
 
 SAND = soil("wong1989/dry_sand", kc=2e4, n=1.1)
 FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
@@ -18,38 +15,6 @@ TRACK = Track(radius=0.1, width=0.08, base=0.6)
 
 def at_rest(load, n=SAND.n):
     return replace(SAND, n=n), Operating(slip=np.zeros(1), load=np.asarray([load]))
-
-
-@pytest.mark.parametrize("n", [0.5, 1.1, 2.8])
-@pytest.mark.parametrize("gear", [Wheel, LinearWheel])
-def test_a_wheel_is_first_guessed_where_its_normal_stress_alone_carries_it(gear, n):
-    ground, at = at_rest(60.0, n)
-    k = SAND.kc + 0.12 * SAND.kphi
-    expected = (3.0 * 60.0 / (max(3.0 - n, 0.5) * k * math.sqrt(0.3))) ** (2.0 / (2.0 * n + 1.0))
-    wheel = gear(radius=0.15, width=0.12)
-    assert wheel.initial_sinkage(ground, at) == pytest.approx(expected, rel=1e-12)
-    assert wheel.largest_sinkage() == 0.15
-
-
-@pytest.mark.parametrize(("load", "n"), [(20.0, 1.1), (9000.0, 1.1), (600.0, 0.4), (600.0, 2.9)])
-def test_a_track_is_first_guessed_flat_or_on_its_front_wheel(load, n):
-    ground, at = at_rest(load, n)
-    k = SAND.kc + 0.08 * SAND.kphi
-    flat = (load / (k * 0.6)) ** (1.0 / n)
-    front = (1.5 * load / (max(3.0 - n, 0.5) * k * math.sqrt(0.2))) ** (2.0 / (2.0 * n + 1.0))
-    found = float(TRACK.initial_sinkage(ground, at)[0])
-    assert found == pytest.approx(min(flat, front), rel=1e-12)
-    assert TRACK.largest_sinkage() * (1.0 + 0.2) == pytest.approx(0.1, rel=1e-15)
-
-
-def test_a_foot_is_first_guessed_as_a_plate_down_to_half_its_radius():
-    ground, at = at_rest(3.0)
-    area = FOOT.radius * FOOT.arc * 0.029
-    assert area == pytest.approx(FOOT.area, rel=1e-12)
-    plate = (3.0 / area / (SAND.kc / 0.029 + SAND.kphi)) ** (1.0 / SAND.n)
-    assert FOOT.initial_sinkage(ground, at) == pytest.approx(plate, rel=1e-12)
-    assert FOOT.initial_sinkage(*at_rest(1e6)) == pytest.approx(0.5 * FOOT.radius, rel=1e-12)
-    assert FOOT.largest_sinkage() == FOOT.radius
 
 
 @pytest.mark.parametrize("number", [float, np.asarray])
@@ -125,19 +90,3 @@ def test_a_profile_of_straight_lines_has_their_two_ends():
     angle, contact = wheel.profile_contact(rim, at, 101)
     np.testing.assert_array_equal(angle, [[0.0], rim.peak])
     assert contact.depth[1] == pytest.approx(0.15 * (np.cos(rim.peak) - np.cos(rim.entry)))
-
-
-@pytest.mark.parametrize("slip", [-0.3, 0.3])
-def test_soil_between_grousers_is_compressed_and_then_rubs(slip):
-    modulus, height, width = 0.01, 0.02, 0.08
-    ground = replace(SAND, cohesion=2000.0, shear_modulus=modulus)
-    j = np.asarray([0.0, 0.25, 1.0, 4.0]) * 3.0 * modulus
-    one = np.ones_like(j)
-    at = Operating(slip=np.asarray(slip), load=600.0)
-    sign = math.copysign(1.0, slip)
-    bare = stress(Contact(0.01 * one, sign * j, j, one, one, 0.0 * one, one, width), ground, at)
-    effect = TrackGrousers(spacing=0.6, height=height, yielding=3.0, power=0.5)
-    found = effect.on_stress(bare, LoadCase(TRACK, ground, at)).shear
-    block = 2000.0 * (1.0 + 2.0 * height / width) + bare.normal * np.tan(ground.friction_angle)
-    between = sign * block * np.sqrt([0.0, 0.25, 1.0, 1.0])
-    np.testing.assert_allclose(found, 0.4 * bare.shear + 0.6 * between, rtol=1e-9, atol=1e-9)

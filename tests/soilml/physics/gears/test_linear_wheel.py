@@ -11,7 +11,6 @@ from scipy.integrate import quad
 from soilml import LinearWheel, Model, Operating, Soil, Wheel
 from soilml.physics.forces import load_at_sinkage, stress_profile
 from soilml.physics.load_case import LoadCase
-from soilml.physics.model import flattened
 from soilml.row_status import Status
 
 SOIL = Soil(
@@ -104,22 +103,6 @@ def test_is_near_the_full_integrals_where_the_stresses_are_near_straight():
     closed = Model(LinearWheel(radius=R, width=B))(SOIL, at)
     assert np.abs(closed.torque / full.torque - 1.0).max() < 0.15
     assert np.abs(closed.torque / full.torque - 1.0).max() > 1e-3  # it is another model
-
-
-def test_a_load_just_below_a_peak_under_the_hub_is_carried():
-    """With n small and the maximum stress far forward the load falls again towards the hub."""
-    gear = LinearWheel(radius=0.1, width=0.1)
-    soil = Soil(cohesion=0.0, friction_angle=0.1, shear_modulus=0.02, kc=0.0, kphi=5e4,
-                n=0.15, a0=0.95, a1=0.0)  # fmt: skip
-    at = Operating(slip=0.2, load=1.0)
-    case, _ = flattened(LoadCase(gear, soil, at))
-    sinkage = np.linspace(0.002, 0.1, 300)
-    load = np.array([float(load_at_sinkage(case, np.array([z]))[0]) for z in sinkage])
-    assert load.max() > 1.005 * load[-1]
-    loads = load[-1] + np.array([0.05, 0.3, 0.6, 0.95, 1.1]) * (load.max() - load[-1])
-    force = Model(gear)(soil, Operating(slip=0.2, load=loads))
-    assert force.status.tolist() == [0, 0, 0, 0, Status.TOO_HEAVY]
-    assert np.all(force.sinkage[:4] < sinkage[np.argmax(load)])
 
 
 @pytest.mark.parametrize("braking", ["displacement-sign", "slip-sign"])

@@ -8,8 +8,7 @@ import pytest
 from conftest import input_box, solved
 from reference import equilibrium, forces, load_carried, stresses, turning_points
 
-from soilml import ExitAngle, LinearWheel, Model, Operating, Soil, Status, Wheel, soil
-from soilml.physics.gears.rigid_wheel import displacement_slip, reversals
+from soilml import ExitAngle, Model, Operating, Soil, Status, Wheel, soil
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
@@ -175,21 +174,6 @@ def test_shear_that_turns_behind_the_axle_agrees_with_adaptive_quadrature(case):
     assert abs(force.drawbar_pull - pull) < 1e-7 * load
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_all_angles_at_which_displacement_vanishes_are_found(law):
-    rng = np.random.default_rng(0)
-    slip = -np.exp(rng.uniform(np.log(1e-3), np.log(0.95), 400))
-    turning = np.arccos(1.0 / (1.0 - displacement_slip(slip, law)))
-    entry = np.minimum(turning * rng.uniform(0.3, 2.2, 400), np.pi / 2)
-    leave = -entry * rng.random(400)
-    angle, there = reversals(entry, leave, displacement_slip(slip, law))
-    assert there.sum(axis=0).max() == 2
-    for i in range(400):
-        points = turning_points(entry[i], leave[i], slip[i], law)
-        expected = [t for t in points if entry[i] - t > 1e-6]
-        np.testing.assert_allclose(np.sort(angle[there[:, i], i]), expected, atol=1e-9)
-
-
 def test_a_place_of_maximum_stress_outside_the_contact_is_a_reason():
     bad = Soil(cohesion=0.0, friction_angle=0.5, shear_modulus=0.01, kc=0.0, kphi=1e6, n=1.0)
     force = WHEEL(bad, Operating(slip=np.asarray([0.2, 0.9]), load=60.0))
@@ -213,49 +197,6 @@ def test_profile_of_stresses_follows_the_equations():
         sigma, tau = stresses(angle, profile.angle[0], 0.0, row)
         assert normal == pytest.approx(sigma, rel=1e-9, abs=1e-6)
         assert shear == pytest.approx(tau, rel=1e-9, abs=1e-6)
-
-
-def test_softer_soil_sinks_more_and_heavier_wheels_too():
-    loads = np.linspace(20.0, 150.0, 8)
-    depth = WHEEL(SAND, Operating(slip=0.2, load=loads)).sinkage
-    assert (np.diff(depth) > 0).all()
-    from dataclasses import replace
-
-    soft = WHEEL(replace(SAND, kphi=0.5 * SAND.kphi), Operating(slip=0.2, load=loads)).sinkage
-    assert (soft > depth).all()
-
-
-def test_stronger_soil_pulls_more_and_slip_mobilises_it():
-    from dataclasses import replace
-
-    slips = np.linspace(0.0, 0.9, 12)
-    force = WHEEL(SAND, Operating(slip=slips, load=60.0))
-    assert (np.diff(force.torque) > 0).all()
-    for change in ({"cohesion": 3000.0}, {"friction_angle": 0.7}, {"shear_modulus": 0.005}):
-        stronger = WHEEL(replace(SAND, **change), Operating(slip=slips[1:], load=60.0))
-        assert (stronger.drawbar_pull > force.drawbar_pull[1:]).all()
-
-
-def test_a_braking_wheel_is_pulled_back():
-    force = WHEEL(SAND, Operating(slip=np.asarray([-0.6, -0.3]), load=60.0))
-    assert (force.torque < 0).all()
-    assert (force.drawbar_pull < 0).all()
-
-
-@pytest.mark.parametrize("gear", [Wheel, LinearWheel])
-def test_any_shape_broadcasts_and_chunks_do_not_matter(gear, monkeypatch):
-    model = Model(gear(radius=0.15, width=np.asarray([[0.08], [0.12]])))
-    slip = np.linspace(-0.4, 0.6, 7)
-    at = Operating(slip=slip, load=60.0)
-    together = model(SAND, at)
-    assert together.torque.shape == (2, 7)
-    for j in range(7):
-        alone = model(SAND, Operating(slip=slip[j], load=60.0))
-        assert alone.torque.shape == (2, 1)
-        np.testing.assert_allclose(alone.torque[:, 0], together.torque[:, j], rtol=1e-12)
-    monkeypatch.setattr("soilml.physics.model.CHUNK", 3)
-    np.testing.assert_allclose(model(SAND, at).torque, together.torque, rtol=1e-12)
-    assert model(SAND, Operating(slip=np.zeros(0), load=60.0)).torque.shape[-1] == 0
 
 
 def test_bearing_comes_from_both_moduli_over_the_width_of_the_wheel():

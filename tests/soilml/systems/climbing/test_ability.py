@@ -16,7 +16,6 @@ from soilml.systems.climbing import (
     quantile_band,
 )
 from soilml.systems.climbing.climb import WheelRun
-from soilml.systems.climbing.simulated_rover import StressArc
 from soilml.systems.force_sensor_wheel import StressProfile
 
 pytestmark = pytest.mark.slow
@@ -118,14 +117,6 @@ def test_a_larger_speed_error_widens_the_interval(true):
     poor = replace(true.noise, speed_scale=0.02)
     wide = identify_ground(true.rover, climbs, fixed=SAND, noise=poor)
     assert wide.fit.std[0] > 1.5 * narrow.fit.std[0]
-
-
-def test_arcs_further_forward_climb_less():
-    back, ahead = (
-        SimulatedRover(arcs=(StressArc(entry=entry), StressArc(entry=entry))).steepest
-        for entry in (0.31, 0.36)
-    )
-    assert ahead < back
 
 
 def test_a_profile_keeps_its_shape_whatever_its_height():

@@ -20,7 +20,6 @@ from soilml.systems.force_sensor_wheel import (
     parabolic_arc,
     solve_force_balance,
 )
-from soilml.systems.force_sensor_wheel.force_balance import excess_pull
 
 SENSORS = SensingWheel(noise=0.0)
 PHI, TRUE, WEIGHT = math.radians(38.0), 0.0072, 28.92
@@ -68,19 +67,6 @@ def test_forces_are_those_of_dense_quadrature(cohesion, slip, modulus):
     assert (found.load, found.drawbar_pull, found.torque) == pytest.approx(expected, rel=rel)
 
 
-def test_a_batch_is_its_rows():
-    profile = parabolic_arc(0.2, 0.6, 2e4)
-    modulus, slip = np.geomspace(1e-3, 0.1, 4)[:, None], np.asarray([0.1, 0.5, -0.1])
-    found = forces_from_profile(
-        profile, shear_modulus=modulus, friction_angle=PHI, slip=slip, **RIM
-    )
-    assert found.load.shape == (4, 3)
-    one = forces_from_profile(
-        profile, shear_modulus=modulus[2, 0], friction_angle=PHI, slip=slip[2], **RIM
-    )
-    assert found.drawbar_pull[2, 2] == pytest.approx(float(one.drawbar_pull), rel=1e-12)
-
-
 def test_the_stress_of_the_model_gives_the_forces_of_the_model():
     model = Model(Wheel(**RIM)) + ExitAngle(kappa=0.1) + StressShift(shift=0.3)
     sand, at = soil("nagatani2009/toyoura_sand"), Operating(slip=0.3, load=20.0)
@@ -109,12 +95,6 @@ def test_modulus_and_magnification_are_recovered(slip, slope):
     found = solve_force_balance(StressProfile(arc.angle, arc.normal / 1.7), at, SENSORS, STRENGTH)
     assert found.shear_modulus == pytest.approx(TRUE, rel=1e-6)
     assert found.magnification == pytest.approx(1.7, rel=1e-6)
-
-
-def test_a_larger_shear_modulus_reduces_the_pull():
-    profile, modulus = parabolic_arc(0.2, 0.5, 2e4), np.geomspace(1e-4, 1.0, 30)
-    found = forces_from_profile(profile, shear_modulus=modulus, friction_angle=PHI, slip=0.2, **RIM)
-    assert (np.diff(found.drawbar_pull / found.load) < 0).all()
 
 
 def test_the_arc_implied_by_table_i_moves_forward_with_slip():
@@ -157,27 +137,6 @@ def test_a_missing_solution_names_its_side():
             SteadyRun(slip=0.2, weight=0.001),
             SENSORS,
             MohrCoulomb(friction_angle=PHI, cohesion=9e5),
-        )
-
-
-@pytest.mark.slow
-def test_there_is_at_most_one_solution():
-    rng, modulus = np.random.default_rng(0), np.geomspace(1e-5, 10.0, 64)
-    for _ in range(150):
-        arc = parabolic_arc(rng.uniform(-0.1, 0.7), rng.uniform(0.3, 1.3), 2e4, rng.uniform(-1, 1))
-        at = SteadyRun(slip=rng.uniform(-0.6, 0.9), weight=WEIGHT, slope=rng.uniform(-0.8, 0.5))
-        strength = MohrCoulomb(friction_angle=PHI, cohesion=rng.choice([0.0, 500.0]))
-        left, _ = excess_pull(arc, at, SENSORS, strength, modulus)
-        above = left[np.isfinite(left)] > 0
-        assert np.count_nonzero(above[1:] != above[:-1]) <= 1
-
-
-def test_several_solutions_are_reported(monkeypatch):
-    waves = lambda *given: (np.sin(np.log(given[-1])), np.ones_like(given[-1]))  # noqa: E731
-    monkeypatch.setattr("soilml.systems.force_sensor_wheel.force_balance.excess_pull", waves)
-    with pytest.raises(FitError, match="shear moduli satisfy both balances"):
-        solve_force_balance(
-            parabolic_arc(0.2, 0.5, 2e4), SteadyRun(slip=0.2, weight=WEIGHT), SENSORS, STRENGTH
         )
 
 

@@ -25,7 +25,6 @@ from soilml.systems.force_sensor_wheel import (
     simulate_readings,
     solve_force_balance,
 )
-from soilml.systems.force_sensor_wheel.shear_modulus import jackknife_covariance, student_t_quantile
 
 NOISY = SensingWheel()
 QUIET = replace(NOISY, noise=0.0)
@@ -55,13 +54,6 @@ def test_deadband_and_saturation_limit_the_readings():
         StressProfile(arc().angle, 10.0 * arc().normal), NOISY, turns=2
     ).force
     assert strong.max() == 4.4
-
-
-def test_a_crowned_stress_keeps_the_mean_over_the_width():
-    many = replace(QUIET, sensors=40, deadband=0.0)
-    even, crowned = (simulate_readings(arc(), many, turns=1, crown=c).force for c in (0.0, 0.4))
-    assert crowned.mean() == pytest.approx(even.mean(), rel=1e-3)
-    assert crowned[..., 20].max() > 1.3 * crowned[..., 0].max()
 
 
 def test_uncorrected_readings_lengthen_the_arc_and_overestimate_k():
@@ -169,21 +161,6 @@ def test_a_pull_beyond_the_valid_slips_carries_a_warning():
     found = predict_pull(simulate_readings(arc(fast), QUIET), fast, QUIET, STRENGTH, grip)
     assert [(r.code, r.about) for r in found.warnings] == [("outside-valid-slip", ("slip",))]
     assert found.drawbar_pull == pytest.approx(WEIGHT * math.sin(fast.slope), abs=0.3)
-
-
-def test_students_t_is_that_of_the_tables():
-    from scipy.stats import t
-
-    for freedom in (3, 5, 20, 1000.0):
-        assert student_t_quantile(freedom) == pytest.approx(t.ppf(0.95, freedom), rel=0.005)
-    assert student_t_quantile(2) == pytest.approx(t.ppf(0.95, 2), rel=0.025)
-
-
-def test_the_jackknife_of_a_mean_is_its_variance():
-    force = np.random.default_rng(3).normal(2.0, 0.3, (8, 1, 1))
-    readings = SensorReadings(np.zeros((8, 1)), force)
-    found = jackknife_covariance(readings, lambda r: np.asarray([r.force.mean()]))
-    assert found[0, 0] == pytest.approx(force.var(ddof=1) / 8, rel=1e-9)
 
 
 def test_uninformative_readings_are_refused():

@@ -12,8 +12,6 @@ from soilml.numerics.prior import Prior
 from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
     identify_groups,
-    linear_regression,
-    predicted,
     simulate_group,
 )
 from soilml.systems.tracked_robot.robot import WANG2018
@@ -68,14 +66,6 @@ def test_averaging_reduces_only_scatter_between_groups(groups):
     assert (groups.std <= 1.2 * each).all()
     same = replace(groups, fits=(groups.fits[0],) * 4)
     np.testing.assert_allclose(same.std, groups.fits[0].std)
-
-
-def test_a_fit_predicts_new_runs(groups):
-    fresh = simulate_group(
-        CASE, np.linspace(0.08, 0.8, 12), WANG2018.load, np.random.default_rng(9)
-    )
-    line = linear_regression(predicted(CASE, groups.pooled, fresh), fresh["drawbar_pull_N"])
-    assert line.r2 > 0.95 and abs(line.slope - 1.0) < 4.0 * line.slope_std
 
 
 def test_the_five_parameters_are_those_of_the_paper_and_one_group_is_refused():

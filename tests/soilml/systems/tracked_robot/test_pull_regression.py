@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from soilml.errors import FitError, InputError
-from soilml.systems.tracked_robot.group_identification import implied_points, linear_regression
+from soilml.systems.tracked_robot.group_identification import linear_regression
 
 
 def test_the_line_is_that_of_scipy():
@@ -19,14 +19,6 @@ def test_the_line_is_that_of_scipy():
     assert ours.slope_std == pytest.approx(theirs.stderr)
     assert stats.f.sf(ours.f, 1, 16) == pytest.approx(theirs.pvalue, rel=1e-6)
     assert ours.points == 18
-
-
-def test_r2_and_f_imply_the_number_of_points():
-    x = np.arange(25.0)
-    line = linear_regression(x, x + np.sin(7.0 * x))
-    assert implied_points(line.r2, line.f) == pytest.approx(25.0)
-    with pytest.raises(InputError, match="r2 is 1"):
-        implied_points(1.0, 10.0)
 
 
 def test_a_perfect_line_explains_all_and_no_line_is_refused():

@@ -68,19 +68,6 @@ def test_slip_is_most_sensitive_to_stiffness_without_a_foot(feet):
     assert np.all(error > 0)
 
 
-def test_a_straight_line_has_its_slope_and_no_error(feet):
-    slope, error = feet.sensitivity(np.outer([1.0, -2.0], feet.stiffness))
-    np.testing.assert_allclose(slope, [1.0, -2.0])
-    np.testing.assert_allclose(error, 0.0, atol=1e-9)
-
-
-def test_falling_ends_where_a_value_is_not_lower():
-    assert decreasing_until(np.array([3.0, 2.0, 1.0])) == 3
-    assert decreasing_until(np.array([3.0, 2.0, 2.0, 1.0])) == 2
-    assert decreasing_until(np.array([1.0, 2.0])) == 1
-    assert decreasing_until(np.array([3.0, 2.9, 1.0]), least=0.1) == 1
-
-
 def test_a_stopped_walk_has_no_metrics():
     stopped = gait_metrics(walk(wheel_leg("LTF"), LinearGround(stiffness=10.0)))
     assert stopped.status[0] != 0

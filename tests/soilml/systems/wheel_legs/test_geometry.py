@@ -41,22 +41,6 @@ def test_a_leg_bulges_to_the_rear():
     assert z.min() > -0.18 and z.max() < 0
 
 
-def test_an_arc_is_cut_into_equal_chords_between_its_ends():
-    along, aside = Section(10, 0.016, 0.18, 0.03).outline()
-    length = np.hypot(np.diff(along), np.diff(aside))
-    np.testing.assert_allclose(length, length[0])
-    assert along[0] == pytest.approx(0.0) and along[-1] == pytest.approx(0.18)
-    np.testing.assert_allclose(aside[[0, 5, -1]], [0.0, 0.03, 0.0], atol=1e-12)
-
-
-def test_legs_stand_evenly_about_the_hub():
-    plates = wheel_leg("LTF", legs=5).plates()
-    wheel = plates.turns > 0
-    mass = plates.area[wheel]
-    assert abs(np.sum(mass * plates.x[wheel])) < 1e-15
-    assert abs(np.sum(mass * plates.z[wheel])) < 1e-15
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [

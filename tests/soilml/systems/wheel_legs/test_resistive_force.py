@@ -19,37 +19,12 @@ def test_a_flat_plate_pushed_straight_down_has_the_unit_gain_and_no_side_force()
     assert across == pytest.approx(0.0, abs=1e-15)
 
 
-def test_a_withdrawn_plate_is_resisted_less_than_an_intruding_one():
-    _, going_in = stress_gains(BETA, DOWN)
-    assert np.all(going_in > 0)
-    _, going_out = stress_gains(0.0, UP)
-    assert -going_in[18] < going_out < 0
-
-
-def test_a_plate_moved_forward_is_pushed_back_and_one_moved_back_forward():
-    assert np.all(stress_gains(BETA, FORWARD)[0] > 0)
-    assert np.all(stress_gains(BETA, BACKWARD)[0] < 0)
-
-
 def test_going_backwards_is_the_mirror_image():
     beta, gamma = np.meshgrid(BETA, np.linspace(-1.5, 1.5, 21))
     ahead_x, ahead_z = stress_gains(beta, gamma)
     back_x, back_z = stress_gains(-beta, np.pi - gamma)
     np.testing.assert_allclose(back_x, -ahead_x, atol=1e-14)
     np.testing.assert_allclose(back_z, ahead_z, atol=1e-14)
-
-
-def test_a_ski_is_lifted_and_a_plough_much_less():
-    _, ski = stress_gains(np.pi / 4, FORWARD)
-    _, plough = stress_gains(-np.pi / 4, FORWARD)
-    assert ski > 3 * plough
-
-
-def test_a_plate_normal_to_its_motion_is_resisted_more_than_one_edge_on():
-    for gamma in (np.pi / 6, np.pi / 4, np.pi / 3):
-        square = np.hypot(*stress_gains(np.pi / 2 - gamma, gamma))
-        edge_on = np.hypot(*stress_gains(-gamma, gamma))
-        assert square > 1.2 * edge_on
 
 
 def test_the_form_without_angles_is_the_same_law():

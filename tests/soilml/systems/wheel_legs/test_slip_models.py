@@ -8,7 +8,6 @@ from soilml.systems.wheel_legs.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
     soil_spring,
-    spring_soil,
 )
 from soilml.systems.wheel_legs.stances import four_soils
 
@@ -73,13 +72,6 @@ def test_an_indeterminate_model_names_the_alternative():
         VIBRATION_SLIP["linear"].spring(0.1, 0.1)
     with pytest.raises(InputError, match="use the linear model"):
         VIBRATION_SLIP["planar"].drop(1.0, 0.1)
-
-
-def test_every_soil_has_a_spring_and_the_spring_its_soil():
-    drop, spring = soil_spring(ANGLE, STIFFNESS)
-    angle, stiffness = spring_soil(drop, spring)
-    np.testing.assert_allclose(angle, ANGLE)
-    np.testing.assert_allclose(stiffness, STIFFNESS)
 
 
 def test_in_the_units_taken_the_four_soils_slip_as_tested_for_tenths_of_g():

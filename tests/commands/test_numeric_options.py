@@ -1,0 +1,129 @@
+"""Every option that is a number states its range, and no number ends in more than one line."""
+
+import argparse
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import THREE_CHANNEL_MODEL
+
+from soilml.cli import main
+from soilml.cli.main import COMMANDS, parser
+from soilml.cli.options import NumberFrom, number, slip_limit, whole_number
+from soilml.serve.command import port_number
+
+HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]
+#: Options whose text holds numbers, which their command reads.
+OF_TEXT = {
+    "init": [
+        "--radius",
+        "--width",
+        "--torque-noise",
+        "--mass",
+        "--wheelbase",
+        "--track",
+        "--height",
+    ],
+    "simulate": ["--slip", "--load"],
+    "advise": ["--slips", "--loads", "--gravity", "--tested-at", "--radii"],
+    "pull": ["--load", "--slope", "--gravity", "--tested-at"],
+    "walk": ["--legs", "--stiffness", "--slip"],
+}
+
+
+def options():
+    """Command, words before, and each option of it that takes a value."""
+    for command in COMMANDS:
+        kinds = [a for a in parser(command)._actions if hasattr(a, "choices") and a.choices]
+        stack = [(command, kinds[0].choices[command])]
+        while stack:
+            words, own = stack.pop()
+            for action in own._actions:
+                if isinstance(action, argparse._SubParsersAction):
+                    stack += [(f"{words} {name}", p) for name, p in action.choices.items()]
+                elif action.option_strings and action.nargs != 0:
+                    yield words, action
+
+
+NUMBERS = [
+    (words, action)
+    for words, action in options()
+    if isinstance(action.type, NumberFrom)
+    or action.type in (slip_limit, port_number)
+    or getattr(action.type, "__qualname__", "").startswith("whole_number_from")
+]
+
+
+def test_no_option_is_a_number_without_a_range():
+    free = [(w, a.option_strings) for w, a in options() if a.type in (int, float, number)]
+    assert not free and len(NUMBERS) > 40
+    # of `generate`, whose recipe bounds the rows and whose seed may be any
+    assert {w for w, a in options() if a.type is whole_number} == {"generate"}
+
+
+@pytest.mark.parametrize("text", HOSTILE)
+def test_a_number_beyond_its_range_is_refused_in_one_line(text):
+    """At the parser, which each command goes through."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for words, action in NUMBERS:
+            try:
+                value = action.type(text)
+            except argparse.ArgumentTypeError as error:
+                assert "\n" not in str(error) and "needed is" in str(error), (words, action)
+                continue
+            assert np.isfinite(value), (words, action.option_strings)
+            if isinstance(action.type, NumberFrom):
+                assert action.type.lower <= value <= action.type.upper
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    work = tmp_path_factory.mktemp("numbers")
+    (work / "m.toml").write_text(THREE_CHANNEL_MODEL)
+    (work / "r.csv").write_text(
+        "run,slip,load_N,torque_Nm\na,0.1,60,1.26\na,0.2,60,1.9\na,0.4,60,2.6\na,0.6,60,3.0\n"
+    )
+    return work
+
+
+WORDS = {
+    "init": ["init", "new.toml", "--radius", "0.15", "--width", "0.12", "--soil",
+             "wong1989/dry_sand", "--mass", "12"],
+    "simulate": ["simulate", "m.toml", "--slip", "0.2", "--load", "60"],
+    "advise": ["advise", "m.toml", "r.csv", "--exact-model"],
+    "pull": ["pull", "m.toml", "r.csv", "--load", "60", "--exact-model"],
+    "walk": ["walk"],
+}  # fmt: skip
+CHEAP = [(c, o) for c in ("init", "simulate", "walk") for o in OF_TEXT[c]]
+CHEAP += [(w, a.option_strings[0]) for w, a in NUMBERS if w in ("simulate", "walk")]
+LONG = [(c, o) for c in ("advise", "pull") for o in OF_TEXT[c]]
+
+
+def run(words, folder, monkeypatch, capsys):
+    """Run a command; every warning is an error, and a refusal one line."""
+    monkeypatch.chdir(folder)
+    Path("new.toml").unlink(missing_ok=True)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        status = main(words)
+    said = capsys.readouterr().err
+    assert status in (0, 2) and "Traceback" not in said and "Warning" not in said, (words, said)
+    assert status == 0 or said.count("\n") == 1, (words, said)
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [*CHEAP, *(pytest.param(*one, marks=pytest.mark.slow) for one in LONG)],
+)
+def test_a_command_answers_or_refuses_whatever_number_it_is_given(
+    command, option, folder, monkeypatch, capsys
+):
+    for text in HOSTILE:
+        words = [*WORDS[command]]
+        if option in words:
+            words[words.index(option) + 1] = text
+        else:
+            words += [f"{option}={text}"]
+        run(words, folder, monkeypatch, capsys)

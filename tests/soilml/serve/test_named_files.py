@@ -1,0 +1,107 @@
+"""Text of the page names no file of its owner, whichever key of whichever settings it uses."""
+
+import json
+
+import pytest
+from served_page import page as page
+from served_page import runs_file
+
+from soilml import Model, Wheel
+from soilml.errors import InputError
+from soilml.io.named_files import NO_FILES, NamedFiles
+from soilml.serve.answers.chosen_case import model_text
+from soilml.serve.answers.forward import controls, forward
+
+SECRET = "root:x:0:0:the first line of a file that is not the page's"
+MODEL = """\
+[gear]
+type = "wheel"
+radius = 0.15
+width = 0.12
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+cohesion = [0.0, 3000.0]
+[noise]
+torque_Nm = "2 %"
+"""
+RANGES = "slip = [0.05, 0.6]\nload_N = [30, 110]\n"
+WITHIN = "runs = { slip = [0.1], load_N = [60] }\n"
+#: Every key of a model file that names a file or a program.
+KEYS = {
+    "table": 'table = "NAME"\n',
+    "python": f'{WITHIN}python = "NAME:f"\n',
+    "command": f'{WITHIN}command = "NAME {{design}} {{runs}}"\n',
+}
+
+
+@pytest.fixture(scope="module")
+def secret(tmp_path_factory):
+    file = tmp_path_factory.mktemp("owner") / "secret.csv"
+    file.write_text(SECRET + "\n")
+    return file
+
+
+def text_of(key, name):
+    return f"{MODEL}[simulator]\n{KEYS[key].replace('NAME', str(name))}{RANGES}"
+
+
+def check(answer, secret):
+    said = json.dumps(answer)
+    assert "may name no file" in said or "may name MODEL.toml" in said, said
+    assert SECRET[:12] not in said and "no such file" not in said
+
+
+@pytest.mark.parametrize("key", KEYS)
+@pytest.mark.parametrize("ask", [model_text, controls, forward], ids=lambda ask: ask.__name__)
+def test_no_answer_reads_a_file_that_a_model_names(ask, key, secret):
+    for name in (secret, "/nowhere/at/all.csv", "../../secret.csv"):
+        with pytest.raises(InputError, match="may name no file") as found:
+            ask({"model": text_of(key, name), "values": {}})
+        check(str(found.value), secret)
+
+
+@pytest.mark.parametrize("address", ["model", "controls", "forward"])
+def test_no_address_reads_a_file_that_a_model_names(page, address, secret):
+    answer, status = page.ask(f"/api/{address}", {"model": text_of("table", secret)})
+    assert status == 422
+    check(answer, secret)
+
+
+def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
+    key = page.put("RUNS.csv", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
+                   .read_bytes())  # fmt: skip
+    for kind in ("estimate", "gap"):
+        answer, status = page.ask(
+            "/api/jobs",
+            {"kind": kind, "files": [key], "model": {"model": text_of("table", secret)}},
+        )
+        assert status == 422
+        check(answer, secret)
+    question = page.ask("/api/design", {})[0]["question"]
+    head, tail = question[: question.index("[soil]")], question[question.index("[goal]") :]
+    for model, runs in ((secret, "RUNS.csv"), ("MODEL.toml", secret)):
+        soil = f'[soil]\nmodel = "{model}"\nruns = "{runs}"\n'
+        job = page.job(kind="design", files=[key], question=head + soil + tail, effort="quick")
+        assert job["state"] == "failed"
+        check(job, secret)
+
+
+@pytest.mark.parametrize("name", ["out", "read", "written", "MODEL.toml"])
+def test_a_dropped_file_may_have_any_name(page, name, tmp_path):
+    """Those of the folders of a job once ended it as out of memory."""
+    runs = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))).read_bytes()
+    job = page.job(kind="estimate", files=[page.put(name, runs)], model={"values": {}})
+    if name == "MODEL.toml":
+        assert job["error"] == "a dropped file has the name MODEL.toml; rename it"
+    else:
+        assert job["state"] == "done", job["error"]
+
+
+def test_a_file_of_the_command_line_names_any_file_beside_it(tmp_path):
+    assert NamedFiles(tmp_path).path("r.csv") == tmp_path / "r.csv"
+    assert NamedFiles(tmp_path).path("/a/r.csv").as_posix() == "/a/r.csv"
+    assert NamedFiles(names=["r.csv"]).path("r.csv").as_posix() == "r.csv"
+    for name in ("r.csv", "", ".", "..", "/etc/passwd"):
+        with pytest.raises(InputError, match="may name no file"):
+            NO_FILES.path(name)
