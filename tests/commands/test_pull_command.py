@@ -137,9 +137,9 @@ def test_bad_input_is_one_line(folder, capsys, fault):
 
 
 def test_the_page_shows_what_the_command_prints_and_its_lines_run(tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs/pull.md").read_text()
-    (rows,), (shown,), (lines,) = (
-        re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL)
+    page = (ROOT / "docs/how-to/pull.md").read_text()
+    rows, shown, lines = (
+        re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL)[0]
         for kind in ("csv", "text", "python")
     )
     command = re.search(r"```\nsoilml (.*?)\n```", page)[1]
