@@ -61,13 +61,6 @@ def test_no_answer_reads_a_file_that_a_model_names(ask, key, secret):
         check(str(found.value), secret)
 
 
-@pytest.mark.parametrize("address", ["model", "controls", "forward"])
-def test_no_address_reads_a_file_that_a_model_names(page, address, secret):
-    answer, status = page.ask(f"/api/{address}", {"model": text_of("table", secret)})
-    assert status == 422
-    check(answer, secret)
-
-
 def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
     key = page.put("RUNS.csv", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
                    .read_bytes())  # fmt: skip
@@ -85,17 +78,6 @@ def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
         job = page.job(kind="design", files=[key], question=head + soil + tail, effort="quick")
         assert job["state"] == "failed"
         check(job, secret)
-
-
-@pytest.mark.parametrize("name", ["out", "read", "written", "MODEL.toml"])
-def test_a_dropped_file_may_have_any_name(page, name, tmp_path):
-    """Those of the folders of a job once ended it as out of memory."""
-    runs = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))).read_bytes()
-    job = page.job(kind="estimate", files=[page.put(name, runs)], model={"values": {}})
-    if name == "MODEL.toml":
-        assert job["error"] == "a dropped file has the name MODEL.toml; rename it"
-    else:
-        assert job["state"] == "done", job["error"]
 
 
 def test_a_file_of_the_command_line_names_any_file_beside_it(tmp_path):
