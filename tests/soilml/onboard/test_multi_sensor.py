@@ -51,29 +51,6 @@ def test_the_prior_counts_once():
     assert inside.mean() == pytest.approx(0.9, abs=0.01)
 
 
-def test_weighing_by_variance_counts_it_twice_and_is_too_sure():
-    truth, found = posteriors()
-    for rule in ("inverse-variance", "pairwise"):
-        twice = fuse_estimates(found, rule).estimate
-        assert rms((twice.mean[:, 0] - truth) / twice.std[:, 0]) > 1.15
-        assert rms(twice.mean[:, 0] - truth) > rms(
-            fuse_estimates(found).estimate.mean[:, 0] - truth
-        )
-
-
-def test_where_readings_say_far_more_than_the_prior_the_rules_agree():
-    found = [estimate(0.30, 0.002), estimate(0.305, 0.004)]
-    once, paper = (fuse_estimates(found, r).estimate for r in ("prior-once", "inverse-variance"))
-    assert paper.mean[0] == pytest.approx(0.301)  # eq. 26: weight 0.8 and 0.2
-    np.testing.assert_allclose(once.mean, paper.mean, atol=1e-5)
-    np.testing.assert_allclose(once.std, paper.std, rtol=1e-3)
-
-
-def test_whatever_errors_have_in_common_covariance_intersection_is_not_too_sure():
-    same = [estimate(0.4, 0.05)] * 2
-    assert fuse_estimates(same, "covariance-intersection").estimate.std[0] == pytest.approx(0.05)
-
-
 @pytest.mark.parametrize("rule", [rule for rule in ACROSS_FILES if rule != "correlated"])
 def test_what_is_out_of_range_takes_no_part(rule):
     flags = np.asarray([True, True, False, False]), np.asarray([True, False, True, False])
