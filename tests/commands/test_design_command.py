@@ -70,17 +70,6 @@ def test_files_and_the_verdict(study, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_options_change_slope_gravity_and_soils(study, capsys):
-    options = ["--slope", "20", "--gravity", "moon", "--soil", "moore1999/drift"]
-    assert main(["design", str(study), *FEW, *options]) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert content["gravity_m_s2"] == 1.62 and content["soils"] == ["moore1999/drift"]
-    codes = {one["code"] for one in content["warnings"]}
-    assert {"other-gravity", "assumed-soil", "goal-not-met"} <= codes
-    assert not content["met"]
-
-
-@pytest.mark.slow
 def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
     runs = "run,slip,load_N,torque_Nm\na,0.1,20,0.6\na,0.2,30,1.4\na,0.4,30,2.0\n"
     (tmp_path / "runs.csv").write_text(runs)

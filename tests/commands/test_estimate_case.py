@@ -43,15 +43,6 @@ def test_a_file_alone_is_described_in_one_line(folder, capsys):
     assert "radius 0.04 to 0.5 m" in said and "0 to 1 cohesion_max" in said
 
 
-def test_the_description_precedes_the_other_notes(folder, capsys):
-    assert main(["estimate", WHEEL, "runs.csv"]) == 0
-    first = capsys.readouterr().err.splitlines()[0]
-    assert first.startswith(f"{WHEEL}: for a wheel of radius 0.15 m")
-    assert main(["estimate", ANY_WHEEL, "runs.csv", "--case", "small.toml"]) == 0
-    first = capsys.readouterr().err.splitlines()[0]
-    assert "radius 0.12 m" in first and "cohesion 0 to 3 kPa" in first
-
-
 @pytest.mark.parametrize("file", [WHEEL, ANY_WHEEL])
 def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
     assert main(["estimate", file, "runs.csv", "--by", "run", "--case", "model.toml"]) == 0
@@ -75,18 +66,6 @@ def test_another_wheel_is_refused_in_one_line(folder, capsys, file, case, said):
         assert main(["estimate", file, *rest, "--case", case]) == 2
         captured = capsys.readouterr()
         assert said in one_line(captured.err) and not captured.out
-
-
-def test_what_a_file_of_one_wheel_ignores_of_the_case_is_said(folder, capsys):
-    other = MODEL.replace('torque_Nm = "2 %"', 'torque_Nm = "7 %"').replace("3000.0", "2000.0")
-    other += "[[soil.test]]\nnormal_stress = 8000\nstrength = 5000\nscatter = 0.1\n"
-    (folder / "other.toml").write_text(other + '[discrepancy]\ntorque_Nm = "2 %"\n')
-    assert main(["estimate", WHEEL, "runs.csv", "--case", "other.toml"]) == 0
-    said = capsys.readouterr().err
-    assert "prior [0.0, 3000.0] of cohesion, other.toml has [0.0, 2000.0], which is ignored" in said
-    assert "noise of torque_Nm as in its recipe, other.toml has another one" in said
-    assert "ignores the [discrepancy] of torque_Nm" in said
-    assert "[[soil.test]] is ignored" in said
 
 
 @pytest.mark.parametrize(("file", "case"), [(WHEEL, None), (ANY_WHEEL, "model.toml")])

@@ -2,11 +2,10 @@
 
 import csv
 import io
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MODEL, simulated_run
+from conftest import simulated_run
 
 from soilml.cli import main
 from soilml.onboard.estimator import Estimator
@@ -49,12 +48,6 @@ def test_an_exact_model_is_an_option(runs, capsys, whole_file):
     rows, said = answers(capsys, str(whole_file), "runs.csv", "--exact-model")
     right = Estimator.load(whole_file).on(model_error=0.0).run(**runs["sound"])
     assert float(rows["sound"]["cohesion_Pa_std"]) == pytest.approx(right["cohesion"][1], rel=1e-3)
-    assert "the model is taken as exact" in said
-
-
-def test_a_declared_discrepancy_takes_the_place_of_other_errors(runs, capsys, whole_file):
-    Path("own.toml").write_text(MODEL + '[discrepancy]\ntorque_Nm = "2 %"\n')
-    _, said = answers(capsys, str(whole_file), "runs.csv", "--case", "own.toml")
     assert "the model is taken as exact" in said
 
 

@@ -1,6 +1,5 @@
 """Ctrl-C at any moment from the first import on: one line, status 130, no file."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -78,16 +77,6 @@ sys.exit(main())
     )  # fmt: skip
     assert done.stderr == "soilml: interrupted; complete before that: out.csv\n"
     assert done.returncode == 130 and (tmp_path / "out.csv").is_file()
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_after_the_command_is_answered(monkeypatch, capsys, number):
-    """Large tables take a while to be freed; a signal meanwhile comes when the command is over."""
-    module = importlib.import_module("soilml.cli.main")
-    monkeypatch.setattr(module, "_run", lambda *_: signal.raise_signal(number))
-    monkeypatch.setattr(module, "replaced", ["d.parquet"])
-    assert module.main(["generate"]) == 128 + number
-    assert capsys.readouterr().err == "soilml: interrupted; complete before that: d.parquet\n"
 
 
 @pytest.mark.parametrize("where", ["__enter__", "__exit__"])

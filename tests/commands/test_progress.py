@@ -22,14 +22,6 @@ def clock(monkeypatch):
     return clock
 
 
-def test_quick_work_is_silent(clock, capsys):
-    with progress.progress_bar("simulating", 10) as done:
-        for i in range(10):
-            clock.now += 0.1
-            done(i + 1)
-    assert capsys.readouterr().err == ""
-
-
 def test_long_work_says_a_line_now_and_then(clock, capsys):
     with progress.progress_bar("simulating", 100) as done:
         for i in range(100):
@@ -37,23 +29,6 @@ def test_long_work_says_a_line_now_and_then(clock, capsys):
             done(i + 1)
     lines = capsys.readouterr().err.splitlines()
     assert lines == [f"simulating: {share} %" for share in (2, 22, 42, 62, 82)]
-
-
-def test_stages_say_that_they_begin_and_how_far_they_are(clock, capsys):
-    with progress.stage_progress() as tell:
-        for i in range(30):
-            clock.now += 1.0
-            tell("training", i, 30)
-    assert capsys.readouterr().err.splitlines() == ["training ...", "training: 66 %"]
-
-
-def test_work_of_unknown_length_says_one_line(monkeypatch, capsys):
-    monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
-    with progress.working("identifying"):
-        while not capsys.readouterr().err.startswith("identifying ..."):
-            pass
-    with progress.working("identifying"):
-        pass
 
 
 def test_a_long_table_is_read_with_progress(tmp_path, monkeypatch, capsys, clock):

@@ -74,16 +74,6 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     assert "no load transfer" in said and "torque alone hardly reveals" in said
 
 
-def test_each_run_has_its_own_answer_and_one_that_cannot_be_had_is_said(folder, capsys):
-    with (folder / "runs.csv").open("a") as file:
-        file.write("b,0.2,60,\n")
-    assert main([*COMMAND, "--by", "run"]) == 0
-    captured = capsys.readouterr()
-    assert {r["run"] for r in rows_of(captured.out)} == {"a"}
-    assert "run b has no result" in captured.err
-    assert "run a: 60 N: the pull still increases" in captured.err
-
-
 def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):
     assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
     rows = rows_of((folder / "pull.csv").read_text())

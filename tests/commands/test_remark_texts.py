@@ -92,12 +92,3 @@ def test_advice_is_decided_by_codes(folder, capsys, other_words):
     before = found()
     other_words()
     assert found() == before and before[0] == 0 and before[2] > 0
-
-
-def test_a_name_that_ends_another_one_is_not_doubted_with_it(folder, capsys):
-    """`cohesion is not identified` says nothing of n."""
-    words = ["identify", "model.toml", "runs.csv", "--where", "run=a", "--free", "cohesion,n"]
-    assert main([*words, "--report", "found"]) == 0
-    page = (folder / "found/report.html").read_text()
-    assert "Cohesion c is not determined by these rows" in page
-    assert "Exponent of sinkage n is not determined" not in page

@@ -7,7 +7,6 @@ import sys
 import pytest
 
 from soilml.cli.main import COMMANDS
-from soilml.onboard.multi_sensor import ACROSS_FILES
 
 #: Runs the command line with the arguments of the process, then lists the modules on the last line.
 LISTING = """\
@@ -53,11 +52,6 @@ def test_help_version_and_unknown_commands_load_no_library(words, commands):
     assert commands_among(loaded) == commands
 
 
-def test_an_output_of_the_wrong_kind_is_refused_before_any_library_is_loaded():
-    loaded, _ = modules_after("identify", "model.toml", "runs.csv", "--out", "result.csv")
-    assert {name.split(".")[0] for name in loaded} <= set(OWN)
-
-
 @pytest.mark.slow
 def test_identify_loads_neither_distributions_nor_the_runtime_for_trained_models(
     model_file, tmp_path
@@ -76,12 +70,6 @@ def test_identify_loads_neither_distributions_nor_the_runtime_for_trained_models
         "matplotlib",
         "rich",
     }
-
-
-def test_the_help_names_the_rules_of_fusion():
-    from soilml.cli.commands.estimate import FUSION_RULES
-
-    assert FUSION_RULES == ACROSS_FILES
 
 
 @pytest.mark.parametrize("chosen", [None, "0"])

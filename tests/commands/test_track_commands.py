@@ -86,12 +86,6 @@ def test_bad_requests_are_refused_in_one_line(options, expected, folder, capsys)
     assert not (folder / "o.csv").exists()
 
 
-def test_only_a_track_has_a_balance(folder, capsys):
-    (folder / "m.toml").write_text(MODEL.replace('"track"', '"wheel"').replace("base = 0.6\n", ""))
-    assert main(SIMULATE) == 2
-    assert "this needs a track" in capsys.readouterr().err
-
-
 @pytest.fixture
 def groups(folder):
     """Four groups of eight pulls, and twelve further rows."""
@@ -121,18 +115,3 @@ def test_the_mean_of_groups_and_the_regression_of_fresh_rows(groups, folder, cap
     assert f"r2 {line['r2']:.3f}" in said and "run mean of 4" in said
     page = (folder / "found" / "report.html").read_text()
     assert "against predictions by the mean" in page and "run mean of 4" in page
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        (["--mean"], "name their column, such as --by run"),
-        (["--fresh", "more.csv"], "add --mean"),
-        (["--by", "run", "--mean", "--where", "run=g1"], "an average needs two or more"),
-        (["--by", "run", "--mean", "--fresh", "none.csv"], "there is no such file"),
-    ],
-)
-def test_a_mean_without_groups_is_refused_in_one_line(options, expected, groups, capsys):
-    command = ["identify", "m.toml", "runs.csv", "--method", "nonlinear", *options]
-    assert main([*command, "--out", "o.json"]) == 2
-    assert expected in capsys.readouterr().err.strip().splitlines()[-1]

@@ -51,13 +51,6 @@ def test_the_motion_of_a_turn_has_the_commanded_slip(tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_ground_that_carries_nothing_is_said(capsys):
-    assert main(["walk", "--stiffness", "1e3"]) == 0
-    said = capsys.readouterr()
-    assert "too soft" in rows_of(said.out)[0]["status"]
-    assert "1 of 1 walks: stopped: the ground is too soft" in said.err
-
-
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
