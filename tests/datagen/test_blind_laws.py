@@ -69,11 +69,3 @@ def test_a_soil_that_changes_does_so_in_the_order_of_the_runs():
             if change.any():
                 assert np.abs(change[runs == 7]).max() > 0.0
         assert set(drawn.truth["region_elapsed"]) == {1.0}
-
-
-def test_times_are_recorded_in_every_other_set_of_laws_and_trends():
-    timed = draw_blind_set(replace(PLAN, seed=8)).columns["time_s"]
-    assert (np.diff(timed) > 0.0).all()
-    assert "time_s" not in draw_blind_set(PLAN).columns
-    law = replace(PLAN, tier="L", cause="firm-base/asymptote", seed=8)
-    assert "time_s" in draw_blind_set(law).columns

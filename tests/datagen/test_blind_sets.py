@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import MECHANISMS, Plan, draw_blind_set, write_blind_set
-from datagen.blind_sets.plans import active_mechanisms, mechanism_keys
 from datagen.blind_sets.reading_errors import CHANNELS, sensors
 from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
-from datagen.blind_sets.run_schedules import COVARIATE_COLUMNS
 from datagen.blind_sets.soil_families import FAMILIES, FREE_PARAMETERS, RADIUS, WIDTH
 from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
 from soilml.config.case import read_case
@@ -65,12 +63,6 @@ def test_the_wheel_is_the_packages():
     assert apart(of_hidden(rows), of_soilml(rows)).max() < 1e-5
 
 
-def test_a_load_that_nothing_carries_has_no_answer():
-    rows = replace(batch(4, seed=2), load=np.array([60.0, 1e7, 60.0, 1e7]))
-    answered = np.isfinite(of_hidden(rows))
-    assert (answered == [True, False, True, False]).all()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
@@ -94,19 +86,6 @@ def test_the_same_plan_gives_the_same_set_and_another_seed_another():
     for name, values in one.columns.items():
         np.testing.assert_array_equal(values, again.columns[name])
     assert not np.array_equal(one.columns["torque_Nm"], other.columns["torque_Nm"])
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("tier", ["A", "B"])
-def test_what_a_cause_needs_varies(tier):
-    needy = [key for key in mechanism_keys(tier) if active_mechanisms(tier, key)[0].needs]
-    assert needy
-    for key in needy:
-        plan = replace(PLAN, tier=tier, cause=key)
-        column = draw_blind_set(plan).columns[
-            COVARIATE_COLUMNS[active_mechanisms(tier, key)[0].needs]
-        ]
-        assert len(np.unique(column)) > 1
 
 
 def strays(tier, count=60):
@@ -153,11 +132,3 @@ def test_what_is_written_is_read_by_the_package_and_the_truth_lies_apart(tmp_pat
         assert case.prior[name].lower < truth["soil"][name] < case.prior[name].upper
     with pytest.raises(ValueError, match="another folder"):
         write_blind_set(PLAN, given, given)
-
-
-def test_only_what_is_free_is_wrong_in_the_model(tmp_path):
-    write_blind_set(PLAN, tmp_path / "given", tmp_path / "kept")
-    soil = read_case(tmp_path / "given" / "model.toml").soil
-    truth = json.loads((tmp_path / "kept" / "truth.json").read_text())["soil"]
-    right = {n for n in truth if getattr(soil, n) == pytest.approx(truth[n], rel=1e-5)}
-    assert right == set(truth) - set(FREE_PARAMETERS[:3])

@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import draw_blind_set, draw_plan
-from datagen.challenge import Challenge, Entry, Truth, bootstrap, crps, make_challenge, score
+from datagen.challenge import Challenge, Entry, Truth, crps, score
 from datagen.challenge.challenge_files import COLUMNS, LEAST_PROBABILITY, NONE, UNKNOWN
-from datagen.challenge.house_entries import house_entry, regression_draws, stated
-from datagen.challenge.linear_entries import gap_probabilities
+from datagen.challenge.house_entries import stated
 from datagen.challenge.sealing import DEFAULT_TIERS, answer_of
 from soilml.cli import main
-from soilml.gap.report.results import GapReport
-
-METHODS = ("gap", "stepwise", "lasso", "gp")
 
 
 @pytest.fixture(scope="module")
@@ -70,17 +66,6 @@ def test_the_public_folder_has_no_truth(made):
         assert not {*header} & {*COLUMNS, "time_s"}
 
 
-def test_without_a_seed_no_two_challenges_or_salts_are_alike():
-    one, other = (make_challenge(1, ("N0",)) for _ in range(2))
-    assert one.public["s1/runs.csv"] != other.public["s1/runs.csv"]
-    assert json.loads(one.truth)["salt"] != json.loads(other.truth)["salt"]
-    assert json.loads(one.truth)["sets"]["s1"]["plan"]["seed"] > 2**64
-
-
-def test_the_same_seed_makes_the_same_challenge():
-    assert make_challenge(1, seed=3) == make_challenge(1, seed=3)
-
-
 def test_answers_are_of_the_list_and_the_truth_is_what_the_plan_simulates(made):
     content = json.loads(made[1].read_text())
     for own in content["sets"].values():
@@ -109,15 +94,6 @@ def test_the_true_distribution_has_the_best_expected_crps():
     assert mean[0.0, 1.0] == pytest.approx(1.0 / np.sqrt(np.pi), abs=0.02)  # Gneiting et al. 2005
 
 
-def test_the_crps_does_not_depend_on_the_number_or_order_of_draws():
-    rng = np.random.default_rng(2)
-    draws, readings = rng.standard_normal((2000, 300)), rng.standard_normal(300)
-    few = np.mean([crps(part, readings).mean() for part in np.split(draws, 100)])
-    assert few == pytest.approx(float(crps(draws, readings).mean()), abs=0.01)
-    mixed = draws[rng.permutation(len(draws))]
-    np.testing.assert_allclose(crps(mixed, readings), crps(draws, readings), rtol=1e-9)
-
-
 def test_the_true_probabilities_have_the_best_expected_score(challenge, truth, entry):
     """Answers drawn from known probabilities, scored for these and for distorted ones."""
     rng = np.random.default_rng(4)
@@ -130,73 +106,6 @@ def test_the_true_probabilities_have_the_best_expected_score(challenge, truth, e
         of = [replace(truth, answer=dict(zip(challenge.rows, pair, strict=True))) for pair in drawn]
         means.append(np.mean([score(challenge, t, one).by_set["causes"].mean() for t in of]))
     assert means[0] > max(means[1:])
-
-
-def test_rows_in_another_order_have_another_score(challenge, truth, entry):
-    turned = replace(entry, draws={n: d[:, ::-1] for n, d in entry.draws.items()})
-    right, wrong = (score(challenge, truth, own).by_set for own in (entry, turned))
-    assert all((right[c] < wrong[c]).all() for c in COLUMNS)
-    shuffled = replace(entry, draws={n: d[::-1] for n, d in entry.draws.items()})
-    for c in COLUMNS:
-        np.testing.assert_allclose(score(challenge, truth, shuffled).by_set[c], right[c])
-
-
-def test_intervals_cover_the_mean_as_often_as_stated():
-    rng = np.random.default_rng(5)
-    ends = [bootstrap(rng.standard_normal(40))[1:] for _ in range(200)]
-    assert 0.82 < np.mean([low < 0.0 < high for low, high in ends]) < 0.96
-
-
-def test_draws_of_a_regression_have_the_known_mean_and_spread():
-    """One weight of unit prior, seen once with unit noise: N(r / 2, 1 / 2), and noise on top."""
-    columns, runs = np.ones((2, 1)), np.asarray([True, False])
-    rng = np.random.default_rng(6)
-    draws = regression_draws(columns, np.asarray([2.0, 0.0]), np.ones(2), runs, 40000, rng)
-    assert draws.mean() == pytest.approx(1.0, abs=0.03)
-    assert draws.var() == pytest.approx(1.5, abs=0.05)
-
-
-def test_a_report_without_a_gap_leaves_its_probability_to_none():
-    quiet = GapReport("no-gap", "", None, probabilities={"grousers": 0.1}, p_gap=0.4)
-    assert gap_probabilities(quiet)[NONE] == pytest.approx(0.9)
-    seen = replace(quiet, status="unknown", p_gap=1e-4)
-    assert gap_probabilities(seen)[UNKNOWN] > 0.89
-    crowded = replace(seen, probabilities=dict.fromkeys(("grousers", "rate", "slope"), 0.9))
-    assert sum(gap_probabilities(crowded).values()) == pytest.approx(1.0)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", METHODS)
-def test_entries_of_the_house_are_valid_and_repeatable(method, made, challenge, truth, tmp_path):
-    out = tmp_path / "a.json"
-    words = ["challenge", "enter", str(made[0]), "--method", method, "--out", str(out)]
-    assert main(words) == 0
-    read = Entry.read(out, challenge)
-    assert house_entry(challenge, method, 0).as_json(challenge) == json.loads(out.read_text())
-    assert all(np.isfinite(v).all() for v in score(challenge, truth, read).by_set.values())
-
-
-@pytest.mark.slow
-def test_simulation_based_inference_enters_where_it_is_installed(made, tmp_path, capsys):
-    words = ["challenge", "enter", str(made[0]), "--method", "sbi"]
-    try:
-        import sbi  # noqa: F401
-    except ImportError:
-        assert main([*words, "--out", str(tmp_path / "e.json")]) == 2
-        assert "pip install 'soilml[sbi]'" in capsys.readouterr().err
-        return
-    import datagen.challenge.simulation_entry as entries
-    from datagen.challenge.house_entries import SetData
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(entries, "OF_CAUSE", 10)
-        patch.setattr(entries, "RATIO_EPOCHS", 2)
-        patch.setattr(entries, "FLOW_EPOCHS", 2)
-        data = SetData.read(made[0] / "s1", Challenge.read(made[0]))
-        answer = entries.simulation_entry(data, 0)
-    assert set(answer.causes) <= set(data.causes)
-    assert answer.draws.shape == (100, len(data.held), len(COLUMNS))
-    assert np.isfinite(answer.draws).all()
 
 
 def _without_set(content):
@@ -305,21 +214,3 @@ def test_scores_are_written_with_differences_to_the_first(made, challenge, entry
     assert first["minus_first"]["torque_Nm"] == {"mean": 0.0, "p05": 0.0, "p95": 0.0}
     assert second["minus_first"]["torque_Nm"]["p05"] > 0.0
     assert second["minus_first"]["causes"]["mean"] == 0.0
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--truth", "{blind}/truth.json"], "which entrants get"),
-        ([], "--truth is missing"),
-        (["--truth", "{folder}/new.json", "--tiers", "A,Z"], "no tier 'Z'"),
-        (["--truth", "{folder}/old.json"], "could not be scored without it"),
-    ],
-)
-def test_a_challenge_that_cannot_be_made_writes_nothing(words, said, tmp_path, capsys):
-    (tmp_path / "old.json").write_text("{}")
-    blind = tmp_path / "blind"
-    filled = [word.format(blind=blind, folder=tmp_path) for word in words]
-    assert main(["challenge", "make", str(blind), *filled]) == 2
-    assert said in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["old.json"]

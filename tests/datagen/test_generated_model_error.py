@@ -55,12 +55,6 @@ def test_generated_rows_are_the_model_its_mean_and_the_error(recipe):
     np.testing.assert_array_equal(rows["sinkage_m"], bare["sinkage_m"])
 
 
-def test_the_error_does_not_depend_on_how_the_rows_are_divided(recipe):
-    whole = simulate_rows(recipe, 0, 0, 64)["torque_Nm"]
-    parts = [simulate_rows(recipe, 0, a, b)["torque_Nm"] for a, b in ((0, 5), (5, 37), (37, 64))]
-    np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12)
-
-
 def test_far_from_the_learned_range_the_error_of_rows_is_a_usual_one(recipe):
     (own,) = recipe.case.remainder.parts
     light = replace(own, usual=0.4, load=(2.0, 3.0), points=((0.2, 2.5), (0.5, 2.5)))

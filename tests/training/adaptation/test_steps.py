@@ -46,9 +46,3 @@ def test_another_input_or_a_changed_output_repeats_it(work):
     (work.folder / "out.txt").unlink()
     work.run("b")
     assert work.calls == 5 and work.run("b") == ["copy"]
-
-
-def test_a_step_that_fails_is_not_done(work):
-    with pytest.raises(InputError):
-        work.run(fail=True)
-    assert work.run() == [] and work.calls == 2

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import THREE_CHANNEL_MODEL
 
-from soilml import ExitAngle, Noise, SlipSinkage, read_case, simulate
+from soilml import ExitAngle, SlipSinkage, read_case, simulate
 from soilml.io.table import Table
 from training.adaptation.supported_errors import supported_errors
 from training.set_posterior.error_scales import USUAL_SCALES
@@ -52,17 +52,3 @@ def test_rows_that_it_does_not_predict_support_the_usual_ones(case, effect):
     kept_back = rows_of(case, effect)
     scales = supported_scales(case, kept_back, whole_of(kept_back, case, effect))
     assert scales.probabilities[0] < 0.05
-
-
-def test_channels_that_were_not_measured_and_declared_errors_keep_theirs(case):
-    torque = ("run", "slip", "load_N", "torque_Nm")
-    rows = whole_of(rows_of(case), case)
-    rows = Table({k: rows[k] for k in torque}, "torque alone")
-    known = replace(case, bias={"torque_Nm": Noise(share=0.02)})
-    sensors = supported_errors(known, rows, rows).sensors
-    assert not {"sinkage_bias", "drawbar_pull_bias", "torque_gain"} & sensors.keys()
-
-
-def test_rows_that_no_error_explains_leave_the_usual_ones(case):
-    rows = whole_of(rows_of(case, SlipSinkage(n1=1.5)), case, SlipSinkage(n1=1.5))
-    assert supported_errors(case, rows, rows).sensors == {}

@@ -39,17 +39,6 @@ def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsy
     assert max(map(len, printed.splitlines())) <= 100
 
 
-def test_without_released_models_the_command_names_the_clone(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["compare"]) == 2
-    assert "run it in a clone of the repository" in capsys.readouterr().err
-    assert main(["compare", "a.toml", "b.parquet"]) == 2
-    assert "needed are MODEL.toml TEST.parquet" in capsys.readouterr().err
-    assert main(["compare", "--limit", "limit.csv"]) == 2
-    assert "must end in .parquet" in capsys.readouterr().err
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.slow
 def test_a_recomputed_limit_replaces_the_file_and_is_used(small_model, tmp_path, capsys):
     file, out = tmp_path / "limit.parquet", tmp_path / "results"

@@ -1,13 +1,11 @@
 """Provenance of test data and model files in a comparison."""
 
-import json
 from dataclasses import replace
 
 import pytest
 from conftest import MODEL
 
 from soilml import Estimator, read_case, read_table
-from soilml.cli import main
 from soilml.errors import InputError
 from training.benchmark.user_comparison import check_same_provenance
 
@@ -40,14 +38,6 @@ def case_of(tmp_path, text):
     return read_case(tmp_path / "m.toml")
 
 
-def test_files_of_one_recipe_give_no_notes(tmp_path, parts):
-    assert check_same_provenance(case_of(tmp_path, MODEL), *parts, NAMES) == []
-    cohesion = MODEL.replace("[soil.prior]", "cohesion = 7.0\n[soil.prior]")
-    assert (
-        check_same_provenance(case_of(tmp_path, cohesion), *parts, NAMES) == []
-    )  # varied in the data
-
-
 @pytest.mark.parametrize("what", OTHERS)
 def test_test_data_of_another_model_file_are_refused(tmp_path, parts, what):
     text, fragment = OTHERS[what]
@@ -70,26 +60,3 @@ def test_without_a_recipe_of_the_data_the_training_differences_are_noted(tmp_pat
             "trained-otherwise",
             ("small",),
         ) and fragment in note.text
-
-
-def test_a_damaged_recipe_is_one_line(tmp_path, parts):
-    table, estimators = parts
-    for text in ("{", "[]", "[" * 100_000, json.dumps({"gear": 10**400}), '{"gear": {}}'):
-        with pytest.raises(InputError):
-            check_same_provenance(
-                case_of(tmp_path, MODEL),
-                replace(table, metadata={"soilml_recipe": text}),
-                estimators,
-                NAMES,
-            )
-
-
-@pytest.mark.parametrize("sets", ["0", "-5", "many", "9" * 5000])
-def test_a_number_of_sets_that_is_not_positive_is_refused(
-    tmp_path, small_data, small_model, capsys, sets
-):
-    (tmp_path / "m.toml").write_text(MODEL)
-    command = ["compare", str(tmp_path / "m.toml"), str(small_data), str(small_model)]
-    assert main([*command, "--out", str(tmp_path / "o"), f"--analytic-sets={sets}"]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-    assert not (tmp_path / "o").exists()

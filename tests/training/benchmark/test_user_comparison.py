@@ -9,7 +9,6 @@ from conftest import MODEL, RECIPE
 
 from soilml import Estimator, read_case, read_table
 from soilml.cli import main
-from soilml.identification import METHODS
 from training.benchmark.user_comparison import compare
 
 
@@ -39,33 +38,12 @@ def score(scores, rows, method):
 
 
 @pytest.mark.slow
-def test_every_method_is_scored_on_every_size_of_set(scores):
-    methods = {"prior", "small", *(f"analytic {method}" for method in METHODS)}
-    for rows in (1, 12):
-        assert {x.method for x in scores if x.rows == rows} == methods
-
-
-def test_the_prior_scores_itself(scores):
-    prior = score(scores, 1, "prior")
-    np.testing.assert_allclose(prior.rmse_over_prior, 1.0, rtol=0.06)
-    np.testing.assert_allclose(prior.coverage90, 0.9, atol=0.05)
-    np.testing.assert_allclose(prior.coverage50, 0.5, atol=0.08)
-
-
-@pytest.mark.slow
 def test_twelve_readings_reduce_the_error_that_one_leaves(scores):
     one, twelve = score(scores, 1, "small"), score(scores, 12, "small")
     assert 0.8 < one.rmse_over_prior[0] < 1.02
     assert (twelve.rmse_over_prior < one.rmse_over_prior).all()
     assert (score(scores, 12, "analytic nonlinear").rmse_over_prior < 0.5).all()
     assert (np.abs(one.coverage90 - 0.9) < 0.05).all()
-
-
-def test_methods_that_need_several_rows_fail_on_one(scores):
-    for method in ("analytic linear", "analytic newton"):
-        assert score(scores, 1, method).failed == score(scores, 1, method).sets
-        assert score(scores, 12, method).failed < score(scores, 12, method).sets
-    assert np.isnan(score(scores, 12, "analytic linear").rmse[2])  # K is fixed, not estimated
 
 
 @pytest.mark.long

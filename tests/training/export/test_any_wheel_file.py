@@ -4,7 +4,6 @@ import pytest
 
 from datagen.recipe import packaged_file
 from soilml import Estimator
-from soilml.cli import main
 from soilml.errors import InputError
 from training import train
 from training.export.any_wheel_file import export_any_wheel
@@ -26,18 +25,6 @@ def test_the_packaged_spec_is_of_driving_wheels():
     assert spec.family.ranges["slip"].lower > 0.0
 
 
-@pytest.mark.parametrize("key", ["slip", "wheel_radius", "load", "n", "friction_angle"])
-def test_a_range_that_is_missing_is_named(tmp_path, key):
-    lines = [line for line in SPEC.splitlines() if not line.startswith(f"{key} =")]
-    with pytest.raises(InputError, match=key):
-        read_any_wheel_spec(spec_of(tmp_path, "\n".join(lines)))
-
-
-def test_an_unknown_key_is_named(tmp_path):
-    with pytest.raises(InputError, match="hiden"):
-        read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("hidden", "hiden")))
-
-
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -50,13 +37,6 @@ def test_an_unknown_key_is_named(tmp_path):
 def test_impossible_settings_are_refused(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
         read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("designs = 60000", text)))
-
-
-def test_data_are_refused_where_rows_are_simulated(tmp_path, capsys):
-    out = tmp_path / "any.onnx"
-    assert main(["train", "any_wheel", str(tmp_path / "data.parquet"), str(out)]) == 2
-    assert "leave the data out" in capsys.readouterr().err
-    assert not out.exists()
 
 
 def test_a_file_has_the_errors_of_sensors_that_its_spec_states(

@@ -75,19 +75,3 @@ def test_an_expression_computes_what_numpy_computes(name):
     of_values(Value(graph, "x")).node("Identity").named("y")
     session = session_of(graph.model({"x": [2, 3]}, {"y": (1, [None, None])}))
     assert session.run(None, {"x": X})[0] == pytest.approx(of_arrays(X), rel=1e-6)
-
-
-def test_a_value_of_doubles_is_combined_with_constants_of_doubles():
-    graph = Graph()
-    wide = Value(graph, "x").astype(np.float64) + 1e-12
-    (wide - 1.0).astype(np.float32).named("y")
-    session = session_of(graph.model({"x": [1]}, {"y": (1, [1])}))
-    assert session.run(None, {"x": np.ones(1, np.float32)})[0] == pytest.approx(1e-12, rel=1e-3)
-
-
-def test_only_the_last_node_can_be_given_the_name_of_an_output():
-    x = Value(Graph(), "x")
-    first = x + 1.0
-    assert (first * 2.0).named("y").name == "y"
-    with pytest.raises(ValueError, match="not an output of the last node"):
-        first.named("z")

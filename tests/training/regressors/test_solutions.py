@@ -66,14 +66,6 @@ def test_a_fit_stays_within_the_memory_that_it_states(regressor, rows, monkeypat
     assert 0.3 * stated < peak < stated
 
 
-def test_ten_times_the_rows_need_little_more_memory_where_prototypes_are_few():
-    few, many = (FixedSizeLSSVM().requirements(n, 3, 3) for n in (100_000, 1_000_000))
-    assert many.memory - few.memory < 0.25e9
-    assert many.size == "fixed-size, 150 prototypes"
-    exact = LSSVM(solution="exact").requirements(20_000, 3, 3)
-    assert 1.6e9 < exact.memory < 2.5e9  # half of the matrix of 3.2 GB, and what it takes beside
-
-
 @pytest.mark.slow
 def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
     rng = np.random.default_rng(0)
@@ -88,15 +80,3 @@ def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
         regressor.fit_with_validation(x, y, (other, noisy), lambda done, total: None)
         sound = np.sqrt(np.mean((regressor.predict(other) - truth) ** 2))
         assert sound < 0.75 * misled
-
-
-def test_the_number_of_rows_picks_the_solution_unless_it_is_stated(monkeypatch):
-    monkeypatch.setattr("training.regressors.lssvm.MOST_EXACT_ROWS", 100)
-    few, many = curve(100)[:2], curve(101)[:2]
-    assert LSSVM(centres=10).fit(*few).fitted_settings().startswith("exact, 100 centres")
-    assert LSSVM(centres=10).fit(*many).fitted_settings().startswith("fixed-size, 10 centres")
-    stated = LSSVM(solution="exact").fit(*many)
-    assert stated.fitted_settings().startswith("exact, 101 centres")
-    assert stated.learning_curve_parameters() is None
-    fixed = LSSVM(solution="fixed-size", centres=10).fit(*few).learning_curve_parameters()
-    assert fixed["solution"] == "fixed-size"

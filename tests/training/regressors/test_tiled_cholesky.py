@@ -21,8 +21,3 @@ def test_solution_and_diagonal_of_the_inverse_are_those_of_the_whole_matrix(rows
     np.testing.assert_allclose(
         factor.inverse_diagonal(no_progress), np.diag(inverse), rtol=1e-9, atol=1e-11
     )
-
-
-def test_a_matrix_that_is_not_positive_definite_is_an_error():
-    with pytest.raises(np.linalg.LinAlgError, match="not positive definite"):
-        TiledCholesky.of(np.zeros((10, 1)), 1.0, -2.0, no_progress)

@@ -38,13 +38,6 @@ def test_the_system_has_residuals_over_noise(wheel_posterior, session, sets):
         assert found == pytest.approx(values / np.hypot(std, response.error[k]), abs=2e-3)
 
 
-def test_a_channel_that_was_not_measured_has_no_row(wheel_posterior, session, sets):
-    torque_only = int(np.argmax(sets.readings["sinkage_std"][:, 0] > 1e5))
-    found = graph_outputs(session, wheel_posterior.response, sets, torque_only)
-    assert len(found["memory_out"]) == 6
-    assert found["counted_out"].tolist() == [6.0, 6.0, 6.0]
-
-
 def test_common_errors_are_integrated_out_of_the_likelihood():
     rng = np.random.default_rng(0)
     a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 3)), rng.normal(size=5)
