@@ -4,13 +4,11 @@ import importlib
 import re
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from soilml import read_case, read_table
+from soilml import read_case
 from soilml.cli import main
 from soilml.cli.main import COMMANDS
-from soilml.io.read_table import RUNS
 from soilml.log_import import read_map
 
 ROOT = Path(__file__).parents[1]
@@ -99,33 +97,11 @@ def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypa
     assert main(["train", "spec.toml", "data.parquet", "model.onnx"]) == 0
 
 
-def test_the_recipe_of_my_wheel_is_valid(tmp_path):
-    from datagen.recipe import read_recipe
-
-    (tmp_path / "recipe.toml").write_text(blocks("docs/how-to/train-my-wheel.md", "toml")[0])
-    recipe = read_recipe(tmp_path / "recipe.toml")
-    assert recipe.rows == 60000
-
-
-def test_the_prior_of_bearing_is_valid(tmp_path):
-    model = blocks("docs/model-file.md", "toml")[0]
-    (bearing,) = blocks("docs/how-to/priors-for-bearing.md", "toml")
-    inside = bearing.removeprefix("[soil.prior]\n")
-    (tmp_path / "model.toml").write_text(model.replace("[soil.prior]", "[soil.prior]\n" + inside))
-    assert {"kphi", "n"} < set(read_case(tmp_path / "model.toml").prior)
-
-
 def test_the_map_of_a_log_is_valid(tmp_path):
     (tmp_path / "map.toml").write_text(blocks("docs/import.md", "toml")[0])
     (wheel,) = read_map(tmp_path / "map.toml").wheels
     assert wheel.channels["motor_current"].torque_constant.relative == pytest.approx(0.03)
     assert len(wheel.channels) == 6
-
-
-def test_the_table_of_runs_is_valid(tmp_path):
-    (tmp_path / "runs.csv").write_text(blocks("docs/runs.md", "csv")[0])
-    table = read_table(tmp_path / "runs.csv", RUNS)
-    assert np.isnan(table["drawbar_pull_N"]).all()
 
 
 def test_an_effect_of_ones_own_pulls_back(tmp_path, capsys):
@@ -142,12 +118,6 @@ def test_an_effect_of_ones_own_pulls_back(tmp_path, capsys):
     assert main(command) == 0
     without = float(capsys.readouterr().out.splitlines()[1].split(",")[3])
     assert without - with_drag == pytest.approx(2.0)
-
-
-def test_the_question_of_a_design_is_that_of_the_example():
-    (toml,) = blocks("docs/how-to/choose-wheels.md", "toml")
-    example = (ROOT / "examples/design/rover.toml").read_text()
-    assert toml == "".join(line for line in example.splitlines(keepends=True)[1:])
 
 
 @pytest.mark.long

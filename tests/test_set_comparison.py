@@ -1,7 +1,6 @@
 """Scores of a file against the exact posterior, on estimates whose scores are known."""
 
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,6 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 from set_comparison import (
     GaussianEstimates,
     PosteriorComparison,
-    pool_comparisons,
     uniformity_p_values,
 )
 
@@ -72,27 +70,6 @@ def test_intervals_that_are_too_narrow_have_low_coverage():
     found = comparison(width=0.5)
     assert np.all(found.coverage90()[0] < 0.65) and found.joint_coverage90[0] < 0.5
     assert found.joint_coverage90[1] > 0.88
-
-
-def test_the_gap_is_the_difference_of_log_densities():
-    assert comparison().log_density_gap == pytest.approx((0.3, 0.0), abs=1e-12)
-
-
-def test_sets_that_are_not_answered_do_not_count():
-    found = comparison()
-    far = replace(found.estimates, mean=found.estimates.mean + 1e6 * (np.arange(4000) < 9)[:, None])
-    answered = replace(far, answered=np.arange(4000) >= 9)
-    assert np.all(replace(found, estimates=far).rmse_ratio[0] > 1e3)
-    assert np.all(replace(found, estimates=answered).rmse_ratio[0] == 1.0)
-
-
-def test_pooling_the_parts_restores_the_comparison():
-    found = comparison(error=0.3)
-    first = found.conditions["first"]
-    again = pool_comparisons([found.subset(first), found.subset(~first)])
-    assert np.array_equal(again.estimates.mean, found.estimates.mean)
-    assert np.array_equal(again.conditions["first"], first)
-    assert again.rmse_ratio[0] == pytest.approx(found.rmse_ratio[0])
 
 
 def test_uniform_ranks_pass_the_test_and_others_do_not():

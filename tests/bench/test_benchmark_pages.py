@@ -42,22 +42,6 @@ def test_sections_stand_in_their_order_and_one_is_replaced(pages):
     assert f"# {TITLES['sets']}\n\n**Machine.** machine B\n" in page_file("sets", pages).read_text()
 
 
-def test_a_section_that_is_no_longer_measured_leaves_its_page(pages):
-    write_page("sets", ["Accuracy", "New"], {"New": "first"}, pages)
-    assert list(sections("sets", pages)) == ["Accuracy", "New"]
-
-
-def test_the_first_page_keeps_its_summary_and_the_machine_that_measured_it(pages):
-    write_page("sets", [*ORDER, "New"], {"New": "first"}, pages)
-    write_first_page(["speed", "accuracy", "new"], "", pages)
-    text = page_file("", pages).read_text()
-    assert sections("", pages) == {"At a glance": "| what | 1 |"}
-    assert "machine A" in text and "machine B" not in text
-    assert "| Speed; Accuracy; New |" in text and "speed, accuracy, new." in text
-    write_first_page(["speed"], "| what | 2 |", pages)
-    assert "machine B" in page_file("", pages).read_text()
-
-
 def test_the_pages_of_the_repository_are_as_they_are_written(monkeypatch):
     """Each page has a title of `TITLES`, and the first one names its sections."""
     first = page_file("").read_text()

@@ -2,28 +2,22 @@
 
 import json
 import sys
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from datagen.blind_sets import Plan, draw_blind_set
-from datagen.blind_sets.plans import benchmark_plans
-from soilml.config.case import read_case
-from soilml.io.table import Table
+from datagen.blind_sets import Plan
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
-import gap_case
 import gap_enlarged
 import gap_pages
 import gap_records
 import gap_reliability
 import gap_table
 from gap_case import judged
-from gap_separation import separation
 
 
 def record(**changed):
@@ -74,15 +68,6 @@ def test_the_right_cause_counts_where_the_runs_can_name_it():
     assert figure(sets, name.replace("0%", "1%")).met is None
 
 
-def test_unique_is_one_explanation_that_is_stated():
-    assert gap_records.unique(record(status="partly-named"))
-    assert gap_records.unique(record(status="form-open"))
-    assert not gap_records.unique(record(status="class"))
-    assert not gap_records.unique(record(cause_set=[("slip-sinkage",), ("grousers",)]))
-    assert not gap_records.unique(record(status="suspected"))
-    assert not gap_records.unique({"status": "crash"})
-
-
 def test_names_where_nothing_was_hidden_are_false():
     named = {"status": "named", "cause_set": [("grousers",)]}
     sets = [null() for _ in range(30)] + [null(tier="D", discrepancy=0.02, **named)]
@@ -95,16 +80,6 @@ def test_names_where_nothing_was_hidden_are_false():
     assert figure(sets, "falsely unique: cause outside").measured.endswith("1/2")
     assert not figure(sets, "falsely unique: cause outside").met
     assert figure(sets, "right when unique, all tiers").measured.endswith("0/3")
-
-
-def test_one_load_is_judged_by_its_suspects():
-    order = [("grousers",), ("torque-gain",), ("slip-sinkage",), ("slope",)]
-    one = record(design="one-load", status="suspected", cause_set=[], suspects=order)
-    sets = [one, one | {"suspects": order[2:]}, one | {"suspects": order[3:]}]
-    assert figure(sets, "one load, SNR >= 3: truth first").measured.endswith("1/3")
-    third = figure(sets, "one load, SNR >= 3: truth in the first three")
-    assert third.measured.endswith("2/3") and not third.met
-    assert gap_records.suspected(record(design="one-run"), 1)  # a claimed name counts as first
 
 
 def test_exact_probabilities_deviate_by_chance_alone_and_wrong_ones_by_more():
@@ -147,35 +122,6 @@ def test_probabilities_are_judged_by_all_their_bins_and_by_what_chance_does():
     assert np.isnan(gap_reliability.calibration_error([record()])[0])
 
 
-def test_the_mix_that_the_prior_expects_has_more_sets_without_a_cause():
-    hidden = [record(probabilities={"slip-sinkage": 0.6, "slope": 0.1}) for _ in range(90)]
-    empty = [null(probabilities={"slip-sinkage": 0.5, "slope": 0.1}) for _ in range(10)]
-    low, high = gap_reliability.wide_bins(*gap_reliability.statements([*hidden, *empty]))
-    assert high.frequency == pytest.approx(0.9) and low.frequency == 0.0
-    _, mixed = gap_reliability.at_expected_mix([*hidden, *empty])
-    assert mixed.frequency == pytest.approx(1.0 - np.exp(-1.0)) and mixed.count == 100
-    assert mixed.stated == pytest.approx(0.6 - 0.1 * np.exp(-1.0))
-    assert gap_reliability.at_expected_mix(hidden) == []
-    name = "stated probabilities, the same at the mix"
-    assert figure([*hidden, *empty], name).measured == "0.100"
-
-
-def test_sets_that_were_added_count_in_the_figures_of_their_group_alone():
-    large, one_load = gap_enlarged.LARGE, gap_enlarged.ONE_LOAD
-    more = [record(discrepancy=0.04, added_to=large) for _ in range(3)]
-    suspects = {"status": "suspected", "cause_set": [], "suspects": [("slip-sinkage",)]}
-    more += [record(design="one-load", added_to=one_load, **suspects)]
-    found = [record(), *more]
-    name = "right cause in the cause set, SNR >= 3, discrepancy "
-    assert figure(found, name + "4%").measured.endswith("3/3")
-    assert figure(found, name + "0%").measured.endswith("1/1")
-    assert figure(found, "one load, SNR >= 3: truth first").measured.endswith("1/1")
-    assert figure(found, "one load, signature of 6 sigma: truth first").measured == "-"
-    assert figure(found, "`unknown`").measured.endswith("0/1")
-    page = gap_pages.text(found)
-    assert "1 sets of at most" in page and "4 more plans" in page
-
-
 def test_a_group_is_enlarged_until_it_has_enough_sets():
     plan = Plan("A", "slip-sinkage", 1.0, 0.02, 8, "dry-sand", 3, 0, discrepancy=0.04)
     plans = [replace(plan, seed=i) for i in range(40)]
@@ -189,24 +135,6 @@ def test_a_group_is_enlarged_until_it_has_enough_sets():
     assert {group for _, group in found} == {gap_enlarged.LARGE} and len(found) == 8
     assert all(snr(p) > 3.0 and p not in sample and p.discrepancy == 0.04 for p, _ in found)
     assert len(list(gap_enlarged.added(plans, sample, 99, snr))) == 18  # as far as there are any
-
-
-def test_further_draws_have_plans_of_few_rows_and_one_load_that_no_other_seed_has():
-    further = gap_enlarged.further_plans((10, 11))
-    few = [p for p in further if p.design == "few-rows"]
-    assert len(few) == 4 * 48 and len(further) > len(few)
-    one_load = gap_enlarged.GROUPS[gap_enlarged.ONE_LOAD]
-    assert all(one_load(p) for p in further if p not in few)
-    assert len({p.seed for p in further}) == len(further)
-    assert not {p.seed for p in further} & {p.seed for s in (10, 11) for p in benchmark_plans(s)}
-
-
-def test_statements_are_those_of_every_effect_that_was_tested():
-    stated, true = gap_reliability.statements([record(), null(), {"status": "crash"}])
-    np.testing.assert_array_equal(stated, [0.01, 0.01, 0.99])
-    np.testing.assert_array_equal(true, [False, False, True])
-    assert gap_reliability.equal_bins(stated, true) == []
-    assert figure([record()], "stated probabilities, largest deviation, bins").met is None
 
 
 def test_region_soil_and_time_are_compared_with_their_gates():
@@ -239,31 +167,6 @@ def test_pages_are_written_from_few_records_and_from_kept_ones(tmp_path):
     assert (tmp_path / "reliability.png").stat().st_size > 1000
 
 
-def separated(**changed):
-    """What the runs of a plan show of its cause."""
-    values = {"tier": "A", "cause": "slip-sinkage", "size": 1.0, "noise": 0.01, "runs": 8}
-    values |= {"soil_family": "dry-sand", "free": 3, "seed": 7}
-    drawn = draw_blind_set(Plan(**(values | changed)))
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "model.toml"
-        file.write_text(drawn.model)
-        case = read_case(file)
-    return separation(case, Table(dict(drawn.columns)), drawn.truth)
-
-
-@pytest.mark.slow
-def test_separation_falls_with_noise_discrepancy_and_fewer_channels():
-    plain = separated()
-    assert plain.snr > 10.0 and plain.signal > plain.snr
-    assert separated(noise=0.02).snr == pytest.approx(plain.snr / 2.0, rel=0.3)
-    steps = [separated(discrepancy=d).snr for d in (0.01, 0.02, 0.04)]
-    assert plain.snr > steps[0] > steps[1] > steps[2] > 0.0
-    assert separated(tier="S", cause="torque-gain").snr < 1.0  # just like grousers
-    assert separated(tier="N0", cause="", size=0.0).signal == 0.0
-    assert separated(design="unequal-soils").signal < plain.signal
-    assert separated(tier="M", cause="slip-sinkage+bulldozing").snr <= plain.signal
-
-
 @pytest.mark.slow
 def test_a_set_is_analysed_and_compared_with_its_truth():
     plan = Plan("A", "slip-sinkage", 1.0, 0.02, 8, "dry-sand", 3, 7, discrepancy=0.01)
@@ -274,14 +177,3 @@ def test_a_set_is_analysed_and_compared_with_its_truth():
     assert found["region"]["soil"] > found["region"]["named"] > 0.0 or not found["cause_set"]
     (kept,) = gap_records.from_json(json.loads(json.dumps([found])))
     assert kept["truth"] == found["truth"] and kept["cause_set"] == found["cause_set"]
-
-
-def test_a_crash_is_recorded(monkeypatch):
-    def fails(*_, **__):
-        raise ZeroDivisionError("on purpose")
-
-    monkeypatch.setattr(gap_case, "gap", fails)
-    found = judged((0, Plan("N0", "", 0.0, 0.02, 4, "dry-sand", 3, 7)))
-    assert found["status"] == "crash" and "on purpose" in found["sentence"]
-    assert figure([found], "analysis ended by an error").measured.endswith("1/1")
-    assert "crash" in gap_pages.text([found])

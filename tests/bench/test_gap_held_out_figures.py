@@ -4,19 +4,13 @@ import json
 import sys
 from pathlib import Path
 
-import pytest
-
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import gap
-import gap_case
 import gap_families
 import gap_held_out
-import gap_hybrid
-import gap_pages
-import gap_table
 
-from datagen.blind_sets.plans import Plan, benchmark_plans
+from datagen.blind_sets.plans import benchmark_plans
 
 METHODS = dict.fromkeys(gap_held_out.METHODS, 4.0)
 
@@ -49,15 +43,6 @@ def figure(found, start):
     """The one figure whose name starts so."""
     (one,) = [f for f in found if f.name.startswith(start)]
     return one
-
-
-def test_a_figure_that_grows_is_counted_wherever_it_is_shown():
-    calm = gap_held_out.figures([record(), record(gap={"train": (1.0, 1.0)})])
-    assert figure(calm, "figures that grow").met
-    grown = [record(gap={"train": (10.0, 1.0), "held_out_runs": (6.0, 12.3)})]
-    assert figure(gap_held_out.figures(grown), "figures that grow").measured.endswith("1/2")
-    beside = [record(beside_remainder={"held_out_runs": (6.0, 7.0)})]
-    assert not figure(gap_held_out.figures(beside), "figures that grow").met
 
 
 def test_predictions_are_compared_where_the_soil_alone_leaves_something():
@@ -99,40 +84,6 @@ def test_a_law_of_the_same_family_is_right_and_any_other_is_false():
     assert figure(gap_families.figures([mixed]), "falsely unique: another").measured.endswith("1/1")
 
 
-def test_a_firm_base_is_a_right_name_of_a_stiff_layer():
-    relatives = gap_case._relatives("C", "stiff-layer", ("stiff-layer",))
-    assert relatives == ["firm-base"] and gap_case._relatives("C", "crust", ("crust",)) == []
-    assert gap_case._relatives("T", "trend/friction", ("trend",)) == ["friction-drift"]
-    layer = record(tier="C", truth=("stiff-layer",), catalogued=False, relatives=relatives)
-    sets = [layer | {"cause_set": [(name,)]} for name in ("firm-base", "slope")]
-    found = list(gap_families.figures(sets))
-    assert figure(found, "falsely unique: tiers L, T and C").measured.endswith("1/2")
-    assert figure(gap_table.figures(sets), "falsely unique: cause outside").measured.endswith("1/2")
-    assert "A stiff layer of tier C counts as named rightly" in gap_pages.text(sets, [])
-
-
-def test_few_rows_and_torque_alone_have_figures_of_their_own():
-    order = [("grousers",), ("slip-sinkage",)]
-    few = record(design="few-rows", status="suspected", cause_set=[], suspects=order)
-    found = list(gap_families.figures([few, few | {"suspects": order[::-1]}, few | {"snr": 1.0}]))
-    assert figure(found, "5 to 10 rows at one load, SNR >= 3: truth first").measured.endswith("1/2")
-    three = figure(found, "5 to 10 rows at one load, SNR >= 3: truth in the first three")
-    assert three.met and three.measured.endswith("2/2")
-    more = few | {"suspects": order, "added_to": "few-rows"}
-    found = list(gap_families.figures([few, more, law(added_to="few-rows")]))
-    assert figure(found, "5 to 10 rows at one load, SNR >= 3: truth first").measured.endswith("0/2")
-    assert figure(found, "5 to 10 rows, signature of 6 sigma: truth first").measured.endswith("0/1")
-    assert figure(found, "a law differs").measured == "-"
-    torque = {"design": "torque-alone", "cause_set": [], "status": "no-gap"}
-    sets = [record(**torque), record(**torque, signal=1.0), record(design="torque-alone")]
-    found = list(gap_families.figures(sets))
-    assert figure(found, "torque alone, signature").measured.endswith("1/2")
-    page = gap_pages.text([few, law(), *sets], [record()])
-    assert "| before |" in page and "## Other laws" in page and "## Held-out rows" in page
-    usual = page.split("right cause in the cause set, SNR >= 3, discrepancy 0%")[1]
-    assert usual.split("|")[2].strip() == "-"  # none of these sets is of the usual kind
-
-
 def test_records_of_the_same_state_are_not_made_again(tmp_path, monkeypatch):
     plans = benchmark_plans(0)[:3]
     made = []
@@ -155,48 +106,8 @@ def test_records_of_the_same_state_are_not_made_again(tmp_path, monkeypatch):
     assert {s["state"] for s in json.loads(Path(file).read_text())} >= {"another"}
 
 
-def test_a_sample_has_every_discrepancy_of_the_causes_of_a_tier():
-    sample = gap.thinned(benchmark_plans(0), 4)
-    assert len(sample) == pytest.approx(len(benchmark_plans(0)) / 4, abs=1)
-    for tier in "ABCS":
-        levels = {p.discrepancy for p in sample if p.tier == tier and p.design == "sweep"}
-        assert levels == {0.0, 0.01, 0.02, 0.04}
-    assert gap.thinned(list("abcdefghi"), 3) == ["a", "e", "i"]
-    assert gap.thinned(list("abc"), 1) == ["a", "b", "c"]
-
-
 def heavier(**distances):
     """A record of the comparison of rows kept back."""
     usual = {"soil": 4.0, "effect": 2.0, "hybrid": 2.0, "process": 8.0}
     usual |= {"soil + process": 3.0}
     return {"discrepancy": 0.02, "kept": usual, "heavier": usual | distances}
-
-
-def test_how_often_a_model_is_no_worse_than_the_better_of_two_is_said():
-    sets = [heavier(), heavier(hybrid=2.4), heavier(hybrid=9.0, process=2.0)]
-    said = gap_hybrid.kept_promise(sets)
-    words = "The hybrid is no worse in 33%, at most 5% worse in 33%, at most 25% worse in 67%."
-    assert words in said
-    assert "The better one is 0.25 times" in said
-    assert gap_hybrid.text(sets).endswith(said)
-
-
-def test_a_plan_is_told_from_every_other():
-    plan = benchmark_plans(0)[0]
-    other = Plan(**{**gap.asdict(plan), "seed": plan.seed + 1})
-    assert gap._key(gap.asdict(plan)) != gap._key(gap.asdict(other))
-    with pytest.raises(KeyError):
-        gap._key({"tier": "A"})
-
-
-def test_a_page_names_the_command_that_made_its_records(monkeypatch):
-    def said(*words):
-        monkeypatch.setattr(sys, "argv", ["bench/gap.py", *words])
-        return gap._command(gap._arguments())
-
-    assert (
-        said("--every", "3", "--enlarge", "60", "--write", "--keep", "a.json") == "`make bench-gap`"
-    )
-    other = said("--every", "30", "--tier", "L", "--seed", "1", "2")
-    assert other == "`python bench/gap.py --every 30 --seed 1 2 --tier L --write`"
-    assert "Written by another: 1 sets" in gap_pages.text([record()], (), "another")

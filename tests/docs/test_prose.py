@@ -59,37 +59,5 @@ def test_few_sentences_are_long():
     assert sum(s.words > 30 for s in every) < 0.02 * len(every)
 
 
-PAGE = """---
-kernelspec: none
----
-# A heading that is not counted, whatever its length may be
-
-One two three. Four `code. With. Points.` five; see eq. 4 of Wong et al. 1989
-([a link](page.md)). *Six* seven eight.
-
-| a table | is skipped |
-- An item
-  of two lines.
-1. Another item. It ends.
-
-```
-code is skipped. All of it.
-```
-
-    indented code is skipped
-"""
-
-
-def test_sentences_are_read_from_paragraphs_and_items():
-    found = [(s.line, s.words) for s in sentences(PAGE)]
-    assert found == [(6, 3), (6, 13), (6, 3), (10, 5), (12, 2), (12, 2)]
-
-
 def test_the_readme_has_few_links():
     assert len(re.findall(r"\]\(", (ROOT / "README.md").read_text())) <= 25
-
-
-def test_house_words_are_found():
-    assert house_words("their 90 % intervals often hold, as usual") != []
-    assert len(house_words("Each parameter is told; a fault is mended.")) == 2
-    assert house_words("A file holds one subject.") == []

@@ -67,19 +67,6 @@ def test_a_wheel_that_is_stuck_tells_on_which_outcomes_it_is():
     assert remaining_fraction(samples, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
 
 
-def test_less_noise_never_leaves_more_and_endless_noise_leaves_all():
-    samples = line(800)
-    found = [
-        remaining_fraction(samples, samples.u[:, 0], std)
-        for std in (1e3, 1.0, 0.3, 0.1, 0.03, 0.01)
-    ]
-    assert (
-        found[0] == pytest.approx(samples.remaining_fraction[0], rel=0.02)
-        and found[0] <= samples.remaining_fraction[0]
-    )
-    assert (np.diff(found) < 0).all()
-
-
 @pytest.mark.slow
 def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
     """Against importance sampling with twenty times the samples, simulated readings apart."""

@@ -40,10 +40,3 @@ def test_the_bracket_is_that_of_the_first_of_several_crossings():
     _, _, exists, peak = first_bracket(lambda x: np.sin(x) - 1.5, grid)
     assert not exists.any()
     assert abs(np.sin(grid[peak[0], 0]) - 1.0) < 1e-3
-
-
-def test_the_peak_is_that_before_the_crossing():
-    grid = np.linspace(0.1, 9.0, 200)[:, None]
-    low, _, exists, peak = first_bracket(lambda x: np.sin(x) + 0.1 * x - 1.2, grid)
-    assert exists.all() and low[0] > 6.0
-    assert abs(grid[peak[0], 0] - np.pi / 2) < 0.2

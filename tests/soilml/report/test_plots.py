@@ -170,19 +170,6 @@ def test_results_draw_themselves(make, shape, said, case):
         result.plot(ax=Figure().subplots(5, 1))
 
 
-def test_shaded_priors_are_those_that_are_given(case):
-    axes = fit(case).plot(prior=case.prior)
-    low, high = axes[1].get_xlim()
-    assert low < 25.0 and high > 45.0  # the prior of the friction angle, in degrees
-    assert len(axes[1].patches) == 1 and not fit(case).plot()[1].patches
-    matplotlib.pyplot.close("all")
-
-
-def test_an_unknown_part_of_a_gap_report_is_refused(case):
-    with pytest.raises(InputError, match=r"this report has train"):
-        gap(case).plot(part="held_out")
-
-
 @pytest.mark.slow
 def test_the_backend_is_left_to_the_user():
     """Reports need none; what the user draws after them has the one of MPLBACKEND."""
