@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ros2_messages import GIVEN, LOAD, MODEL, RADIUS, ROOT, SAND, SECOND, contents, drive, play
+from ros2_messages import GIVEN, LOAD, MODEL, ROOT, SAND, SECOND, contents, drive, play
 
 from soilml import Estimator
 from soilml.errors import InputError, ModelFileError
@@ -16,9 +16,7 @@ from soilml.errors import InputError, ModelFileError
 sys.path.insert(0, str(ROOT / "examples" / "ros2"))
 
 from soil_estimator.logic import Level, SoilLogic
-from soil_estimator.rows import RowCollector
 from soil_estimator.settings import settings_of
-from soil_estimator.slip import slip_of
 
 #: Rows of a drive of a minute: the last stretch is not known to be complete.
 WHOLE = 59
@@ -184,20 +182,6 @@ def test_load_from_its_topic_and_a_wheel_beside_the_centre():
     plain = play(logic(), contents(drive(10)))
     assert rows_of(found) == pytest.approx(rows_of(plain))
     assert {report.values["row_load"] for report in found} == {LOAD + 2.0}
-
-
-def samples(wheel_speed=1.0, torque=1.0, speed=0.1):
-    return {"wheel_speed": wheel_speed, "torque": torque, "speed": speed}
-
-
-def test_slip_of_driving_and_braking_wheels_forward_and_backward():
-    assert slip_of(0.2, 0.15) == pytest.approx(0.25)
-    assert slip_of(0.15, 0.2) == pytest.approx(-0.25)
-    rows = RowCollector(RADIUS, LOAD)
-    for i in range(2):
-        rows.add(SECOND + i * SECOND // 2, samples(-1.0, -2.0, -0.75 * RADIUS))
-    (found,) = rows.add(5 * SECOND // 2, samples())
-    assert found.row == pytest.approx({"slip": 0.25, "torque": 2.0, "load": LOAD})
 
 
 @pytest.mark.parametrize(

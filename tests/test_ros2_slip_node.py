@@ -122,27 +122,3 @@ def test_a_wild_reading_is_flagged_and_the_next_rows_are_answered(
     assert len(twists) == len(told) - (0 if answered else 2)
     for twist in twists:
         assert np.isfinite([twist.twist.linear.x, *twist.covariance]).all()
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"model": None}, "the parameter model is missing"),
-        ({"joints": ["a"]}, "names 1; "),
-        ({"joint_signs": [1.0, 1.0, 2.0, 1.0]}, "other numbers than 1.0 and -1.0"),
-        ({"wheel_radius": 0.0}, "wheel_radius is 0; it must be above zero"),
-        ({"wheel_radius": 0.2}, "wheel_radius is 0.2; "),
-        ({"wheel_radius": "wide"}, "wheel_radius is 'wide'; needed: radius of the wheels, m"),
-        ({"joints": "flfr"}, "the parameter joints is 'flfr'; needed is a list"),
-        ({"joints": 4}, "the parameter joints is 4; needed is a list"),
-        ({"joints": ["fl", "fr", "fl", "rr"]}, "the parameter joints names a joint twice"),
-        ({"joint_signs": [1.0, 1.0, "x", 1.0]}, "the parameter joint_signs is 'x'; needed: "),
-        ({"period": 1e300}, "the parameter period is 1e+300 s; needed is a time above zero"),
-        ({"model": 3}, "the parameter model is 3; needed is a text"),
-        ({"model": str(ROOT / "exported" / "wheel.onnx")}, "no file of soilml export-slip"),
-    ],
-)
-def test_a_wrong_parameter_ends_it_with_one_line(node_module, capsys, given, said):
-    assert node_module(**given).main() == 2
-    told = capsys.readouterr().err
-    assert told.startswith("slip_speed: ") and said in told and told.count("\n") == 1

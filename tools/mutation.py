@@ -43,8 +43,9 @@ ROOMS = {
     "identification": ("soilml/identification", "soilml/identification", "/plot"),
     "onboard": (
         "soilml/onboard",
-        "soilml/onboard commands/test_contract.py commands/test_outputs.py commands/test_estimate_case.py"
-        " test_flags.py test_onnx_interface.py test_ros2_example.py training/test_trained_slip.py",
+        "soilml/onboard commands/test_contract.py commands/test_outputs.py"
+        " commands/test_estimate_case.py test_flags.py test_onnx_interface.py test_ros2_example.py"
+        " training/test_trained_slip.py",
         "",
     ),
     "gap": ("soilml/gap", "soilml/gap commands/test_gap_command.py", "/html/|_figure"),

@@ -13,7 +13,6 @@ from datagen.blind_sets import Plan
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import gap_enlarged
-import gap_pages
 import gap_records
 import gap_reliability
 import gap_table
@@ -82,21 +81,6 @@ def test_names_where_nothing_was_hidden_are_false():
     assert figure(sets, "right when unique, all tiers").measured.endswith("0/3")
 
 
-def test_exact_probabilities_deviate_by_chance_alone_and_wrong_ones_by_more():
-    generator = np.random.default_rng(0)
-    p = generator.random(4000) ** 2
-    stated = np.sort(p)
-    true = generator.random(4000) < stated
-    small, wide = gap_reliability.equal_bins(stated, true), gap_reliability.wide_bins(stated, true)
-    assert {b.count for b in small} == {50} and len(small) == 80
-    assert sum(b.count for b in wide) == 4000 and min(b.count for b in wide) >= 50
-    assert gap_reliability.largest(wide) < 0.05
-    usual, seldom = gap_reliability.chance(small)
-    assert 0.05 < usual < seldom and gap_reliability.largest(small) < 1.2 * seldom
-    sure = gap_reliability.wide_bins(stated, generator.random(4000) < stated**2)
-    assert gap_reliability.largest(sure) > 0.15
-
-
 def test_probabilities_are_judged_by_all_their_bins_and_by_what_chance_does():
     generator = np.random.default_rng(1)
     stated = np.sort(generator.random(3000) ** 2)
@@ -151,20 +135,6 @@ def test_region_soil_and_time_are_compared_with_their_gates():
     assert not figure(slow, name).met and figure(slow[:2], name).met
     doubled = [record(seconds=1.8, solves=250_000.0)]
     assert figure(doubled, name).measured.startswith("0.90")
-
-
-def test_pages_are_written_from_few_records_and_from_kept_ones(tmp_path):
-    sets = [record(), null(), record(status="crash", cause_set=[], seconds=9.0)]
-    page = gap_pages.text(sets)
-    assert "| falsely unique: null |" in page and "nan" not in page.split("## Held-out")[0]
-    kept = [{k: list(v) if isinstance(v, tuple) else v for k, v in s.items()} for s in sets]
-    assert gap_pages.text(gap_records.from_json(kept)) == page
-    many = [record(probabilities={"slip-sinkage": p}) for p in np.linspace(0.0, 1.0, 120)]
-    assert "reliability" in gap_pages.text(many)
-    gap_reliability.save_picture([null()], tmp_path / "reliability.png")
-    assert not (tmp_path / "reliability.png").exists()
-    gap_reliability.save_picture(many, tmp_path / "reliability.png")
-    assert (tmp_path / "reliability.png").stat().st_size > 1000
 
 
 @pytest.mark.slow

@@ -9,14 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import MODEL
 
-from soilml import Estimator
 from soilml.cli import main
-from soilml.experiment_design.advice_after_results import advice_after_estimate
-from soilml.remarks import texts
 
 pytestmark = pytest.mark.slow
 
@@ -123,19 +119,6 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     capsys.readouterr()
     assert main([*command, "--by", "run"]) == 0
     assert "advice" in json.loads(capsys.readouterr().out)["runs"]["a"]
-
-
-@pytest.mark.parametrize("rows", [1, 4, 40])
-def test_short_and_long_runs_at_one_load_ask_for_another(whole_file, rows):
-    estimator = Estimator.load(whole_file)
-    torque = 2.9 * (1.0 + 0.02 * np.random.default_rng(1).standard_normal(rows))
-    readings = {"slip": np.full(rows, 0.2), "load": np.full(rows, 60.0), "torque": torque}
-    one = estimator.run(**readings)
-    said = texts(advice_after_estimate(estimator, one.mean, one.covariance, readings))
-    cohesion = next(line for line in said if line.startswith("cohesion"))
-    left, again = (int(share) for share in re.findall(r"leaves (\d+)%", cohesion))
-    assert left < again - 5 and " at 60 N" not in cohesion.split(";")[0]
-    assert ("this row," if rows == 1 else "these rows,") in cohesion
 
 
 def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model):

@@ -50,15 +50,6 @@ def test_both_tables_in_either_order_give_a_model_file_that_identify_takes(table
     assert main(["identify", "soil.toml", "runs.csv", "--method", "nonlinear"]) == 0
 
 
-@pytest.mark.parametrize("table", ["plates.csv", "shear.csv"])
-def test_one_table_gives_a_soil_section_and_says_what_is_missing(tables, table, capsys):
-    assert main(["bevameter", table, "--out", "soil.toml", "--picture", "soil.png"]) == 0
-    text = (tables / "soil.toml").read_text()
-    assert "[soil.prior]" in text and "[gear]" not in text
-    missing = "cohesion" if table == "plates.csv" else "kc"
-    assert f"soil.toml lacks {missing}" in capsys.readouterr().err
-
-
 def test_bad_shear_tables_end_with_one_line(tables, capsys):
     for old, new, said in (
         ("normal_stress_Pa", "normal_stress_kPa", "name the column normal_stress_Pa"),

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.config.measurement_noise import Noise
 from soilml.io.text_tables import csv_text
 from soilml.systems.climbing import SimulatedRover
-from soilml.systems.climbing.tables import climb_tables, read_climb_data
+from soilml.systems.climbing.tables import climb_tables
 
 ROVER = """\
 [rover]
@@ -85,28 +84,12 @@ def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
         assert low <= middle <= high
 
 
-def test_tables_are_read_back_as_written(folder, tables):
-    data = read_climb_data("runs.csv", "stress.csv", Noise(share=0.05))
-    again = climb_tables(data.climbs, rim_speed=0.00915)
-    for name, values in tables[0].items():
-        if isinstance(values[0], str):
-            assert again[0][name] == values
-        else:
-            np.testing.assert_allclose(again[0][name], values, rtol=1e-8, atol=1e-12)
-    assert len(data.front) == len(data.rear) == 6 + 8
-
-
 def changed(table, name, change):
     return {**table, name: [change(v) for v in table[name]]}
 
 
 def without(table, name):
     return {n: v for n, v in table.items() if n != name}
-
-
-def only(table, keep):
-    kept = [keep(run) for run in table["run"]]
-    return {n: [v for v, k in zip(c, kept, strict=True) if k] for n, c in table.items()}
 
 
 def of_run(table, name, run, value):
@@ -186,9 +169,3 @@ def test_invalid_rover_files_are_refused_in_one_line(folder, capsys, fault):
     text, message = ROVER_FAULTS[fault]
     (folder / "rover.toml").write_text(text)
     refused(folder, capsys, message)
-
-
-def test_too_few_slopes_are_refused_with_the_number_needed(folder, tables, capsys):
-    (folder / "rover.toml").write_text(ROVER.split("[soil]")[0])
-    (folder / "runs.csv").write_text(csv_text(only(tables[0], lambda run: run[0] == "0")))
-    refused(folder, capsys, "one slope for 3 parameters")

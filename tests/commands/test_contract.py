@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import MODEL, RECIPE
+from conftest import RECIPE
 
 from soilml.cli import main
 
@@ -117,23 +117,3 @@ def test_soils_and_effects_list_their_catalogues(capsys):
         assert name in listed
     assert main(["effects", "grousers"]) == 0
     assert "height" in capsys.readouterr().out
-
-
-def test_the_root_lists_every_command_in_the_order_of_work(capsys):
-    assert main(["--help"]) == 0
-    said = capsys.readouterr().out
-    places = [
-        said.index(f"    {c} ")
-        for c in ("soils", "simulate", "identify", "generate", "train", "estimate", "compare")
-    ]
-    assert places == sorted(places)
-
-
-def test_model_file_of_the_contract(tmp_path, capsys):
-    text = MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n'
-    text = text.replace("[soil.prior]", "friction_angle = 0.60\n[soil.prior]")
-    (tmp_path / "m.toml").write_text(text)
-    command = ["simulate", str(tmp_path / "m.toml"), "--slip", "0.1,0.5", "--load", "60"]
-    assert main(command) == 0
-    first, last = rows_of(capsys.readouterr().out)
-    assert float(last["sinkage_m"]) > 1.4 * float(first["sinkage_m"])

@@ -51,23 +51,6 @@ def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
     assert "radius 0.15 m" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "case", "said"),
-    [
-        (WHEEL, "small.toml", "gear.radius 0.15, small.toml has 0.12"),
-        (KLS1, "model.toml", "gear.radius 0.085, model.toml has 0.15"),
-        (WHEEL, "effect.toml", "effects none, effect.toml has slip-sinkage"),
-        (ANY_WHEEL, "effect.toml", "has no effects, the model has slip-sinkage"),
-    ],
-)
-def test_another_wheel_is_refused_in_one_line(folder, capsys, file, case, said):
-    for rest in (["runs.csv"], []):
-        assert main(["estimate", file, *rest, "--case", case]) == 2
-        captured = capsys.readouterr()
-        assert said in one_line(captured.err) and not captured.out
-
-
 @pytest.mark.parametrize(("file", "case"), [(WHEEL, None), (ANY_WHEEL, "model.toml")])
 def test_a_table_of_another_wheel_is_refused(folder, capsys, file, case):
     text = RUNS.replace("torque_Nm", "torque_Nm,wheel_radius_m")
@@ -76,8 +59,3 @@ def test_a_table_of_another_wheel_is_refused(folder, capsys, file, case):
     assert main(command) == 2
     said = one_line(capsys.readouterr().err)
     assert "other.csv line 3, column wheel_radius_m: 0.12 given" in said and "0.15" in said
-
-
-def test_options_of_rows_need_rows(folder, capsys):
-    assert main(["estimate", WHEEL, "--by", "run"]) == 2
-    assert "RUNS.csv is missing" in one_line(capsys.readouterr().err)

@@ -44,13 +44,6 @@ def test_a_run_has_one_answer_with_errors_of_the_model(runs, capsys, whole_file)
     assert "errors of the model are included, of a size that follows from the residuals" in said
 
 
-def test_an_exact_model_is_an_option(runs, capsys, whole_file):
-    rows, said = answers(capsys, str(whole_file), "runs.csv", "--exact-model")
-    right = Estimator.load(whole_file).on(model_error=0.0).run(**runs["sound"])
-    assert float(rows["sound"]["cohesion_Pa_std"]) == pytest.approx(right["cohesion"][1], rel=1e-3)
-    assert "the model is taken as exact" in said
-
-
 def test_rows_out_of_range_are_set_aside_and_said(runs, capsys, whole_file):
     rows, said = answers(capsys, str(whole_file), "runs.csv")
     assert rows["far"]["rows_in_range"] == "13" and rows["far"]["in_range"] == "1"

@@ -199,19 +199,6 @@ def test_one_load_has_suspects_and_names_nothing(one_load):
     assert found["suspects"][0]["predictive_gain"] > 0.0
 
 
-def heavy(inputs, tmp_path):
-    text = (inputs / "runs.csv").read_text().splitlines()
-    text[3:3] = ["r9,0.3,100000,5.0,5.0,0.1"]
-    (tmp_path / "heavy.csv").write_text("\n".join(text) + "\n")
-    return str(inputs / "model.toml"), str(tmp_path / "heavy.csv")
-
-
-def test_a_row_is_named_where_it_stands_in_the_table(inputs, tmp_path, capsys):
-    files = heavy(inputs, tmp_path)
-    found = analysed(inputs, tmp_path, capsys, *files, "--holdout", "run=r0")
-    assert "line 4" in found["sentence"] or "row 3" in found["sentence"]
-
-
 def test_an_effect_of_ones_own_is_hidden_found_and_written(inputs, tmp_path, capsys):
     own = tmp_path / "own.py"
     own.write_text(OWN)

@@ -47,17 +47,6 @@ def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(fo
     assert not (folder / "n.json").exists()
 
 
-def test_a_blank_cell_is_no_group(folder, capsys, small_model):
-    (folder / "timed.csv").write_text(
-        "run,slip,load_N,torque_Nm,time_s\na,0.1,60,1.2,1\na,0.3,80,3.5,\n"
-    )
-    for command in (["identify", "model.toml"], ["estimate", str(small_model)]):
-        assert main([*command, "timed.csv", "--by", "time_s"]) == 2
-        captured = capsys.readouterr()
-        assert captured.err.count("\n") == 1 and captured.out == ""
-        assert "timed.csv line 3, column time_s: the cell is blank" in captured.err
-
-
 @pytest.mark.slow
 def test_all_runs_of_one_soil_are_one_set_of_readings(folder, capsys):
     """`--by all` gives what the same rows give as one run."""

@@ -114,14 +114,6 @@ def test_a_closed_standard_output_is_one_line(folder):
     assert (folder / "o.csv").read_text().startswith("slip,")
 
 
-@pytest.mark.parametrize("slip", ["0:0.6:1000000000", "0:0.6:20000", "0:0.6:" + "9" * 5000])
-def test_more_rows_than_memory_holds_are_refused(folder, capsys, slip):
-    command = ["simulate", "model.toml", "--slip", slip, "--load", "1:100:20000"]
-    assert main(command) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1 and len(error) < 400
-
-
 @pytest.mark.slow
 def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(tmp_path, capsys):
     exported = Path(__file__).parents[2] / "exported"
@@ -137,16 +129,6 @@ def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(t
     assert main(command) == 0
     one = capsys.readouterr().out.splitlines()[1].split(",")
     assert float(fused[5]) == pytest.approx(float(one[5]), rel=1e-4)
-
-
-def test_only_arguments_that_are_files_count_as_inputs(folder, capsys):
-    assert main([*SIMULATE, "--run", "o.csv", "--out", "o.csv"]) == 0
-    assert main([*SIMULATE, "--run", "o.csv", "--out", "o.csv"]) == 0  # overwrites it, as asked
-    assert (folder / "o.csv").read_text().splitlines()[1].startswith("o.csv,0.1,60")
-    capsys.readouterr()
-    (folder / "effects.csv").write_text("")
-    command = [*SIMULATE, "--effects", "effects.csv", "--out", "effects.csv"]
-    refused(command, capsys, "is an input and would be overwritten")
 
 
 def test_every_argument_that_names_an_input_file_is_declared_as_one():

@@ -105,16 +105,3 @@ def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
     found = json.loads((folder / "found/report.json").read_text())
     del found["report"]
     assert found == json.loads((folder / "all.json").read_text())
-
-
-@pytest.mark.slow
-def test_no_file_is_written_where_the_page_fails(folder, monkeypatch, capsys):
-    def fails(*args):
-        raise KeyboardInterrupt
-
-    before = sorted(folder.rglob("*"))
-    monkeypatch.setattr("soilml.report.page.page", fails)
-    command = [*COMMANDS["identify"], "--method", "nonlinear", "--report", "found"]
-    assert main([*command, "--out", "all.json"]) == 130
-    assert "no output was written" in capsys.readouterr().err
-    assert sorted(folder.rglob("*")) == before

@@ -63,20 +63,6 @@ def test_the_modulus_is_found_and_predicts_the_pull_of_the_slopes(files, capsys)
     assert "k_x of run flat" in said.err
 
 
-def test_a_run_without_balance_is_named_and_the_others_answer(files, capsys):
-    text = (
-        (files / "runs.csv")
-        .read_text()
-        .replace("up6,0.39,0.01,28.92,0.1", "up6,0.39,0.01,28.92,0.9")
-    )
-    (files / "runs.csv").write_text(text)
-    assert main(COMMAND) == 0
-    said = capsys.readouterr()
-    last = list(csv.DictReader(io.StringIO(said.out)))[-1]
-    assert last["shear_modulus_m"] == ""
-    assert "run up6 has no k_x: even with fully mobilised shear" in said.err
-
-
 @pytest.mark.parametrize(
     ("file", "old", "new", "options", "expected"),
     [

@@ -44,28 +44,6 @@ def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
     assert "Next: soilml identify" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--width", "0.1"], "--radius is missing; needed is the wheel radius in m"),
-        (["--radius", "15", "--width", "0.1"], "radius"),
-        (
-            ["--radius", "0.1", "--width", "0.1", "--soil", "wong1989/dry-sand"],
-            "did you mean 'wong1989/dry_sand'?",
-        ),
-        (["--radius", "0.1", "--width", "0.1", "--torque-noise", "2 per cent"], "torque_Nm"),
-        (["--radius", "0.1", "--width", "0.1", "--mass", "5", "--wheels", "3"], "an even number"),
-        (["--radius", "0.1", "--width", "0.1", "--mass", "5"], "--wheelbase is missing; needed is"),
-    ],
-)
-def test_what_is_wrong_is_told_and_nothing_is_written(tmp_path, capsys, words, said):
-    file = tmp_path / "model.toml"
-    assert main(["init", str(file), *words]) == 2
-    error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1 and "/tmp" not in error
-    assert not file.exists()
-
-
 @pytest.mark.slow
 def test_models_lists_them(capsys):
     assert main(["models"]) == 0
@@ -73,13 +51,6 @@ def test_models_lists_them(capsys):
     assert len(lines) == 3 + len(released_models())
     assert any(line.startswith("wheel ") and "r 0.15, w 0.12" in line for line in lines)
     assert max(map(len, lines)) <= 110
-
-
-def test_a_short_name_serves_estimate(tmp_path, capsys):
-    runs = tmp_path / "runs.csv"
-    runs.write_text("run,slip,load_N,torque_Nm\na,0.2,60,3.0\na,0.4,60,4.2\n")
-    assert main(["estimate", "wheel", str(runs)]) == 0
-    assert "cohesion" in capsys.readouterr().out
 
 
 @pytest.mark.slow

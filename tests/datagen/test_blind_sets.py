@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from datagen.blind_sets import MECHANISMS, Plan, draw_blind_set, write_blind_set
-from datagen.blind_sets.reading_errors import CHANNELS, sensors
+from datagen.blind_sets.reading_errors import CHANNELS
 from datagen.blind_sets.reference_wheel import WheelState, solve_equilibrium
 from datagen.blind_sets.soil_families import FAMILIES, FREE_PARAMETERS, RADIUS, WIDTH
 from soilml import EFFECTS, Model, Operating, Soil, Wheel, read_table
@@ -56,13 +56,6 @@ def apart(one, other):
     return np.abs((one - other) / np.maximum(typical, np.abs(other))).max(axis=1)
 
 
-def test_the_wheel_is_the_packages():
-    """Driving and braking."""
-    slip = np.random.default_rng(9).uniform(-0.4, 0.6, 400)
-    rows = replace(batch(400, seed=1), slip=slip)
-    assert apart(of_hidden(rows), of_soilml(rows)).max() < 1e-5
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_cause_in_its_usual_form_is_the_packages_effect(name):
@@ -86,30 +79,6 @@ def test_the_same_plan_gives_the_same_set_and_another_seed_another():
     for name, values in one.columns.items():
         np.testing.assert_array_equal(values, again.columns[name])
     assert not np.array_equal(one.columns["torque_Nm"], other.columns["torque_Nm"])
-
-
-def strays(tier, count=60):
-    """Readings less truth in declared standard deviations, (sets, channels, rows)."""
-    found = []
-    for i in range(count):
-        plan = replace(PLAN, tier=tier, cause="", size=0.0, noise=0.02, seed=i)
-        drawn, declared = draw_blind_set(plan), sensors(0.02)
-        true = {name: np.array(drawn.truth["runs_true"][name]) for name in CHANNELS}
-        found.append([(drawn.columns[c] - true[c]) / declared[c].std(true[c]) for c in CHANNELS])
-    return np.array(found)
-
-
-@pytest.mark.long
-def test_readings_stray_as_the_tier_says():
-    plain, linked, struck, louder = (strays(tier) for tier in ("N0", "N2", "N3", "N4"))
-    assert plain.std() == pytest.approx(1.0, abs=0.03)
-    assert plain.std(axis=(0, 2)) == pytest.approx(np.ones(3), abs=0.06)
-    assert linked.std() == pytest.approx(1.0, abs=0.05)
-    assert louder.std() == pytest.approx(1.0 / 0.85, abs=0.04)
-    assert np.mean(np.abs(struck) > 7.0) == pytest.approx(0.02, abs=0.006)
-    runs = linked.reshape(60, 3, 8, 8)  # 8 runs of 8 samples
-    assert np.mean(runs[..., 1:] * runs[..., :-1]) == pytest.approx(0.7, abs=0.06)
-    assert abs(np.mean(plain[..., 1:] * plain[..., :-1])) < 0.03
 
 
 def test_what_is_written_is_read_by_the_package_and_the_truth_lies_apart(tmp_path):

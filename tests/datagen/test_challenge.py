@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from datagen.blind_sets import draw_blind_set, draw_plan
 from datagen.challenge import Challenge, Entry, Truth, crps, score
 from datagen.challenge.challenge_files import COLUMNS, LEAST_PROBABILITY, NONE, UNKNOWN
 from datagen.challenge.house_entries import stated
-from datagen.challenge.sealing import DEFAULT_TIERS, answer_of
 from soilml.cli import main
 
 
@@ -64,23 +62,6 @@ def test_the_public_folder_has_no_truth(made):
         assert not numbers & {float(f"{x:.6g}") for x in changed}
         header = (folder / name / "held_out.csv").read_text().splitlines()[0].split(",")
         assert not {*header} & {*COLUMNS, "time_s"}
-
-
-def test_answers_are_of_the_list_and_the_truth_is_what_the_plan_simulates(made):
-    content = json.loads(made[1].read_text())
-    for own in content["sets"].values():
-        assert own["answer"] in content["causes"]
-    plans = [draw_plan(DEFAULT_TIERS, seed) for seed in range(200)]
-    assert {plan.tier for plan in plans} == set(DEFAULT_TIERS)
-    assert all((plan.discrepancy == 0.0) >= plan.tier.startswith("N") for plan in plans)
-    assert all(plan.discrepancy > 0.0 for plan in plans if plan.tier == "D")
-    answers = {
-        p.tier: answer_of(p, draw_blind_set(p).truth["causes"])
-        for p in {plan.tier: plan for plan in plans}.values()
-    }
-    assert answers["N0"] == answers["N1"] == NONE
-    assert answers["D"] == UNKNOWN
-    assert answers["S"] not in (NONE, UNKNOWN)
 
 
 def test_the_true_distribution_has_the_best_expected_crps():
@@ -195,22 +176,3 @@ def test_a_changed_truth_or_set_is_refused(made, challenge, entry, tmp_path, cap
         assert "was changed since the challenge was made" in capsys.readouterr().err
     finally:
         runs.write_text(before)
-
-
-def test_scores_are_written_with_differences_to_the_first(made, challenge, entry, tmp_path, capsys):
-    sharp = replace(
-        entry,
-        name="late",
-        draws={n: d + 1.0 for n, d in entry.draws.items()},
-    )
-    paths = []
-    for own in (entry, sharp):
-        paths.append(tmp_path / f"{own.name}.json")
-        paths[-1].write_text(json.dumps(own.as_json(challenge)))
-    out = tmp_path / "scores.json"
-    assert main(["challenge", "score", *map(str, (*made, *paths)), "--json", str(out)]) == 0
-    assert "Differences to equal, paired by set." in capsys.readouterr().out
-    first, second = json.loads(out.read_text())["entries"]
-    assert first["minus_first"]["torque_Nm"] == {"mean": 0.0, "p05": 0.0, "p95": 0.0}
-    assert second["minus_first"]["torque_Nm"]["p05"] > 0.0
-    assert second["minus_first"]["causes"]["mean"] == 0.0

@@ -2,7 +2,6 @@
 
 import functools
 import hashlib
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -16,43 +15,7 @@ from conftest import RECIPE
 from datagen.generate import generate
 from datagen.recipe import read_recipe
 from datagen.simulation import pieces
-from soilml.errors import InputError
 from soilml.processes import process_map
-
-
-def wait_for_another(folder, number):
-    """Where this item is done, once two processes have begun one."""
-    (folder / str(os.getpid())).touch()
-    deadline = time.monotonic() + 60
-    while len(list(folder.iterdir())) < 2 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return number, os.getpid()
-
-
-def fail_at_five(number):
-    if number == 5:
-        raise InputError("five is too many")
-    return number
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.long)])
-def test_results_come_in_order_from_several_processes(method, tmp_path):
-    task = functools.partial(wait_for_another, tmp_path)
-    with process_map(task, range(20), 2, start_method=method) as results:
-        numbers, processes = zip(*results, strict=True)
-    assert numbers == tuple(range(20))
-    assert len(set(processes)) == 2 and os.getpid() not in processes
-    assert not multiprocessing.active_children()
-
-
-def test_an_error_in_a_worker_is_that_of_the_function():
-    with (
-        pytest.raises(InputError, match="five is too many"),
-        process_map(fail_at_five, range(9), 2) as results,
-    ):
-        list(results)
-    assert not multiprocessing.active_children()
 
 
 def is_alive(process):

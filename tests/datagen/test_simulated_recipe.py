@@ -9,12 +9,10 @@ from conftest import WHEEL_ON_SAND
 from datagen.generate import generate
 from datagen.recipe import read_recipe
 from datagen.simulation import simulate_rows
-from soilml import Estimator, Model, Operating, Wheel, read_table, soil
-from soilml.cli import main
+from soilml import Estimator, Model, Operating, Wheel, soil
 from soilml.config.case import read_case
 from soilml.experiment_design.simulator_runs import space_filling_runs
 from soilml.io.text_tables import csv_text
-from training.adaptation.campaign import DrivenRange, recipe_text
 from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
@@ -85,32 +83,6 @@ def test_rows_are_those_of_the_simulator_with_a_draw_of_its_emulator_s_error(rec
         assert np.std(drawn) == pytest.approx(error[name], rel=0.15)  # one draw for each soil
         apart = without[name] - truth[name]
         assert np.sqrt(np.mean(apart**2)) < 1.3 * error[name]  # as stated of new runs
-
-
-def test_ranges_beyond_the_runs_are_refused_or_cut(folder, tmp_path, recipe, capsys):
-    (tmp_path / "simulated.csv").write_bytes((folder / "simulated.csv").read_bytes())
-    far = (folder / "recipe.toml").read_text().replace("110.0]\n[noise]", "160.0]\n[noise]")
-    (tmp_path / "recipe.toml").write_text(far)
-    assert main(["generate", str(tmp_path / "recipe.toml"), str(tmp_path / "out.parquet")]) == 2
-    said = capsys.readouterr().err
-    assert (
-        "load_N is [30, 160]; the runs of the simulator have 30" in said and said.count("\n") == 1
-    )
-    rows = {
-        "run": ["a"] * 2,
-        "slip": [0.06, 0.58],
-        "load_N": [31.0, 109.0],
-        "torque_Nm": [1.0, 2.0],
-    }
-    (tmp_path / "rows.csv").write_text(csv_text(rows))
-    driven = DrivenRange.of(read_table(tmp_path / "rows.csv"), recipe.case)
-    gear = recipe.case.model.gear
-    assert driven.slip[1] <= gear.upper[0] and driven.load[1] <= gear.upper[1]
-    (tmp_path / "adapted.toml").write_text(recipe_text(recipe.case, driven, 100, 1))
-    assert read_recipe(tmp_path / "adapted.toml").case.simulator is not None
-    one = str(folder / "recipe.toml"), str(tmp_path / "out.parquet")
-    assert main(["generate", *one, "--device", "cpu"]) == 2
-    assert "--device solves equations" in capsys.readouterr().err
 
 
 @pytest.mark.long

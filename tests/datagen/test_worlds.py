@@ -21,12 +21,6 @@ def torque(of):
     return np.concatenate([piece["torque_Nm"] for piece in simulate_pieces(of)])
 
 
-def test_without_effects_and_errors_the_rows_are_those_of_the_model(tmp_path):
-    plain = torque(recipe(tmp_path))
-    none = torque(recipe(tmp_path, "[worlds]\neffect = 0.0\nerror = 0.0\n"))
-    np.testing.assert_allclose(none, plain, rtol=1e-9)
-
-
 def test_an_effect_acts_in_its_share_of_the_runs_and_in_all_rows_of_a_run(tmp_path):
     plain = torque(recipe(tmp_path)).reshape(-1, 16)
     worlds = '[worlds]\neffect = 0.3\nerror = 0.0\neffects = ["torque-gain"]\n'

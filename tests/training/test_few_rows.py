@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -83,12 +81,3 @@ def test_files_of_few_rows_are_exported_and_fused_by_their_correlation(tmp_path)
     fused = fuse_estimates(readings)
     assert fused.rule == "correlated" and fused.used.all()
     assert fused.estimate.std[0] < min(e.std[0] for e in readings)
-
-
-def test_a_campaign_on_one_soil_is_named_on_the_card(tmp_path):
-    path = strides(tmp_path / "a.csv", 1, 20, 3)
-    trained = trained_on(path)
-    metadata = export_model(trained, tmp_path / "m.onnx", path)
-    assert "All rows are of one run" in model_card(trained, metadata, "m")
-    many = replace(trained, left_out=replace(trained.left_out, runs=4))
-    assert "All rows are of one run" not in model_card(many, metadata, "m")

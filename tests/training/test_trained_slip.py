@@ -1,7 +1,5 @@
 """Slip as what is learned: from torque, from other channels, and from both in one file or two."""
 
-import json
-
 import numpy as np
 import pytest
 from conftest import WHEEL_ON_SAND
@@ -10,7 +8,7 @@ from datagen.generate import generate
 from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.cli import main
-from soilml.errors import InputError, TableError
+from soilml.errors import InputError
 from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
@@ -82,17 +80,6 @@ def test_slip_follows_from_torque_on_known_soil_and_hardly_on_unknown(trained):
         assert abs(original.scores["estimator"].cover90[0] - 0.9) < 0.06
 
 
-def test_each_regressor_reads_its_own_features_and_two_say_more_than_one(trained):
-    one, other = trained(TORQUE + MACHINE)[0], trained(PULL + MACHINE)[0]
-    both, path = trained(BOTH + OF_TORQUE + OF_PULL)
-    assert [m.regressor.columns for m in both.members] == [(0, 1), (2, 1)]
-    assert share(both) < share(one) < share(other)
-    alone = [both.scores[m.regressor.name].relative[0] for m in both.members]
-    np.testing.assert_allclose(alone, [share(one), share(other)], atol=0.1)
-    card = json.loads(Estimator.load(path).metadata["metrics"])
-    assert "fixed-size-lssvm of torque/load, load" in card
-
-
 def test_a_channel_that_was_not_measured_is_named(trained):
     estimator = Estimator.load(trained(BOTH + OF_TORQUE + OF_PULL)[1])
     with pytest.raises(InputError, match="drawbar_pull is nan"):
@@ -155,13 +142,3 @@ def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
     with pytest.raises(InputError, match=said) as caught:
         read_spec(tmp_path / "s.toml")
     assert "\n" not in str(caught.value)
-
-
-def test_data_that_lack_a_channel_or_measure_slip_badly_are_refused(folder, tmp_path):
-    with pytest.raises(TableError, match="vibration_m_s2 is missing"):
-        read_dataset(folder / "known.parquet", ("vibration", "load"), ("slip",))
-    text = RECIPE.format(rows=300, seed=1, soil=KNOWN)
-    (tmp_path / "r.toml").write_text(text + "slip = 0.02\n")
-    generate(read_recipe(tmp_path / "r.toml"), tmp_path / "d.parquet")
-    with pytest.raises(InputError, match=r"slip is a target, but its column has noise"):
-        read_dataset(tmp_path / "d.parquet", ("torque", "load"), ("slip",))

@@ -8,7 +8,6 @@ from soilml.onboard.estimate import PriorSummary
 from training.calibration.recalibration import covariance_matrices, recalibrate
 from training.calibration.row_pooling import calibrate_pooling, run_conditions
 from training.dataset import read_dataset, split_by_run
-from training.ensemble import fuse_members
 from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec
 
@@ -19,29 +18,6 @@ TARGETS = ("cohesion", "friction_angle", "shear_modulus")
 @pytest.fixture(scope="module")
 def data(small_data):
     return read_dataset(small_data, FEATURES, TARGETS)
-
-
-def test_the_split_is_by_run_and_complete(data):
-    parts = split_by_run(data, seed=3)
-    runs = [set(p.run) for p in (parts.train, parts.validation, parts.calibration)]
-    assert not (runs[0] & runs[1] or runs[0] & runs[2] or runs[1] & runs[2])
-    assert sum(map(len, (parts.train, parts.validation, parts.calibration))) == len(data)
-    assert parts.train.run_length.max() == 1  # runs of many rows serve calibration
-    assert (parts.calibration.run_length > 1).any()
-    assert len(parts.calibration.limit_rows_per_run(2)) < len(parts.calibration)
-
-
-def test_fusing_a_regressor_with_itself_does_not_reduce_std(data):
-    parts = split_by_run(data, seed=0)
-    regressor = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    member = recalibrate(regressor, parts.validation)
-    single = member.predict(parts.calibration.features)[1]
-    twice = fuse_members([member, member], "best-linear", parts.validation)
-    np.testing.assert_allclose(twice.predict(parts.calibration.features)[1], single, rtol=0.02)
-    naive = fuse_members([member, member], "inverse-variance", parts.validation)
-    np.testing.assert_allclose(
-        naive.predict(parts.calibration.features)[1], single / np.sqrt(2), rtol=1e-9
-    )
 
 
 @pytest.mark.slow

@@ -2,11 +2,10 @@
 
 import os
 import shutil
-import sys
 
 import pytest
-from served_page import ROOT, runs_file
 from served_page import page as page
+from served_page import runs_file
 
 from soilml import EFFECTS, Model, Operating, Wheel, soil
 
@@ -139,18 +138,6 @@ def test_a_table_leads_to_bands_and_back_to_the_sliders(tab, tmp_path):
     assert value == pytest.approx(28.0, abs=5.0)
 
 
-def test_a_model_file_moves_the_sliders_and_its_faults_are_shown(tab, tmp_path):
-    text = '[gear]\ntype = "wheel"\nradius = "10 cm"\nwidth = 0.08\n[soil]\n'
-    (tmp_path / "m.toml").write_text(f'{text}name = "wong1989/dry_sand"\n')
-    tab.set_input_files("#file", tmp_path / "m.toml")
-    until(tab, "document.querySelector('#s-gear-radius').value === '100'")
-    assert "from m.toml" in tab.locator("#wheel option").first.inner_text()
-    (tmp_path / "wrong.toml").write_text(text)
-    tab.set_input_files("#file", tmp_path / "wrong.toml")
-    tab.wait_for_selector("#drop-error:not([hidden])")
-    assert "wrong.toml is not taken: MODEL.toml" in tab.locator("#drop-error").inner_text()
-
-
 def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
     digging = Model(Wheel(radius=0.15, width=0.12)) + EFFECTS["slip-sinkage"](n1=0.5)
     tab.set_input_files("#file", runs_file(tmp_path, digging, (40.0, 90.0)))
@@ -173,42 +160,6 @@ def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
         tab.get_by_role("link", name="Open the full report").click()
     opened.value.wait_for_load_state()
     assert "Gap report" in opened.value.title()
-
-
-def rig_log(tmp_path):
-    sys.path.insert(0, str(ROOT / "examples" / "import"))
-    from rig import write_logs
-
-    return write_logs(tmp_path / "rig")[0]
-
-
-def settled(tab):
-    """Wait for the answer to a change of the map."""
-    tab.wait_for_timeout(50)
-    tab.wait_for_selector("#map-job", state="hidden", timeout=LONG)
-
-
-def test_a_raw_log_goes_through_its_map(tab, tmp_path):
-    tab.set_input_files("#file", rig_log(tmp_path))
-    tab.wait_for_selector("#map-panel:not([hidden])", timeout=LONG)
-    assert tab.locator("#map-columns tr").count() == 6
-    assert tab.locator("#map-curves figure").count() == 3
-    assert "gearbox" in tab.locator("#map-columns .wrong").inner_text()
-    tab.get_by_role("button", name="Import", exact=True).click()
-    tab.wait_for_selector("#map-error:not([hidden])", timeout=LONG)
-    box = "document.querySelector('#map-text')"
-    marked = tab.evaluate(f"{box}.value.slice({box}.selectionStart, {box}.selectionEnd)")
-    assert marked.startswith("gear_ratio = 1 ")  # the error leads to its line
-    tab.get_by_label("[wheel_angle] gear_ratio").fill("99")
-    tab.keyboard.press("Tab")
-    settled(tab)
-    assert tab.locator("#map-panel .wrong").count() == 0
-    with tab.expect_download() as saved:
-        tab.get_by_role("button", name="Save map.toml").click()
-    assert saved.value.suggested_filename == "map.toml"
-    tab.get_by_role("button", name="Import", exact=True).click()
-    tab.wait_for_selector("#table-panel:not([hidden])", timeout=LONG)
-    assert tab.get_by_role("link", name="Open the import report").is_visible()
 
 
 def test_wheels_are_compared_for_a_slope(tab):

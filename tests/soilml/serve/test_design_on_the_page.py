@@ -3,13 +3,9 @@
 from pathlib import Path
 
 import pytest
-from served_page import runs_file
 
 from soilml.errors import InputError
-from soilml.physics.gears import Wheel
-from soilml.physics.model import Model
 from soilml.serve.answers import design
-from soilml.serve.answers.chosen_case import model_text
 
 
 def silent(*stage):
@@ -44,22 +40,6 @@ def test_the_answer_is_that_of_the_command(tmp_path, monkeypatch):
     assert found["tables"][0]["title"] == "designs" and found["remarks"]
     assert set(found["files"]) == {"design_report.html", "design.json", "rover.toml"}
     assert (Path("../written") / "rover.toml").read_text() == text
-
-
-@pytest.mark.slow
-def test_the_soil_of_measured_rows_is_that_of_the_page(tmp_path, monkeypatch):
-    (tmp_path / "read").mkdir()
-    monkeypatch.chdir(tmp_path / "read")
-    monkeypatch.setitem(design.EFFORTS, "quick", (6, 60))
-    runs_file(Path(), Model(Wheel(radius=0.15, width=0.12)))
-    case = model_text({})["text"]
-    question = changed("Soils, each as likely", {"rows": "RUNS.csv"}, changed("Slope", 8))
-    request = {"question": question, "effort": "quick", "names": ["RUNS.csv"], "model": case}
-    found = design.answer(request, silent)
-    assert set(found["files"]) == {"design_report.html", "design.json", "rover.toml", "MODEL.toml"}
-    assert (Path("../written") / "MODEL.toml").read_text() == case
-    kinds = (Path("../written") / "design.json").read_text()
-    assert "RUNS.csv" in kinds
 
 
 def test_questions_that_the_page_does_not_take(tmp_path, monkeypatch):

@@ -69,22 +69,6 @@ def test_a_value_is_set_and_the_curves_are_those_of_the_import(ask):
         np.testing.assert_allclose(means, rows[name], atol=0.05 * np.ptp(rows[name]) + 0.3)
 
 
-def test_a_column_of_another_role_gets_its_sign_and_tare(ask):
-    answer = ask()
-    text = answer["map"].replace('shortest = "2 s"', 'shortest = "3 s"')
-    answer = ask(map=text, change={"column": "Fx", "role": "load"})
-    found = tomllib.loads(answer["map"])
-    assert found["load"] == {"column": "Fx", "unit": "N", "bias": "1 %"}  # and no reverse
-    assert "drawbar_pull" not in found and found["windows"]["shortest"] == "3 s"
-    assert by_name(answer)["Fz"]["role"] == ""
-    answer = ask(map=answer["map"], change={"column": "Fz", "role": "load"})
-    found = tomllib.loads(answer["map"])
-    assert found["load"]["reverse"] is True and "it is negative in the log" in answer["map"]
-    answer = ask(map=answer["map"], change={"column": "Fz", "role": ""})
-    assert "load" not in tomllib.loads(answer["map"])
-    assert "the load is missing" in answer["preview"]["error"]
-
-
 def test_a_wheel_of_several_is_changed_alone(tmp_path, monkeypatch):
     rng = np.random.default_rng(0)
     t = np.arange(0, 20, 0.05)

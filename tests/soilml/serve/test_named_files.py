@@ -8,7 +8,6 @@ from served_page import runs_file
 
 from soilml import Model, Wheel
 from soilml.errors import InputError
-from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.serve.answers.chosen_case import model_text
 from soilml.serve.answers.forward import controls, forward
 
@@ -78,12 +77,3 @@ def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
         job = page.job(kind="design", files=[key], question=head + soil + tail, effort="quick")
         assert job["state"] == "failed"
         check(job, secret)
-
-
-def test_a_file_of_the_command_line_names_any_file_beside_it(tmp_path):
-    assert NamedFiles(tmp_path).path("r.csv") == tmp_path / "r.csv"
-    assert NamedFiles(tmp_path).path("/a/r.csv").as_posix() == "/a/r.csv"
-    assert NamedFiles(names=["r.csv"]).path("r.csv").as_posix() == "r.csv"
-    for name in ("r.csv", "", ".", "..", "/etc/passwd"):
-        with pytest.raises(InputError, match="may name no file"):
-            NO_FILES.path(name)

@@ -58,22 +58,6 @@ def test_every_wheel_stands_on_every_soil_that_carries_it(wheel):
     assert len(found["profile"]["angle"]) == 97
 
 
-def test_sliders_begin_at_the_values_of_the_choice_and_change_nothing():
-    request = {"wheel": "kls1", "soil": "comin2017/es-3"}
-    values = {path: c["value"] for path, c in sliders(request).items()}
-    moved = forward(request | {"values": values})
-    own = {"slip": values["slip"], "load": values["load"]}
-    assert moved == forward(request | {"values": own})
-
-
-def test_a_model_file_gives_its_own_sliders():
-    found = sliders({"model": MODEL})
-    assert found["gear.radius"]["value"] == 0.1
-    assert found["slip-sinkage.n1"]["value"] == 0.3
-    text = model_text({"model": MODEL})["text"]
-    assert text == MODEL
-
-
 def test_the_text_of_the_sliders_is_a_model_file(tmp_path):
     values = {"cohesion": 500.0, "gear.radius": 0.2, "bulldozing.share": 0.3, "slip": 0.2}
     (tmp_path / "model.toml").write_text(model_text({"values": values})["text"])

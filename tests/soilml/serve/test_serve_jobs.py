@@ -50,15 +50,6 @@ def test_a_table_of_runs_is_known_and_estimated(page):
     assert values["friction_angle"]["value"] == pytest.approx(angle["si"])
 
 
-def test_one_reading_leaves_a_parameter_unknown_in_words(page):
-    key = page.put("one.csv", (RUNS + "a,0.3,60,2.26\n").encode())
-    job = page.job(kind="estimate", files=[key], model={"values": {}})
-    assert job["state"] == "done", job["error"]
-    by_path = {p["path"]: p for p in job["result"]["parameters"]}
-    assert not by_path["cohesion"]["identified"]
-    assert any(text.startswith("cohesion: not identified") for text in job["result"]["words"])
-
-
 def test_a_gap_runs_with_progress_and_its_files_are_there(page):
     key = page.put("RUNS.csv", runs_text(7))
     job = page.job(kind="gap", files=[key], model={"values": {}})
@@ -102,26 +93,6 @@ def test_a_raw_log_is_guessed_edited_and_imported(page, tmp_path):
     assert page.request("GET", f"/api/jobs/{job['id']}/import_report.html?show=1")[0] == 200
     again = page.job(kind="look", files=[f"{job['id']}/runs.csv"])
     assert again["result"]["kind"] == "runs" and again["result"]["rows"] == 4
-
-
-@pytest.mark.parametrize(
-    ("request_", "said"),
-    [
-        ({"kind": "look", "files": ["0" * 32]}, "the file is gone"),
-        ({"kind": "look", "files": [7]}, "the file is gone"),
-        ({"kind": "look", "files": ["0" * 32 + "/runs.csv"]}, "this analysis is gone"),
-        ({"kind": "look", "files": []}, "a list of files"),
-        ({"kind": "shell", "files": ["x"]}, "needed is a kind"),
-        ({"files": "x"}, "needed is a kind"),
-        ({"kind": [], "files": [1]}, "needed is a kind"),
-        ({"kind": "estimate", "files": ["x"], "model": "x"}, "model: needed is an object"),
-        ({"kind": "look", "files": ["x"], "run": {}}, "run: needed is a text"),
-    ],
-    ids=str,
-)
-def test_a_wrong_job_is_refused_in_one_line(page, request_, said):
-    wrong, status = page.ask("/api/jobs", request_)
-    assert status in (400, 422) and said in wrong["error"]
 
 
 def test_the_pull_is_that_of_usual_errors_and_of_each_wheel(page):

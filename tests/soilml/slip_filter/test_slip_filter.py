@@ -72,18 +72,6 @@ def test_a_hard_floor_is_refused_and_a_soil_is_not(case, drive):
     assert "no-soil" not in code_of(slip_of_drive(case, drive.columns(), soils=SOILS))
 
 
-def test_rows_that_the_balance_does_not_describe_are_passed_over(case, drive):
-    columns = drive.columns()
-    rim = columns["rim_speed_m_s"].reshape(-1, 4)
-    rim[3], rim[6, 1], rim[9] = 0.0, -0.1, 0.4
-    found = slip_of_drive(case, columns | {"rim_speed_m_s": rim.ravel()}, soils=SOILS)
-    assert found.flags[3] == ("standing",)
-    assert found.flags[6] == ("wheel-stopped",)
-    assert found.flags[9] == ("not-steady",)
-    assert not found.answered[[3, 6, 9]].any()
-    assert found.answered[[2, 5, 12]].all()
-
-
 def test_in_reverse_the_answer_is_that_of_forward_up_the_same_slope(case, drive):
     columns = drive.columns() | {"load_N": loads(drive.slope).ravel()}
     back = columns | {n: -columns[n] for n in ("rim_speed_m_s", "torque_Nm", "slope_rad")}

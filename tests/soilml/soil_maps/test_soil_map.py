@@ -124,12 +124,6 @@ def test_the_weak_soil_is_climbed_with_less_probability_and_more_slip(found):
     assert np.nanmax(ability.energy[:, 0]) < np.nanmin(ability.energy[:, 1])
 
 
-def test_stretches_held_out_are_predicted_better_than_by_one_soil(found):
-    gain, error = found.held_out.gain("one soil")
-    assert gain > 2.0 * error > 0.0
-    assert set(found.held_out.mean) == {"map", "tracker", "one soil"}
-
-
 @pytest.mark.parametrize("as_read", [False, True])
 def test_the_field_is_the_conditional_normal(monkeypatch, as_read):
     """Beside the joint covariance of places and stretches, written out."""

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import Operating, Wheel, read_case
+from soilml import Operating, read_case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.physics.model import Model
 from soilml.traction.draws import SoilDraws
 from soilml.traction.rover_performance import rover_performance
 from soilml.traction.rover_report import rover_report
@@ -70,18 +69,6 @@ def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
     apart = {k: replace(w, left=2.0 * w.left) if "rear" in k else w for k, w in FOUR.items()}
     beside = replace(again, rover=replace(case.rover, wheels=apart))
     assert set(rover_performance(beside, draws(), SLOPES, SLIP).passes.values()) == {1}
-
-
-def test_wheels_have_gears_of_their_own(case):
-    gears = {k: Model(Wheel(radius=r, width=0.12)) for k, r in (("small", 0.1), ("large", 0.15))}
-    wheels = {k: replace(w, gear="small" if "front" in k else "large") for k, w in FOUR.items()}
-    both = replace(case, gears=gears, rover=replace(case.rover, wheels=wheels))
-    found = rover_performance(both, draws(), SLOPES, SLIP)
-    assert found.sinkage["front-left"][0, 0] > found.sinkage["rear-left"][0, 0]
-    equal = {k: replace(w, gear="large") for k, w in FOUR.items()}
-    same = replace(both, rover=replace(case.rover, wheels=equal))
-    expected = rover_performance(case, draws(), SLOPES, SLIP)
-    assert rover_performance(same, draws(), SLOPES, SLIP).slip == pytest.approx(expected.slip)
 
 
 def measured(case, wheels):

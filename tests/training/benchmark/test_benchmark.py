@@ -9,11 +9,10 @@ import pytest
 
 from datagen.recipe import read_recipe
 from soilml import Estimator
-from soilml.errors import InputError
 from soilml.quantities import SHEAR
 from training.benchmark.acceptance import goals
-from training.benchmark.bayes_limit import UNMODELLED_EFFECTS, benchmark_sets, exact_posterior
-from training.benchmark.bayes_limit_file import load_limit, packaged_limit, save_limit
+from training.benchmark.bayes_limit import UNMODELLED_EFFECTS, benchmark_sets
+from training.benchmark.bayes_limit_file import load_limit, packaged_limit
 from training.benchmark.methods import (
     MethodKind,
 )
@@ -75,31 +74,6 @@ def test_the_limit_is_calibrated(recipe):
     np.testing.assert_allclose(inside.mean(axis=0), 0.9, atol=0.02)
     assert np.mean(stored.hpd_levels < 0.9) == pytest.approx(0.9, abs=0.02)
     assert np.mean(stored.flagged) < 0.01
-
-
-def test_a_stale_limit_is_refused_with_a_hint(recipe, tmp_path, capsys, monkeypatch):
-    wanted = benchmark_sets(recipe.sized(seed=recipe.seed + 1), SHEAR, 1)
-    with pytest.raises(InputError, match=r"stale.*soilml compare --limit FILE\.parquet"):
-        load_limit(packaged_limit(), wanted)
-    some = benchmark_sets(recipe, SHEAR, 1)[:2]
-    save_limit(
-        tmp_path / "two.parquet",
-        some,
-        [exact_posterior(j.case, j.table, j.truth, SHEAR) for j in some],
-    )
-    assert load_limit(tmp_path / "two.parquet", some).mean.shape == (2, 3)
-    with pytest.raises(InputError, match="has no posterior of set 0"):
-        load_limit(tmp_path / "two.parquet", benchmark_sets(recipe, SHEAR, 1))
-    with pytest.raises(InputError, match="cannot be read"):
-        load_limit(tmp_path / "none.parquet", some)
-
-
-def test_only_an_oracle_has_a_higher_log_score_than_the_limit(results):
-    for name in ("prior", "noisy"):
-        for other, limit in zip(select(results, name), select(results, LIMIT_LABEL), strict=True):
-            assert other.log_score < limit.log_score
-    for oracle, limit in zip(select(results, "oracle"), select(results, LIMIT_LABEL), strict=True):
-        assert oracle.log_score > limit.log_score > 0.0
 
 
 def test_an_unmodelled_effect_raises_rmse_and_flags(results):

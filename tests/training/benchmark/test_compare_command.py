@@ -37,14 +37,3 @@ def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsy
     content = json.loads((out / "benchmark.json").read_text())
     assert content["report"]["answer"][0].endswith("acceptance goals are met.")
     assert max(map(len, printed.splitlines())) <= 100
-
-
-@pytest.mark.slow
-def test_a_recomputed_limit_replaces_the_file_and_is_used(small_model, tmp_path, capsys):
-    file, out = tmp_path / "limit.parquet", tmp_path / "results"
-    file.write_text("old")
-    assert main(["compare", "--limit", str(file), "--sets", "1"]) == 0
-    command = ["compare", str(small_model), "--out", str(out), "--against", str(file), "--sets"]
-    assert main([*command, "2"]) == 2
-    assert "has no posterior of set 1" in capsys.readouterr().err
-    assert not out.exists()

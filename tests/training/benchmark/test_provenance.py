@@ -39,14 +39,6 @@ def case_of(tmp_path, text):
 
 
 @pytest.mark.parametrize("what", OTHERS)
-def test_test_data_of_another_model_file_are_refused(tmp_path, parts, what):
-    text, fragment = OTHERS[what]
-    with pytest.raises(InputError) as caught:
-        check_same_provenance(case_of(tmp_path, text), *parts, NAMES)
-    assert fragment in str(caught.value)
-
-
-@pytest.mark.parametrize("what", OTHERS)
 def test_without_a_recipe_of_the_data_the_training_differences_are_noted(tmp_path, parts, what):
     text, fragment = OTHERS[what]
     table, estimators = parts

@@ -3,13 +3,10 @@
 import csv
 import json
 
-import numpy as np
 import pytest
 from conftest import MODEL, RECIPE
 
-from soilml import Estimator, read_case, read_table
 from soilml.cli import main
-from training.benchmark.user_comparison import compare
 
 
 @pytest.fixture(scope="module")
@@ -24,26 +21,6 @@ def test_data(tmp_path_factory):
     (folder / "model.toml").write_text(MODEL + "sinkage_m = 0.0005\n")
     generate(read_recipe(folder / "recipe.toml"), folder / "test.parquet")
     return folder
-
-
-@pytest.fixture(scope="module")
-def scores(test_data, small_model):
-    case = read_case(test_data / "model.toml")
-    table = read_table(test_data / "test.parquet")
-    return compare(case, table, {"small": Estimator.load(small_model)}, analytic_sets=2)
-
-
-def score(scores, rows, method):
-    return next(x for x in scores if x.rows == rows and x.method == method)
-
-
-@pytest.mark.slow
-def test_twelve_readings_reduce_the_error_that_one_leaves(scores):
-    one, twelve = score(scores, 1, "small"), score(scores, 12, "small")
-    assert 0.8 < one.rmse_over_prior[0] < 1.02
-    assert (twelve.rmse_over_prior < one.rmse_over_prior).all()
-    assert (score(scores, 12, "analytic nonlinear").rmse_over_prior < 0.5).all()
-    assert (np.abs(one.coverage90 - 0.9) < 0.05).all()
 
 
 @pytest.mark.long

@@ -4,10 +4,9 @@ import pytest
 
 from datagen.recipe import packaged_file
 from soilml import Estimator
-from soilml.errors import InputError
 from training import train
 from training.export.any_wheel_file import export_any_wheel
-from training.spec import is_any_wheel_spec, read_any_wheel_spec
+from training.spec import read_any_wheel_spec
 
 SPEC = packaged_file("any_wheel", "training", "specs").read_text()
 
@@ -16,27 +15,6 @@ def spec_of(folder, text):
     path = folder / "spec.toml"
     path.write_text(text)
     return path
-
-
-def test_the_packaged_spec_is_of_driving_wheels():
-    spec = read_any_wheel_spec("any_wheel")
-    assert is_any_wheel_spec("any_wheel") and not is_any_wheel_spec("fused")
-    assert spec.noise["torque"] == [0.0, 0.02]
-    assert spec.family.ranges["slip"].lower > 0.0
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("designs = 10", "designs"),
-        ("designs = 60000000000", "designs"),
-        ("designs = -5", "designs"),
-        ('designs = "many"', "designs"),
-    ],
-)
-def test_impossible_settings_are_refused(tmp_path, text, message):
-    with pytest.raises(InputError, match=message):
-        read_any_wheel_spec(spec_of(tmp_path, SPEC.replace("designs = 60000", text)))
 
 
 def test_a_file_has_the_errors_of_sensors_that_its_spec_states(

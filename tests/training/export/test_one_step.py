@@ -72,9 +72,3 @@ def test_every_shape_is_a_number(tmp_path, file):
     assert known >= {name for node in inferred.node for name in node.output if name}
     names = [node.name for node in model.graph.node]
     assert len(set(names)) == len(names) and all(names)
-
-
-def test_it_is_no_file_for_the_runtime(tmp_path, capsys):
-    out = exported(tmp_path, "wheel")
-    assert main(["estimate", str(out)]) == 2
-    assert "is one step of a stream" in capsys.readouterr().err

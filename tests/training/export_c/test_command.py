@@ -43,17 +43,6 @@ def test_a_name_that_c_does_not_take_is_refused(name, tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
-def test_other_bad_input_is_refused(tmp_path, capsys):
-    out = tmp_path / "wheel.c"
-    refused([LINEAR, tmp_path / "wheel.txt"], capsys, "must end in .c")
-    assert main(["export-c", str(LINEAR), str(out), "--rows", "0"]) == 2
-    assert "--rows: '0' given; needed" in capsys.readouterr().err
-    refused([tmp_path / "none.onnx", out], capsys, "there is no such file")
-    (tmp_path / "text.onnx").write_text("no model")
-    refused([tmp_path / "text.onnx", out], capsys, "not a valid ONNX model")
-    assert not out.exists()
-
-
 def test_an_operator_that_is_not_known_is_named():
     model = onnx.load(str(LINEAR))
     metadata = {entry.key: entry.value for entry in model.metadata_props}

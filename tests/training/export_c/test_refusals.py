@@ -67,23 +67,6 @@ def test_numbers_beyond_float_change_nothing(wheel, memory):
     assert bytes(memory) == before or np.isfinite(memory.factor[:]).all()
 
 
-@pytest.mark.parametrize("value", [1e-38, 1e10, 3e38])
-@pytest.mark.parametrize("name", ["torque", "load", "sinkage", "drawbar_pull", "torque_std"])
-def test_extreme_readings_are_answered_by_finite_numbers_or_a_code(name, value, wheel, memory):
-    row = wheel.row(**(READING | {name: value}))
-    code, _ = wheel.step(memory, (type(row) * 1)(row))
-    answered, estimate = wheel.answer(memory)
-    assert np.isfinite(memory.factor[:]).all() and np.isfinite(estimate["mean"]).all()
-    assert code in (0, wheel.codes["NOT_FINITE"]) and answered >= 0
-
-
-def test_a_memory_that_was_not_started_is_refused(wheel):
-    empty = wheel.new("memory")
-    rows = wheel.rows(**{k: [v] for k, v in READING.items()})
-    assert wheel.step(empty, rows)[0] == wheel.codes["NOT_STARTED"]
-    assert wheel.answer(empty)[0] == wheel.codes["NOT_STARTED"]
-
-
 def test_the_memory_of_another_file_is_refused(wheel, compiled):
     other = compiled("kls1_wheel")
     memory = ctypes.cast(

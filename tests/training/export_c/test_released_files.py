@@ -139,26 +139,6 @@ def test_rows_that_lack_a_reading_are_left_out_as_onnxruntime_does(name, missing
         same_answer(answer, outputs)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SETS)
-def test_steps_in_which_rows_lack_readings_are_those_of_onnxruntime(name, compiled):
-    """The first step has none but such rows, and others have one."""
-    model, plain = compiled(name), loaded(name)
-    rows, given = probe_rows(plain, np.random.default_rng(15), 12)
-    estimator = plain.on(**given) if given else plain
-    memory, state = model.start(**given), estimator.start()
-    for first, lacking in ((0, [0, 1, 2, 3]), (4, [0]), (8, [3])):
-        part = {key: values[first : first + 4] for key, values in rows.items()}
-        fed = estimator.sets.feed(estimator.sets.rows(part), state)
-        part["torque"] = part["torque"].copy()
-        part["torque"][lacking] = fed["torque"][lacking] = np.nan
-        *outputs, system, counts = estimator.session.run(OUTPUTS, fed)
-        state = state.grown(system, counts)
-        _, answer = model.update(memory, model.rows(**part))
-        assert list(memory.counted) == list(counts)
-        same_answer(answer, outputs)
-
-
 def same_answer(answer, outputs):
     """All numbers of an answer agree with outputs of onnxruntime."""
     expected = {k.removeprefix(SET_PREFIX): v for k, v in zip(OUTPUTS, outputs, strict=False)}

@@ -7,16 +7,6 @@ import pytest
 
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 from training.set_posterior.validation import graph_outputs, posterior_session
-from training.spec import read_spec
-
-SPEC = """\
-[[regressor]]
-type = "linear"
-[set_posterior]
-designs = 600
-hidden = 24
-epochs = 60
-"""
 
 
 @pytest.mark.slow
@@ -39,17 +29,3 @@ def test_a_file_answers_by_its_own_scales(wheel_posterior):
     assert stds["one"][0] == pytest.approx(told[0], rel=1e-3)  # of the size that it is told
     for std in told[1:]:
         assert std == pytest.approx(told[0], rel=1e-3)
-
-
-SENSORS = "[set_posterior.sensor_errors]\nslip_bias = 0.004\ntorque_gain = 0\n"
-
-
-@pytest.mark.slow
-def test_a_spec_states_errors_of_sensors_and_a_file_has_them(tmp_path, wheel_posterior):
-    (tmp_path / "s.toml").write_text(SPEC + SENSORS)
-    stated = read_spec(tmp_path / "s.toml").set_posterior.sensor_errors
-    assert stated == {"slip_bias": 0.004, "torque_gain": 0.0}
-    usual, own = wheel_posterior.typical_errors, replace(wheel_posterior, sensor_errors=stated)
-    assert own.typical_errors == usual | stated
-    assert float(own.defaults()["slip_bias"][0]) == np.float32(0.004)
-    assert own.defaults()["load_gain"] == wheel_posterior.defaults()["load_gain"]

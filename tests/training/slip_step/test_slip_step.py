@@ -64,24 +64,6 @@ def test_the_flags_are_those_of_the_batch(answers):
     assert {"no-soil", "not-determined"} <= seen
 
 
-def test_rows_that_are_passed_over_change_nothing(slip_drive, slip_stream):
-    row = {
-        "rim_speed": slip_drive.rim_speed[0],
-        "torque": slip_drive.torque[0],
-        "load": slip_drive.load[0],
-    }
-    first, state = slip_stream.step(slip_stream.start(), **row, slope=0.0)
-    assert first.answered
-    stand, after = slip_stream.step(state, np.zeros(4), np.zeros(4), row["load"], 0.0)
-    assert stand.flags == ("standing",) and not stand.answered
-    assert np.array_equal(after.grounds, state.grounds)
-    turning = row["rim_speed"] * np.asarray([1.0, 1.0, 1.0, -1.0])
-    passed, after = slip_stream.step(state, turning, row["torque"], row["load"], 0.0)
-    assert passed.flags == ("passed-over",) and np.array_equal(after.grounds, state.grounds)
-    faster, _ = slip_stream.step(state, 3.0 * row["rim_speed"], row["torque"], row["load"], 0.0)
-    assert faster.flags == ("passed-over",)  # 0.2 m/s faster within a second
-
-
 def test_wrong_input_is_one_line(slip_stream, slip_drive, tmp_path, capsys):
     state, rim, load = slip_stream.start(), slip_drive.rim_speed[0], slip_drive.load[0]
     with pytest.raises(InputError, match="needed are 4 numbers, of front-left"):

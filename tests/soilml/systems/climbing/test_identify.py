@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from soilml.systems.climbing import SimulatedRover, Uncertainty, identify_ground, modulus_per_climb
+from soilml.systems.climbing import SimulatedRover, identify_ground
 
 pytestmark = pytest.mark.slow
 
@@ -24,12 +24,6 @@ def climbs(true):
     return true.simulate_climbs(np.random.default_rng(5), SLOPES, 3)
 
 
-@pytest.fixture(scope="module")
-def exact():
-    noise = Uncertainty(speed=0.0, slope=0.0, entry_angle=0.0, front_load=0.0)
-    return SimulatedRover(noise=noise, stress=0.0)
-
-
 def test_the_shear_modulus_is_identified_with_known_strength(true, climbs):
     ground = identify_ground(true.rover, climbs, fixed=SAND)
     assert ground.fit.names == ("shear_modulus",)
@@ -45,17 +39,6 @@ def test_unknown_wheel_loads_give_the_same_soil(true, climbs):
         identify_ground(rover, climbs, fixed=SAND).fit for rover in (true.rover, unknown)
     )
     assert shared.values[0] == pytest.approx(known.values[0], abs=2.0 * known.std[0])
-
-
-def test_a_speed_error_affects_the_shear_modulus_most_at_low_slip(exact):
-    climbs = exact.simulate_climbs(np.random.default_rng(1), SLOPES, 1)
-    size = {"cohesion": 0.0, "friction_angle": SAND["friction_angle"]}
-    low, as_read, high = (
-        modulus_per_climb(exact.rover, climbs, speed_error=e, **size) for e in (-0.015, 0.0, 0.015)
-    )
-    assert np.all(low > as_read) and np.all(high < as_read)
-    assert np.all(np.diff((low - high) / as_read) < 0.0)
-    assert (low[0] - high[0]) / as_read[0] > 5.0 * (low[-1] - high[-1]) / as_read[-1]
 
 
 def test_intervals_cover_the_truth_of_random_rovers(monkeypatch):

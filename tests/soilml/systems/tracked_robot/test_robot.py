@@ -48,22 +48,6 @@ def test_the_tension_of_an_even_pressure_is_that_of_a_ring():
     assert found.tension == pytest.approx(float(expected), rel=0.01)
 
 
-@pytest.mark.slow
-def test_a_raised_hitch_lowers_the_tail():
-    """Wang et al. 2018, section 4.1.3: the more it pulls, the more the robot inclines."""
-    model = Model(WANG2018.track)
-    at = Operating(slip=np.asarray([0.02, 0.1, 0.5]), load=WANG2018.load)
-    level = settling_from_moments(model, SAND, at, behind=0.01)
-    pulled = settling_from_moments(model, SAND, at, behind=0.01, hitch=0.03)
-    assert (pulled > level).all() and (np.diff(pulled) > 0).all()
-    trimmed = Model(replace(WANG2018.track, settling=pulled))
-    force, stands = trimmed(SAND, at), track_balance(trimmed, SAND, at)
-    expected = 0.01 + 0.03 * force.drawbar_pull / WANG2018.load
-    np.testing.assert_allclose(stands.centre, expected, atol=5e-5)
-    assert (np.diff(stands.trim) > 0).all()
-    assert np.isnan(settling_from_moments(model, SAND, at, behind=-0.3)).all()
-
-
 def test_the_example_on_the_page_runs(capsys):
     page = (Path(__file__).parents[4] / "docs/papers/wang2018.md").read_text()
     names: dict = {}

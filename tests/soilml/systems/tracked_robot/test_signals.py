@@ -6,7 +6,6 @@ from scipy import signal as scipy_signal
 
 from soilml.systems.tracked_robot.signals import (
     low_pass,
-    rut_mean,
     stationary_mean,
 )
 
@@ -54,10 +53,3 @@ def test_ramps_before_and_after_the_pull_are_excluded():
     assert stationary_mean(pull[:900]).mean == pytest.approx(
         0.0, abs=8.0
     )  # waiting stands still too
-
-
-def test_the_mean_of_a_rut_keeps_the_volume_of_soil():
-    lower, raised, part, pitch = 0.010, 0.006, 0.012, 0.05
-    mean = rut_mean([lower + raised], [lower], part, pitch)
-    assert (mean - lower) * pitch == pytest.approx(raised * part)  # eq. 16
-    assert rut_mean([0.02], [0.01], pitch, pitch) == pytest.approx(0.02)

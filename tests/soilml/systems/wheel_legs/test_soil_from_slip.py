@@ -42,11 +42,3 @@ def test_the_std_from_torque_is_that_of_repeated_tests(name):
         errors.append(found.friction_angle - ANGLE)
         claimed.append(found.std[0])
     assert np.std(errors) == pytest.approx(np.mean(claimed), rel=0.15)
-
-
-def test_the_std_from_vibration_is_that_of_repeated_tests():
-    rng, law = np.random.default_rng(4), VIBRATION_SLIP["linear"]
-    slip = law.slip(2.0, np.deg2rad(38.0), 1.0) + 0.5 * law.slip_std * rng.standard_normal(2000)
-    drawn = [soil_from_vibration(2.0, s) for s in slip]
-    errors = np.std([d.friction_angle for d in drawn])
-    assert errors == pytest.approx(0.5 * drawn[0].std[0], rel=0.1)
