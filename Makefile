@@ -66,7 +66,7 @@ models: $(VENV)/.ready ## train the released models again, into exported/
 
 limit: $(VENV)/.ready ## compute the Bayes limit of the benchmark and of the reference sets, ten minutes on two cores
 	@$(BIN)/soilml compare --limit training/benchmark/benchmark_limit.parquet
-	@$(BIN)/python bench/sets.py --limit
+	@$(BIN)/python bench/reference_sets.py
 
 kls1: $(VENV)/.ready ## evaluate the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
 	@$(BIN)/python examples/kls1/run.py
@@ -74,20 +74,14 @@ kls1: $(VENV)/.ready ## evaluate the KLS-1 tests: make kls1 SOILML_DATA=/path/to
 gap-real: $(VENV)/.ready ## gap workflow on published tests, and its page: make gap-real SOILML_DATA=/path/to/data
 	@$(BIN)/python examples/gap/real.py --write
 
-bench: $(VENV)/.ready ## measure speed and accuracy, and write BENCHMARKS.md and docs/benchmarks/
+bench: $(VENV)/.ready ## measure speed and accuracy, and write bench/results; goes on where it was ended
 	@$(BIN)/python bench/run.py
 
 bench-gap: $(VENV)/.ready ## 739 sets with hidden effects against gates and baselines; goes on where it was ended
-	@PIP_CONSTRAINT=constraints.txt $(BIN)/python -m pip install --quiet \
-	  --disable-pip-version-check --editable '.[bench]'
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --every 3 --enlarge 60 --write \
-	  --keep build/gap_records.json
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap_hybrid.py \
-	  --seed 10 11 --sets 10 --write
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap_speed.py --write
+	@$(BIN)/python bench/run.py gap gap-speed
 
-bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of seeds to tune on: nothing is written
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python bench/gap.py --seed 1 --every 20
+bench-gap-quick: $(VENV)/.ready ## a sample of these sets, of a seed to tune on: nothing is written
+	@$(BIN)/python bench/run.py gap --quick
 
 fuzz: $(VENV)/.ready ## fuzz every reader and public function for an hour: make fuzz FUZZ_SECONDS=3600
 	@$(BIN)/python tests/fuzz/fuzz_run.py --seconds $(or $(FUZZ_SECONDS),3600)

@@ -2,126 +2,81 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from benchmarks_file import ROOT
+from runner import ROOT, Bench, Row, Sample, rms, table
 
-from soilml import Case, Estimator, Operating, identify, read_case
-from soilml.experiment_design import (
-    advise,
-    candidate_grid,
-    samples_of_prior,
-    samples_of_rows,
-)
-from soilml.experiment_design.advice_after_results import advice_of_file
+from soilml import Case, Operating, identify, read_case
+from soilml.experiment_design import advise, candidate_grid, samples_of_rows
 from soilml.experiment_design.design import SLIPS
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.fit import Fit
-from soilml.identification.model_error_inputs import with_exact_model
 from soilml.io.table import Table
 
 LOADS = (30.0, 42.0, 60.0, 85.0, 120.0)
-SOILS = 120
+SOILS, QUICK_SOILS, SAMPLES = 120, 3, 1024
+#: Rows of the first drive, which are the seeds of the soils too.
+DRIVEN = (1, 3)
 #: Rows after the first drive, by name; `nothing` is no further row.
 KINDS = ("nothing", "repeat", "random", "advised")
+EXPECTED = "advised, as expected"
+ABOUT = (
+    "Remaining fraction of the prior width after one more reading, where that is the advised one, "
+    "a repetition, or a random one (docs/advice.md), and the error: root mean squares over "
+    f"{SOILS} soils, in standard deviations of the prior."
+)
 
 
-@dataclass(frozen=True)
-class Driven:
-    """Soils (s,) by kind of next row (k,) and parameter (p,), in standard deviations of the prior.
-
-    `expected` (s, p) is the width that the advice said would be left.
-    """
-
-    error: np.ndarray
-    std: np.ndarray
-    expected: np.ndarray
-
-    def root_mean_square(self) -> tuple[np.ndarray, np.ndarray]:
-        """Of error and of std, (k, p)."""
-        return np.sqrt(np.mean(self.error**2, axis=0)), np.sqrt(np.mean(self.std**2, axis=0))
+def cases(sample: Sample) -> list[Row]:
+    """All soils of each number of rows: they are drawn one after another."""
+    soils = QUICK_SOILS if sample.quick else SOILS
+    return [{"rows": rows, "soils": soils, "seed": rows} for rows in DRIVEN]
 
 
-def driven(case: Case, rows: int, soils: int, seed: int, samples: int = 1024) -> Driven:
+def driven(asked: Row) -> list[Row]:
+    """Soils by kind of next row: error and width, in standard deviations of the prior."""
+    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
+    return advised(case, asked["rows"], asked["soils"], asked["seed"])
+
+
+def advised(case: Case, rows: int, soils: int, seed: int, samples: int = SAMPLES) -> list[Row]:
     """Draw soils from the prior, drive `rows` at one slip and load, then one more row of each kind.
 
     The drawn point and the next ones are of one grid of slips and loads; the torque is measured
-    with the case's noise, the same draw of it whichever next row is driven.
+    with the case's noise, the same draw of it whichever next row is driven. `width` of the last
+    kind is what the advice said would be left.
     """
     rng = np.random.default_rng(seed)
     free = select_free(case, None)
     spread = np.asarray([f.prior.std for f in free])
-    found = []
+    found: list[Row] = []
     for _ in range(soils):
         truth = {f.path: float(f.prior.at(rng.random())) for f in free}
         values = np.asarray(list(truth.values()))
         first, other = ((rng.choice(SLIPS), rng.choice(LOADS)) for _ in range(2))
         normal = rng.standard_normal(rows + 1)
-        table = _measured(case, truth, [first] * rows, normal[:rows])
+        table = measured(case, truth, [first] * rows, normal[:rows])
         data = usable_readings(case, table)
         belief = samples_of_rows(case, data, free, samples, exact_model=True)
         best = advise(case, belief, candidate_grid(SLIPS, LOADS), channels=("torque",)).best()
-        points = {
-            "repeat": first,
-            "random": other,
-            "advised": (best.candidate.slip, best.candidate.load),
-        }
-        fits = [identify(case, table, None, "posterior")]
-        for point in points.values():
-            fits.append(_with(case, truth, [first] * rows, point, normal))
-        found.append(
-            (
-                [(fit.values - values) / spread for fit in fits],
-                [fit.std / spread for fit in fits],
-                best.remaining_fraction,
-            )
-        )
-    error, std, expected = (np.asarray(part) for part in zip(*found, strict=True))
-    return Driven(error, std, expected)
+        points = (first, other, (best.candidate.slip, best.candidate.load))
+        tables = [measured(case, truth, [*[first] * rows, point], normal) for point in points]
+        for kind, own in zip(KINDS, (table, *tables), strict=True):
+            fit = identify(case, own, None, "posterior")
+            error = (fit.values - values) / spread
+            found.append({"kind": kind, "width": fit.std / spread, "error": error})
+        found.append({"kind": EXPECTED, "width": best.remaining_fraction, "error": None})
+    return found
 
 
-def planned(case: Case, rows: int, soils: int, seed: int) -> dict[str, np.ndarray]:
-    """Std left (s, p) where `rows` are planned before any is driven, or drawn from the grid."""
-    rng = np.random.default_rng(seed)
-    free = select_free(case, None)
-    spread = np.asarray([f.prior.std for f in free])
-    ranges = candidate_grid(SLIPS, LOADS)
-    plan = advise(case, samples_of_prior(free), ranges, channels=("torque",), count=rows).sequence
-    best = [(choice.candidate.slip, choice.candidate.load) for choice in plan]
-    left: dict[str, list[np.ndarray]] = {"drawn": [], "planned": []}
-    for _ in range(soils):
-        truth = {f.path: float(f.prior.at(rng.random())) for f in free}
-        normal = rng.standard_normal(rows)
-        drawn = [(rng.choice(SLIPS), rng.choice(LOADS)) for _ in range(rows)]
-        for name, points in (("drawn", drawn), ("planned", best)):
-            table = _measured(case, truth, points, normal)
-            left[name].append(identify(case, table, None, "posterior").std / spread)
-    return {
-        **{name: np.asarray(values) for name, values in left.items()},
-        "planned, as expected": plan[-1].remaining_fraction[None],
-    }
-
-
-def _with(
-    case: Case,
-    truth: dict[str, float],
-    points: list[tuple[float, float]],
-    last: tuple[float, float],
-    normal: np.ndarray,
-) -> Fit:
-    return identify(case, _measured(case, truth, [*points, last], normal), None, "posterior")
-
-
-def _measured(
+def measured(
     case: Case,
     truth: dict[str, float],
     points: Sequence[tuple[float, float]],
     normal: np.ndarray,
 ) -> Table:
+    """Rows at some slips and loads."""
     slip, load = np.asarray(points, dtype=float).T
     true = case.with_values(truth)
     torque = np.asarray(true.model(true.soil, Operating(slip=slip, load=load)).torque)
@@ -130,104 +85,27 @@ def _measured(
     return Table({"run": run, "slip": slip, "load_N": load, "torque_Nm": torque})
 
 
-def next_rows(soils: int = SOILS) -> str:
-    """The section of the page: width and error that each next row leaves."""
-    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
-    lines = [
-        "| rows at one slip and load | then one row | std left c | phi | K | all "
-        "| RMSE c | phi | K | all |",
-        "|---|---|" + "---:|" * 8,
-    ]
-    for rows in (1, 3):
-        found = driven(case, rows, soils, seed=rows)
-        for kind, error, std in zip(KINDS, *found.root_mean_square(), strict=True):
-            cells = [f"{v:.3f}" for part in (std, error) for v in (*part, _all(part))]
-            lines.append(f"| {rows} | {kind} | {' | '.join(cells)} |")
-        expected = np.sqrt(np.mean(found.expected**2, axis=0))
-        cells = [f"{v:.3f}" for v in (*expected, _all(expected))]
-        lines.append(f"| {rows} | advised, as expected | {' | '.join(cells)} | | | | |")
-    return "\n".join(lines)
+def tables(rows: list[Row]) -> str:
+    """Width and error that each next row leaves."""
+
+    def cell(member: str, index: int | None):  # type: ignore[no-untyped-def]
+        def text(own: list[Row]) -> str:
+            values = [np.asarray(row[member]) for row in own if row[member] is not None]
+            part = [v if index is None else v[index] for v in values]
+            return f"{rms(part):.3f}" if part else ""
+
+        return text
+
+    columns = {
+        f"{title} {name}": cell(member, index)
+        for title, member in (("std left", "width"), ("RMSE", "error"))
+        for name, index in (("c", 0), ("phi", 1), ("K", 2), ("all", None))
+    }
+    by = {"rows at one slip and load": "rows", "then one row": "kind"}
+    ordered = sorted(rows, key=lambda r: (r["rows"], (*KINDS, EXPECTED).index(r["kind"])))
+    return table(ordered, by, columns)
 
 
-def plans(soils: int = SOILS) -> str:
-    """The section of the page: rows planned at once against rows drawn at random."""
-    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
-    lines = ["| rows | chosen | std left c | phi | K | all |", "|---|---|---:|---:|---:|---:|"]
-    for rows in (2, 3):
-        for name, left in planned(case, rows, soils, seed=10 + rows).items():
-            part = np.sqrt(np.mean(left**2, axis=0))
-            cells = [f"{v:.3f}" for v in (*part, _all(part))]
-            lines.append(f"| {rows} | {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def promises(
-    estimator: Estimator, soils: int = SOILS, rows: int = 1, seed: int = 5, errors: float = 1.0
-) -> tuple[np.ndarray, np.ndarray]:
-    """What a trained file promised of its advised row, and what it answered with it, (soils, q).
-
-    Both are widths in standard deviations of the prior, in the mode in which the file answers.
-    Soils are drawn from the prior of examples/wheel, `rows` from the grid. Sensors have the noise
-    of the case, and `errors` times the usual errors that all rows share.
-    """
-    case = read_case(ROOT / "examples" / "wheel" / "model.toml")
-    rng, free = np.random.default_rng(seed), select_free(case, None)
-    usual = estimator.sets.common_errors
-    promised, answered = [], []
-    for _ in range(soils):
-        truth = {f.path: float(f.prior.at(rng.random())) for f in free}
-        points = [(float(rng.choice(SLIPS)), float(rng.choice(LOADS))) for _ in range(rows)]
-        offset, load, torque = (
-            errors * usual[name] * rng.standard_normal()
-            for name in ("slip_bias", "load_gain", "torque_gain")
-        )
-        shared, normal = (offset, 1.0 + load, 1.0 + torque), rng.standard_normal(rows + 1)
-        readings = _readings(case, truth, points, normal[:rows], shared)
-        told = estimator.run(**readings)
-        if not told.in_range:
-            continue
-        best = advice_of_file(estimator, told.mean, told.covariance, readings).best()
-        points.append((best.candidate.slip, best.candidate.load))
-        after = estimator.run(**_readings(case, truth, points, normal, shared))
-        promised.append(best.remaining_fraction)
-        answered.append(after.std / estimator.prior.std)
-    return np.asarray(promised), np.asarray(answered)
-
-
-def _readings(
-    case: Case,
-    truth: dict[str, float],
-    points: list[tuple[float, float]],
-    normal: np.ndarray,
-    shared: tuple[float, float, float],
-) -> dict[str, np.ndarray]:
-    """Readings by name at slips and loads as they are read, with offset and gains of sensors."""
-    offset, load_gain, torque_gain = shared
-    true = [(slip - offset, load / load_gain) for slip, load in points]
-    slip, load = np.asarray(points).T
-    torque = torque_gain * _measured(case, truth, true, normal)["torque_Nm"]
-    return {"slip": slip, "load": load, "torque": torque}
-
-
-def from_file(soils: int = SOILS) -> str:
-    """The section of the page: promises of a trained file beside its answers."""
-    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    lines = [
-        "| rows first | model | promised c | φ | K | answered c | φ | K |",
-        "|---|---|" + "---:|" * 6,
-    ]
-    for rows in (1, 3, 6):
-        for name, own in (("default", estimator), ("exact", with_exact_model(estimator))):
-            parts = [np.sqrt(np.mean(x**2, axis=0)) for x in promises(own, soils, rows)]
-            cells = [f"{v:.2f}" for part in parts for v in part]
-            lines.append(f"| {rows} | {name} | {' | '.join(cells)} |")
-    return "\n".join(lines)
-
-
-def _all(parts: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(parts**2)))
-
-
-if __name__ == "__main__":
-    count = int(sys.argv[1]) if len(sys.argv) > 1 else SOILS
-    print(next_rows(count), plans(count), from_file(count), sep="\n\n")
+ADVICE = Bench(
+    "advice", "Experimental design: benefit of the advised reading", ABOUT, cases, driven, tables
+)

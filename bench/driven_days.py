@@ -35,10 +35,6 @@ SOILS = np.asarray([[100.0, 2900.0], [0.45, 0.77], [0.006, 0.029]])
 FRICTION_DRIFT, ZERO_DRIFT = -0.12, 0.5
 
 
-#: Halvings of the way to a far soil: a hundredth of it and less.
-BISECTIONS = 7
-
-
 class Kind(Enum):
     """What a row is in truth."""
 
@@ -82,7 +78,6 @@ def simulate_day(
     mechanism: str = "",
     size: float = 0.0,
     usual_errors: float = 0.0,
-    change: float | None = None,
 ) -> Day:
     """A day on three soils with glitches, a stuck sensor and a pause, which ends with a drift.
 
@@ -97,18 +92,12 @@ def simulate_day(
     usual_errors : float
         Size, over the usual one, of random errors of the sensors on this day and of the model on
         each soil.
-    change : float, optional
-        Rms relative change of torque from each soil to the next; without it soils are drawn.
     """
     rng = np.random.default_rng(seed)
     count = 3 * ROWS_PER_SOIL + ROWS_PAUSED + ROWS_DRIFTING
     slip, load = (low + (high - low) * _wander(rng, count) for low, high in (SLIP, LOAD))
     of_row = np.minimum(np.arange(count) // ROWS_PER_SOIL, 2)
     three = SOILS[:, 0] + (SOILS[:, 1] - SOILS[:, 0]) * rng.random((3, 3))
-    if change is not None:
-        for i in (1, 2):
-            here = slice(i * ROWS_PER_SOIL, (i + 1) * ROWS_PER_SOIL)
-            three[i] = nearer_soil(three[i - 1], three[i], change, slip[here], load[here])
     soils = three[of_row]
     begin = count - ROWS_DRIFTING
     ramp = np.clip((np.arange(count) - begin) / ROWS_DRIFTING, 0.0, 1.0)
@@ -116,8 +105,7 @@ def simulate_day(
     kinds[begin:] = Kind.DRIFTING
     if drift == "friction":
         # from the upper half of the friction angles, so that it stays inside of the prior
-        if change is None:
-            soils[of_row == 2, 1] = max(three[2, 1], SOILS[1, 0] - FRICTION_DRIFT)
+        soils[of_row == 2, 1] = max(three[2, 1], SOILS[1, 0] - FRICTION_DRIFT)
         soils[:, 1] += FRICTION_DRIFT * ramp
     errors = DrawnErrors.drawn(3, seed, usual_errors)
     torque = wheel_torque(slip, load, soils, errors.of_rows(of_row), mechanism, size)
@@ -150,20 +138,6 @@ def simulate_day(
     slip[paused], torque[paused], load[paused] = 0.0, 0.0, load[paused.start]
     kinds[paused] = Kind.PAUSED
     return Day({"slip": slip, "load": load, "torque": torque}, soils, tuple(kinds), tuple(changes))
-
-
-def nearer_soil(before: Floats, far: Floats, change: float, slip: Floats, load: Floats) -> Floats:
-    """The soil on the way to a far one at which torque has changed so much, or the far one."""
-    none = DrawnErrors.drawn(1, 0, 0.0).of_rows(np.zeros(len(slip), dtype=int))
-    torque = wheel_torque(slip, load, np.broadcast_to(before, (len(slip), 3)), none)
-    low, high = 0.0, 1.0
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        soil = np.broadcast_to(before + middle * (far - before), (len(slip), 3))
-        ratio = wheel_torque(slip, load, soil, none) / torque
-        enough = float(np.sqrt(np.mean((ratio - 1.0) ** 2))) > change
-        low, high = (low, middle) if enough else (middle, high)
-    return before + high * (far - before)
 
 
 def wheel_torque(

@@ -230,3 +230,36 @@ def _rms_error_over_noise(sets: SimulatedSets, index: int, y: Floats, true: Floa
             std = _noise_std(sets, index, name, read, b[read, :, k])
             squares.append(((a[read, :, k] - b[read, :, k]) / std) ** 2)
     return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+
+def posterior_of_memory(
+    family: WheelFamily, system: Floats, sets: SimulatedSets, index: int
+) -> RankedPosterior:
+    r"""The posterior of a linear system (m, terms + errors), as in `SetPosterior`, well sampled.
+
+    .. math:: \log p(y | x) = -\tfrac12 | S^{-1} A b(x) |^2 + const, \qquad I + G G^T = S S^T
+
+    with the last columns G the effects of errors that all readings share. They are integrated out
+    by the update of Andrews (AIAA Journal 6(6), 1968), with the Cholesky factor
+    :math:`I + G^T G = L L^T`:
+
+    .. math:: A' = A - G (L + I)^{-T} L^{-1} G^T A
+
+    The estimate of a file differs from it
+    by the Monte Carlo error of its short sampling alone. Its difference from the exact posterior is
+    the error of the learned response, and of a likelihood that is normal in the logarithm of a
+    reading.
+    """
+    axes, (degree, of_targets) = len(family.axes), family.degree
+    these = monomial_terms(axes, degree, family.targets, of_targets)
+    a, g = np.split(system, [len(these)], axis=1)
+    identity = np.eye(g.shape[1])
+    factor = np.linalg.cholesky(identity + g.T @ g)
+    a = a - g @ np.linalg.solve((factor + identity).T, np.linalg.solve(factor, g.T @ a))
+
+    def log_likelihood(x: Floats) -> Floats:
+        return np.asarray(-0.5 * ((monomials(x, these) @ a.T) ** 2).sum(axis=1))
+
+    return sample_posterior(Unknowns.of(family, sets, index), log_likelihood, sets.origin.x[index])[
+        0
+    ]

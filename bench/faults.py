@@ -125,6 +125,19 @@ def effects(case: Case) -> list[Fault]:
     return found
 
 
+def definitions() -> list[Fault]:
+    """Readings of another definition: of slip by travel, of torque by its unit or its side."""
+    return [
+        Fault("unit", "torque in lbf ft", _scaled("torque", 1.356)),
+        Fault("sensor", "torque halved", _scaled("torque", 0.5)),
+        Fault(
+            "sensor",
+            "slip read as s / (1 - s)",
+            lambda r: r | {"slip": r["slip"] / (1.0 - r["slip"])},
+        ),
+    ]
+
+
 def mixed_rows() -> list[Fault]:
     """Sets whose rows are not all readings of one soil."""
     return [

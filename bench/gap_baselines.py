@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
-from datagen.challenge.linear_entries import lasso_weights
-from datagen.challenge.process_entry import gaussian_process, process_features
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
-from soilml.fitting.predictions import linearise, predict
+from soilml.fitting.operating_points import operating_points
+from soilml.fitting.predictions import forces, linearise, predict
 from soilml.fitting.readings import stack_readings
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.quantities import column
+from soilml.quantities import CHANNELS, column
 
 
 def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
@@ -33,17 +31,11 @@ def names(soil_only: Case, table: Table, case: Case) -> dict[str, str]:
     free = select_free(case, None)
     at = np.asarray([f.prior.fraction(float(soil_only.parameters()[f.path][1])) for f in free])
     j = linearise(case, free, at, readings).jacobian / readings.std[:, None]
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        named = {"residual correlation": _correlated(g, r, labels)}
-        if find_spec("pysindy"):  # of the extra `bench`
-            named["STLSQ (pysindy)"] = _stlsq(g, r, labels)
-        return named | {
-            "Lasso, BIC": _lasso(g, r, labels),
-            "stepwise, AIC": _stepwise(g, r, j, labels, 2.0),
-            "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
-            "random forest sees a gap": _forest(readings.slip, readings.load, readings.channel, r),
-        }
+    return {
+        "residual correlation": _correlated(g, r, labels),
+        "Lasso, BIC": _largest(lasso_weights(g, r), g, labels),
+        "stepwise, BIC": _stepwise(g, r, j, labels, float(np.log(r.size))),
+    }
 
 
 def _correlated(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
@@ -56,17 +48,15 @@ def _largest(weights: np.ndarray, g: np.ndarray, labels: list[str]) -> str:
     return labels[int(np.argmax(share))] if share.max() > 0 else ""
 
 
-def _stlsq(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
-    import pysindy
+def lasso_weights(signatures: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Weights (k,) of signatures (m, k) of residuals (m,) in noise, by the Lasso with BIC."""
+    from sklearn.linear_model import LassoLarsIC
 
-    norm = np.linalg.norm(g, axis=0)
-    optimizer = pysindy.STLSQ(threshold=1.0, alpha=1e-3)
-    optimizer.fit(g / norm, r[:, None])
-    return _largest(optimizer.coef_[0] / norm, g, labels)
-
-
-def _lasso(g: np.ndarray, r: np.ndarray, labels: list[str]) -> str:
-    return _largest(lasso_weights(g, r), g, labels)
+    norm = np.maximum(np.linalg.norm(signatures, axis=0), 1e-12)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of steps that rounding makes too small
+        fitted = LassoLarsIC(criterion="bic", noise_variance=1.0).fit(signatures / norm, residual)
+    return np.asarray(fitted.coef_ / norm)
 
 
 def _stepwise(
@@ -84,13 +74,31 @@ def _stepwise(
     return labels[best] if costs[best] < base else ""
 
 
-def _forest(slip: np.ndarray, load: np.ndarray, channel: np.ndarray, r: np.ndarray) -> str:
-    """'gap' where a random forest explains residuals it has not seen."""
-    from sklearn.ensemble import RandomForestRegressor
+#: Columns that a process uses where they vary.
+COVARIATES = ("speed_m_s", "pass", "slip_angle_rad", "time_s")
 
-    x = np.column_stack([slip, np.log(load), channel])
-    forest = RandomForestRegressor(100, oob_score=True, min_samples_leaf=3, random_state=0)
-    return "gap" if forest.fit(x, r).oob_score_ > 0.0 else ""
+
+def process_features(table: Table) -> Callable[[Table], np.ndarray]:
+    """A function that gives slip, load and what varies in a table as features (rows, q)."""
+    varied = [name for name in COVARIATES if name in table and np.ptp(table[name]) > 0.0]
+
+    def features(rows: Table) -> np.ndarray:
+        columns: list[Any] = [rows["slip"] / 0.2, np.log(rows["load_N"]) / 0.4]
+        columns += [rows[name] / np.ptp(table[name]) for name in varied]
+        if "gear" in rows:
+            columns.append(np.unique(rows["gear"], return_inverse=True)[1])
+        return np.column_stack(columns)
+
+    return features
+
+
+def gaussian_process(dimensions: int) -> Any:
+    """A regressor of scikit-learn for readings in units of their noise."""
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
+    kernel = ConstantKernel(10.0, (1e-2, 1e6)) * RBF([1.0] * dimensions, (0.2, 20.0))
+    return GaussianProcessRegressor(kernel + WhiteKernel(1.0), random_state=0)
 
 
 #: Regressions of the residuals of a soil-only fit; the others are of the readings themselves.
@@ -139,4 +147,28 @@ def learned(
                 for part, rows in zip(found[label], parts, strict=True):
                     added = model.predict(features(rows)) * scale
                     part[name] = added if label in BESIDE_SOIL else added + base
+    return found
+
+
+def predicted(case: Case, rows: Table) -> dict[str, np.ndarray]:
+    """Predictions (rows,) of each channel, with the mean of the remainder."""
+    force = forces(case, operating_points(rows))
+    return {name: np.asarray(getattr(force, name)) for name in CHANNELS}
+
+
+def process_of_readings(case: Case, learned: Table, rows: Table) -> dict[str, np.ndarray]:
+    """Predictions of a Gaussian process of the readings, by slip, load and gear."""
+    names = [name for name in ("slip", "load_N", "gear") if name in learned]
+    features, found = process_features(Table({name: learned[name] for name in names})), {}
+    for name in CHANNELS:
+        known = np.isfinite(learned[column(name)])
+        if not known.any():
+            continue
+        reading = learned[column(name)][known]
+        scale = float(np.median(case.noise[column(name)].std(reading)))
+        process = gaussian_process(features(learned).shape[1])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            process.fit(features(learned)[known], (reading - reading.mean()) / scale)
+        found[name] = reading.mean() + scale * process.predict(features(rows))
     return found

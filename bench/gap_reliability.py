@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from gap_records import Judged, interval
 
-from soilml.gap.evidence.prior_odds import EXPECTED_CAUSES
+Judged = dict[str, Any]
 
 #: Statements in a bin.
 BIN = 50
@@ -156,63 +155,6 @@ def calibration_error(
     low, high = np.quantile(again, (0.025, 0.975))
     usual, seldom = np.quantile(exact, (0.5, 0.95))
     return error(stated, true), (float(low), float(high)), (float(usual), float(seldom))
-
-
-def at_expected_mix(sets: Sequence[Judged]) -> list[Bin]:
-    """The wide bins, where as many sets lack a cause of the catalogue as the analyst expects.
-
-    The prior expects `EXPECTED_CAUSES` causes, so that a share of exp(-1) of all sets has none. The
-    benchmark has fewer of these; they are weighted. Empty without bins or without such sets.
-    """
-    stated, _ = statements(sets)
-    cuts = _wide_cuts(stated)
-    without = [not s["catalogued"] for s in sets]
-    share = float(np.mean(without)) if sets else 0.0
-    if cuts is None or not 0.0 < share < 1.0:
-        return []
-    expected = float(np.exp(-EXPECTED_CAUSES))
-    weight = expected / (1.0 - expected) * (1.0 - share) / share
-    parts = [(*_pairs([s]), weight if bare else 1.0) for s, bare in zip(sets, without, strict=True)]
-    p = np.concatenate([own for own, _, _ in parts])
-    true = np.concatenate([own for _, own, _ in parts])
-    weights = np.concatenate([np.full(len(own), w) for own, _, w in parts])
-    at = np.searchsorted(stated[cuts], p, side="right")
-    total = np.bincount(at, weights)
-    means = [np.bincount(at, weights * values) / total for values in (p, true)]
-    count = np.bincount(at)
-    return [Bin(float(m), float(f), int(n)) for m, f, n in zip(*means, count, strict=True)]
-
-
-def save_picture(sets: Sequence[Judged], file: Path) -> None:
-    """Frequency over stated probability, with 95 % intervals; nothing without probabilities."""
-    stated, true = statements(sets)
-    small, wide = equal_bins(stated, true), wide_bins(stated, true)
-    if not wide:
-        return
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(figsize=(5.0, 4.6), layout="constrained")
-    axes.plot([0, 1], [0, 1], color="0.6", lw=1.0, zorder=0)
-    axes.scatter(
-        [b.stated for b in small], [b.frequency for b in small], s=10, color="0.7", label="50 each"
-    )
-    x, y = np.asarray([[b.stated, b.frequency] for b in wide]).T
-    low, high = np.asarray([interval(round(b.frequency * b.count), b.count) for b in wide]).T
-    span = [np.maximum(y - low, 0.0), np.maximum(high - y, 0.0)]
-    axes.errorbar(x, y, span, fmt="o", ms=5, color="C0", label="wide bins, 95 % interval")
-    axes.set(
-        xlabel="stated probability of an effect",
-        ylabel="share in which it was hidden",
-        xlim=(-0.02, 1.02),
-        ylim=(-0.02, 1.02),
-    )
-    axes.legend(frameon=False, loc="upper left")
-    file.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(file, format="png", dpi=110, metadata={"Software": "soilml"})
-    plt.close(figure)
 
 
 def _bin(stated: np.ndarray, true: np.ndarray) -> Bin:

@@ -1,86 +1,71 @@
-"""Measure how long a gap analysis takes, and write docs/benchmarks/gap-speed.md.
-
-python bench/gap_speed.py              a table of sets of 64, of 200 and of 5 rows
-python bench/gap_speed.py --sets 4     a quick look
-
-The sets are those of the blind benchmark, of seeds to tune on, one after the other in one process.
-Set OMP_NUM_THREADS=1 and OPENBLAS_NUM_THREADS=1.
-"""
+"""Seconds of a gap analysis and of the averaged answer of `identify`, on blind sets."""
 
 from __future__ import annotations
 
-import argparse
 import cProfile
 import pstats
-import sys
 from collections.abc import Iterator
 from itertools import islice
-from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))
-
+import gap_bench
 import numpy as np
-from benchmarks_file import write_page
-from core_speed import SOLVES, Timed, timed
-from gap_case import read_model
-from gap_records import table
+from core_speed import SOLVES, timed
+from runner import Bench, Row, Sample, table
 
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.plans import benchmark_plans
-from soilml.gap import GapReport, gap
-from soilml.io.table import Table
+from soilml import identify
+from soilml.gap import gap
 
-SECTION = "Seconds of an analysis"
-SEED = 1  # Of the plans; see `gap.SEEDS`
-SETS = 24  # Sets of each size
+SEED = 1  # Of the plans: sets to tune on
+SETS, QUICK_SETS = 24, 2  # Of each size
 #: Sets of each size in which calls of Python functions are counted, which takes three times as long
 COUNTED = 3
-#: Rows in all, design, and gates of median and longest in seconds at `SOLVES` solutions a second.
-SIZES = ((64, "sweep", 1.0, 4.0), (200, "sweep", 3.0, None), (5, "few-rows", 1.0, None))
+#: Rows in all, and design; those that `identify` is timed on; gates of median and longest in
+#: scaled seconds.
+SIZES = {64: "sweep", 200: "sweep", 5: "few-rows"}
+IDENTIFIED = (64, 5)
+GATES = {
+    ("gap", 64): (1.0, 4.0),
+    ("gap", 200): (3.0, None),
+    ("gap", 5): (1.0, None),
+    ("identify", 64): (2.0, None),
+}
+ABOUT = (
+    "Seconds of one core, raw and for a core that makes "
+    f"{SOLVES:,} forward solutions of the wheel in a second. The sets are those of the blind "
+    "benchmark, of a seed to tune on, one after the other. Goal of `identify`: a median of 2 s "
+    "for 64 rows."
+)
 
 
-def run() -> None:
-    """Time the sets, print the table; and write it where that is asked for."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--sets", type=int, default=SETS, help=f"of each size (default: {SETS})")
-    parser.add_argument("--write", action="store_true", help="write docs/benchmarks/gap-speed.md")
-    args = parser.parse_args()
-    analyse(next(sets(64, "sweep")))  # libraries are loaded
-    rows = [_row(size, args.sets) for size in SIZES]
-    header = ("sets", "raw: median, 90 %, longest", "scaled: median, 90 %, longest", "gate", "met")
-    text = (
-        f"Written by `python bench/gap_speed.py --sets {args.sets} --write`. Seconds of one core, "
-        f"raw and for a core that makes {SOLVES:,} forward solutions of the wheel in a second.\n\n"
-        + table((*header, "Python calls"), rows)
-    )
-    print(text)
-    if args.write:
-        write_page("gap-speed", (SECTION,), {SECTION: text.strip()})
-
-
-def _row(size: tuple[int, str, float, float | None], count: int) -> list[str]:
-    """The line of the table on sets of one size."""
-    number, design, median, longest = size
-    drawn_sets = list(islice(sets(number, design), count))
-    timed = [analyse(drawn) for drawn in drawn_sets]
-    scaled = [t.scaled for t in timed]
-    calls = np.median([_python_calls(drawn) for drawn in drawn_sets[:COUNTED]])
-    met = float(np.median(scaled)) <= median and (longest is None or max(scaled) <= longest)
-    gate = f"<= {median:g}" + (f", longest <= {longest:g}" if longest else "")
+def cases(sample: Sample) -> list[Row]:
+    """Analyses of the sets of each size, numbered."""
+    count = QUICK_SETS if sample.quick else SETS
+    calls = [("gap", size) for size in SIZES] + [("identify", size) for size in IDENTIFIED]
     return [
-        f"{len(drawn_sets)} of {number} rows",
-        _figures([t.seconds for t in timed]),
-        _figures(scaled),
-        gate,
-        "yes" if met else "**no**",
-        f"{calls:,.0f}",
+        {"of": of, "size": n, "design": SIZES[n], "sets": count, "call": f"{of}, {n} rows"}
+        for of, n in calls
     ]
 
 
-def _figures(seconds: list[float]) -> str:
-    return f"{np.median(seconds):.2f}, {np.quantile(seconds, 0.9):.2f}, {max(seconds):.2f}"
+def measured(case: Row) -> list[Row]:
+    """Seconds of each set, and calls of Python functions in some."""
+    analyse = {
+        "gap": lambda model, rows: gap(model, rows, seed=0),
+        "identify": identify,
+    }[case["of"]]
+    analyse(*gap_bench.given(next(sets(64, "sweep"))))  # libraries are loaded
+    found = []
+    for number, drawn in enumerate(islice(sets(case["size"], case["design"]), case["sets"])):
+        model, rows = gap_bench.given(drawn)
+        work = timed(model, lambda model=model, rows=rows: analyse(model, rows))
+        found.append({"seconds": work.seconds, "scaled": work.scaled})
+        if number < COUNTED and case["of"] == "gap":
+            profile = cProfile.Profile()
+            profile.runcall(analyse, model, rows)
+            found[-1]["calls"] = int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
+    return found
 
 
 def sets(rows: int, design: str) -> Iterator[BlindSet]:
@@ -96,19 +81,48 @@ def sets(rows: int, design: str) -> Iterator[BlindSet]:
                 yield drawn
 
 
-def analyse(drawn: BlindSet) -> Timed[GapReport]:
-    """The analysis of a set, timed."""
-    case, rows = read_model(drawn.model), Table(dict(drawn.columns))
-    return timed(case, lambda: gap(case, rows, seed=0))
+def tables(rows: list[Row]) -> str:
+    """Median, 90 % quantile and longest of each size, with their gates."""
+
+    def figures(member):  # type: ignore[no-untyped-def]
+        def cell(own: list[Row]) -> str:
+            seconds = [row[member] for row in own]
+            ends = np.median(seconds), np.quantile(seconds, 0.9), max(seconds)
+            return ", ".join(f"{s:.2f}" for s in ends)
+
+        return cell
+
+    def gate(own: list[Row]) -> tuple[float | None, float | None]:
+        return GATES.get((own[0]["of"], own[0]["size"]), (None, None))
+
+    def gate_text(own: list[Row]) -> str:
+        median, longest = gate(own)
+        text = f"<= {median:g}" if median else ""
+        return text + (f", longest <= {longest:g}" if longest else "")
+
+    def met(own: list[Row]) -> str:
+        (median, longest), scaled = gate(own), [row["scaled"] for row in own]
+        if median is None:
+            return ""
+        fine = float(np.median(scaled)) <= median and (longest is None or max(scaled) <= longest)
+        return "yes" if fine else "**no**"
+
+    def calls(own: list[Row]) -> str:
+        counted = [row["calls"] for row in own if "calls" in row]
+        return f"{np.median(counted):,.0f}" if counted else ""
+
+    columns = {
+        "sets": len,
+        "raw: median, 90 %, longest": figures("seconds"),
+        "scaled: median, 90 %, longest": figures("scaled"),
+        "gate": gate_text,
+        "met": met,
+        "Python calls": calls,
+    }
+    return table(rows, {"call": "call"}, columns)
 
 
-def _python_calls(drawn: BlindSet) -> int:
-    """How many functions an analysis calls."""
-    case, rows = read_model(drawn.model), Table(dict(drawn.columns))
-    profile = cProfile.Profile()
-    profile.runcall(gap, case, rows, seed=0)
-    return int(pstats.Stats(profile).total_calls)  # type: ignore[attr-defined]
-
-
-if __name__ == "__main__":
-    run()
+GAP_SPEED = Bench(
+    "gap-speed", "Gap workflow and averaged answer: seconds", ABOUT, cases, measured, tables,
+    timed=True, long=True,
+)  # fmt: skip

@@ -1,27 +1,29 @@
-"""Reference sets: fixed simulated sets whose exact posteriors are stored beside this file."""
+"""Reference sets: fixed simulated sets whose exact posteriors are stored beside this file.
+
+`python bench/reference_sets.py` computes these posteriors again, seven minutes on two cores.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from exact_sets import RankedPosterior, exact_set_posterior, si_values
+from exact_sets import exact_set_posterior
 
 from datagen.recipe import read_recipe
+from soilml.cli.progress import progress_bar
 from soilml.onboard.set_contract import ABSENT_STD
 from soilml.physics.gears import Wheel
 from soilml.processes import process_map
 from soilml.quantities import SHEAR
+from training.benchmark.bayes_limit_file import PosteriorSummary, save_limit
 from training.benchmark.designs import HASHED_DIGITS
-from training.set_posterior.families.dimensionless_sets import TORQUE_NOISE
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily
 from training.spec import read_any_wheel_spec
-
-Progress = Callable[[str, int, int], None]
 
 #: Rows per set, number of sets of each size, and a seed that no training or tuning uses.
 SIZES = (1, 3, 6, 8, 16, 32)
@@ -31,17 +33,11 @@ SEED = 4711
 CANDIDATES = 3
 #: Labels of the two families; they are part of the stored design keys.
 ONE_WHEEL, ANY_WHEEL = "reference wheel", "any wheel"
-#: Ends the labels of sets whose torque noise is equal in all rows; and the rows of these sets.
-CONSTANT, CONSTANT_ROWS = ", constant noise", 32
 
 
 @dataclass(frozen=True)
 class ReferenceSet:
-    """One reference set; `sets` holds this one set alone.
-
-    `declares_noise`: a file is told the constant part and the share of the torque noise, not the
-    standard deviation of each reading.
-    """
+    """One reference set; `sets` holds this one set alone."""
 
     label: str
     number: int
@@ -49,7 +45,6 @@ class ReferenceSet:
     sets: SimulatedSets
     effect: str = ""
     names: tuple[str, ...] = SHEAR
-    declares_noise: bool = False
 
     @property
     def rows(self) -> int:
@@ -96,63 +91,15 @@ def generate_reference_sets(max_sets: int = COUNT) -> list[ReferenceSet]:
     return references
 
 
-def constant_noise_sets(max_sets: int = COUNT) -> list[ReferenceSet]:
-    """Reference sets of 32 rows read again, with a torque noise in N m that is equal in all rows.
-
-    It is 1 to 8 % of the median torque of the set, log-uniform. Half of the rows have more, as a
-    share of their torque, and those of small slip far more.
-    """
-    return [
-        _with_constant_noise(reference)
-        for reference in generate_reference_sets(max_sets)
-        if reference.rows == CONSTANT_ROWS
-    ]
-
-
-def _with_constant_noise(reference: ReferenceSet) -> ReferenceSet:
-    sets, origin = reference.sets, reference.sets.origin
-    rng = np.random.default_rng((SEED, reference.number, reference.label == ANY_WHEEL))
-    x = np.broadcast_to(origin.x[0], (reference.rows, 1, origin.x.shape[1]))
-    torque = si_values(sets, 0, reference.family.responses(origin.designs[0], x))[:, 0, 0]
-    share = np.exp(rng.uniform(*np.log(TORQUE_NOISE)))
-    std = np.full((1, reference.rows), share * np.median(torque))
-    constant, of_torque = origin.noise["torque_bias"]
-    bias = np.hypot(constant, of_torque * torque)
-    noisy = torque + bias * rng.standard_normal() + std * rng.standard_normal(torque.shape)
-    return replace(
-        reference,
-        label=reference.label + CONSTANT,
-        sets=replace(
-            sets,
-            readings=sets.readings | {"torque": noisy, "torque_std": std},
-            origin=replace(origin, noise=origin.noise | {"torque": (std, np.zeros_like(std))}),
-        ),
-    )
-
-
 def _in_range(family: WheelFamily, context: Mapping[str, float]) -> bool:
     """Whether a file accepts this context: candidates exceed the ends of its range slightly."""
     ends = family.limits()
     return all(ends[name][0] <= value <= ends[name][1] for name, value in context.items())
 
 
-def compute_reference_posteriors(
-    references: Sequence[ReferenceSet], progress: Progress
-) -> Iterator[RankedPosterior]:
-    """The exact posterior of each set, in order, computed on all cores."""
-    with process_map(_exact, references) as found:
-        for done, summary in enumerate(found, 1):
-            progress("exact posteriors", done, len(references))
-            yield summary
-
-
 def packaged_posteriors() -> Path:
     """The file with the exact posteriors of the reference sets."""
     return Path(__file__).with_name("sets_limit.parquet")
-
-
-def _exact(reference: ReferenceSet) -> RankedPosterior:
-    return exact_set_posterior(reference.family, reference.sets, 0)
 
 
 def as_any_wheel_sets(references: Sequence[ReferenceSet]) -> list[ReferenceSet]:
@@ -202,3 +149,27 @@ def with_noise_of_reading(references: Sequence[ReferenceSet]) -> list[ReferenceS
             readings[key] = np.where(readings[key] < ABSENT_STD, std, ABSENT_STD)
         converted.append(replace(reference, sets=replace(sets, readings=readings)))
     return converted
+
+
+def _exact(reference: ReferenceSet) -> PosteriorSummary:
+    return exact_set_posterior(reference.family, reference.sets, 0)
+
+
+def store_posteriors() -> None:
+    """Compute and store the exact posteriors of all reference sets."""
+    references = generate_reference_sets()
+    with (
+        process_map(_exact, references) as found,
+        progress_bar("exact posteriors", len(references)) as done,
+    ):
+        summaries = []
+        for summary in found:
+            summaries.append(summary)
+            done(len(summaries))
+    save_limit(packaged_posteriors(), references, summaries)
+    flagged = sum(summary.flagged for summary in summaries)
+    print(f"written: {packaged_posteriors()}, {len(summaries)} sets, {flagged} flagged")
+
+
+if __name__ == "__main__":
+    store_posteriors()

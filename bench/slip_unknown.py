@@ -1,18 +1,16 @@
-"""Slip of a rover without odometry, on simulated drives: `python bench/run.py slip-unknown`.
+"""Slip of a rover without odometry, on simulated drives.
 
 Fixed numbers of the filter were chosen on drives of the seeds `TUNED`, the tables are of others.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import fields, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
-from benchmarks_file import ROOT
+from runner import ROOT, Bench, Row, Sample, markdown, rms
 from slip_drives import RADIUS, Drive, loads, simulate_drive
 
 from soilml import read_case
@@ -29,11 +27,16 @@ LOADS = (20.0, 140.0)  # N, of the table
 NO_SOIL = 0.5  # Probability of a hard floor from which on a row is refused
 SETTLED = 10  # Rows after a change from which a soil counts as found
 #: Lines: name, and what differs.
+FLOOR = "hard floor"
 WORLDS: dict[str, dict[str, Any]] = {
     "equal rim speeds": {},
     "rim speeds 10 % apart": {"apart": 0.1},
     "the same with slip-sinkage 0.3": {"apart": 0.1, "mechanism": "slip-sinkage", "size": 0.3},
+    FLOOR: {"floor": True},
 }
+METHODS = ("filter", "known soil", "line")
+#: Bands of the slip of the first wheel.
+BANDS = ((-1.0, 0.1), (0.1, 0.3), (0.3, 1.0))
 ABOUT = (
     f"Drives of docs/how-to/slip-unknown.md, {len(TESTED)} a line, by the reference wheel of "
     "`datagen/blind_sets`: three soils of 60 rows each, on slopes of -11 to 20 degrees. "
@@ -47,59 +50,64 @@ ABOUT = (
 )
 
 
-@dataclass(frozen=True)
-class Answers:
-    """Slips (rows, wheels) beside the truth."""
-
-    true: Floats
-    low: Floats
-    middle: Floats
-    high: Floats
-    no_soil: Floats  # (rows,)
-
-    def cells(self, rows: np.ndarray | slice = slice(None)) -> str:
-        """Rmse, coverage of the 90 % interval, and its median width."""
-        true, low, high = self.true[rows], self.low[rows], self.high[rows]
-        rms = np.sqrt(np.mean((self.middle[rows] - true) ** 2))
-        held = np.mean((low <= true) & (true <= high))
-        return f"{rms:.3f} | {100 * held:.0f} % | {np.median(high - low):.2f}"
+def cases(sample: Sample) -> list[Row]:
+    """Each drive of each world."""
+    return [{"world": w, "seed": seed} for w in WORLDS for seed in sample.of(TESTED)]
 
 
-def case() -> Any:
-    """The rover of the example."""
+@cache
+def rover() -> Any:
+    """The case of the example."""
     return read_case(ROOT / "examples/slip/rover.toml")
 
 
-def filtered(drive: Drive, table: ForceTable) -> Answers:
-    """What the filter says of a drive."""
-    rover = case()
-    filter_ = SlipFilter(table, rover.rover.weight, rover.drive)
-    belief, found = filter_.start(), []
+@cache
+def prior_table() -> ForceTable:
+    """Pull and torque over soils of the prior."""
+    return force_table(rover(), LOADS)
+
+
+def one_drive(case: Row) -> list[Row]:
+    """Rows of a drive: errors and intervals of the slip of each wheel by each method."""
+    drive = simulate_drive(case["seed"], **WORLDS[case["world"]])
+    own, floor = filtered(drive, prior_table())
+    answers = [own] if case["world"] == FLOOR else [own, known(drive), by_line(drive)]
+    return [
+        {
+            "row": i,
+            "true": true[0],
+            "floor": floor[i],
+            "error": [each[i, 1] - true for each in answers],
+            "held": [(each[i, 0] <= true) & (true <= each[i, 2]) for each in answers],
+            "width": [each[i, 2] - each[i, 0] for each in answers],
+        }
+        for i, true in enumerate(drive.slip)
+    ]
+
+
+def filtered(drive: Drive, table: ForceTable) -> tuple[Floats, Floats]:
+    """Interval and middle of each slip (rows, 3, wheels), and probability of a floor (rows,)."""
+    slips = SlipFilter(table, rover().rover.weight, rover().drive)
+    belief, found, floor = slips.start(), [], []
     for i in range(len(drive.time)):
         load, slope = loads(drive.slope[i]), float(drive.slope[i])
-        answer, belief = filter_.step(belief, drive.rim_speed[i], drive.torque[i], load, slope)
-        found.append((*answer.slip, np.full(4, answer.no_soil)))
-    low, middle, high, floor = np.moveaxis(np.asarray(found), 1, 0)
-    return Answers(drive.slip, low, middle, high, floor[:, 0])
+        answer, belief = slips.step(belief, drive.rim_speed[i], drive.torque[i], load, slope)
+        found.append(answer.slip)
+        floor.append(answer.no_soil)
+    return np.asarray(found), np.asarray(floor)
 
 
-def knowing(drive: Drive) -> Answers:
+def known(drive: Drive) -> Floats:
     """The same where each soil and its begin are known."""
     parts = []
     for number, soil in enumerate(drive.soils):
-        own = drive.ground == number
-        names = tuple(case().prior)
+        of_rows = [f.name for f in fields(Drive) if f.name != "soils"]
+        own = {name: getattr(drive, name)[drive.ground == number] for name in of_rows}
+        names = tuple(rover().prior)
         values = np.tile([soil[name] for name in names], (KNOWN, 1))
-        table = force_table(case(), LOADS, soils=SoilDraws(names, values))
-        rows = {n: getattr(drive, n)[own] for n in ("time", "rim_speed", "torque", "slope", "slip")}
-        parts.append(filtered(Drive(**rows, speed=drive.speed[own], ground=drive.ground[own],
-                                    soils=drive.soils), table))  # fmt: skip
-    return joined(parts)
-
-
-def joined(parts: Sequence[Answers]) -> Answers:
-    """Several answers as one."""
-    return Answers(*(np.concatenate([getattr(p, n) for p in parts]) for n in vars(parts[0])))
+        table = force_table(rover(), LOADS, soils=SoilDraws(names, values))
+        parts.append(filtered(replace(drive, **own), table)[0])
+    return np.concatenate(parts)
 
 
 def pull_share(drive: Drive) -> Floats:
@@ -107,70 +115,52 @@ def pull_share(drive: Drive) -> Floats:
     return drive.torque / (RADIUS * loads(drive.slope))
 
 
-def linear_law(drives: Sequence[Drive]) -> tuple[Floats, float]:
+@cache
+def linear_law() -> tuple[Floats, float]:
     """Slip as a straight line of torque over radius and load, and the standard error."""
+    drives = [simulate_drive(seed) for seed in TUNED]
     x, y = (np.concatenate([f(d).ravel() for d in drives]) for f in (pull_share, lambda d: d.slip))
     line = np.polyfit(x, y, 1)
     return line, float(np.std(y - np.polyval(line, x)))
 
 
-def by_line(drive: Drive, line: Floats, std: float) -> Answers:
+def by_line(drive: Drive) -> Floats:
     """Slip by that law."""
+    line, std = linear_law()
     middle = np.polyval(line, pull_share(drive))
-    reach = Z_90 * std
-    return Answers(drive.slip, middle - reach, middle, middle + reach, np.zeros(len(drive.time)))
+    return np.stack([middle - Z_90 * std, middle, middle + Z_90 * std], axis=1)
 
 
-def _one(seed: int, world: dict[str, Any], table: ForceTable, line: Any) -> list[Answers]:
-    drive = simulate_drive(seed, **world)
-    return [filtered(drive, table), knowing(drive), by_line(drive, *line)]
-
-
-def scores(
-    seeds: Sequence[int], worlds: Sequence[str], workers: int = 2
-) -> dict[str, list[Answers]]:
-    """Answers of the three methods in each world, all drives joined."""
-    table = force_table(case(), LOADS)
-    with ProcessPoolExecutor(workers) as pool:
-        line = linear_law(list(pool.map(simulate_drive, TUNED)))
-        found = {}
-        for name in worlds:
-            one = partial(_one, world=WORLDS[name], table=table, line=line)
-            each = list(pool.map(one, seeds))
-            found[name] = [joined([e[i] for e in each]) for i in range(3)]
+def cells(rows: list[Row]) -> list[str]:
+    """Rmse, coverage of the 90 % interval and its median width, by each method."""
+    error, held, width = (np.asarray([r[k] for r in rows]) for k in ("error", "held", "width"))
+    found = []
+    for k in range(len(METHODS)):
+        found += [f"{rms(error[:, k]):.3f}", f"{100 * held[:, k].mean():.0f} %"]
+        found.append(f"{np.median(width[:, k]):.2f}")
     return found
 
 
-def floors(seeds: Sequence[int], workers: int = 2) -> Floats:
-    """Probability of a hard floor at each row of drives on one, (drives, rows)."""
-    table = force_table(case(), LOADS)
-    with ProcessPoolExecutor(workers) as pool:
-        drives = pool.map(partial(simulate_drive, floor=True), seeds)
-        found = pool.map(partial(filtered, table=table), drives)
-        return np.asarray([one.no_soil for one in found])
+def tables(rows: list[Row]) -> str:
+    """A line for each world, and for bands of slip in it; rows that are refused."""
+    lines = []
+    for name in WORLDS:
+        own = [r for r in rows if r["world"] == name]
+        if name == FLOOR or not own:
+            continue
+        refused = np.mean([r["floor"] > NO_SOIL for r in own])
+        lines.append((name, len(own), *cells(own), f"{100 * refused:.1f} %"))
+        for low, high in BANDS:
+            some = [r for r in own if low <= r["true"] < high]
+            lines.append((f"- slip {low:g} to {high:g}", len(some), *cells(some), ""))
+    head = [f"{n}: {what}" for n in METHODS for what in ("rmse", "covered", "width")]
+    floor = [r for r in rows if r["world"] == FLOOR]
+    after = [r["floor"] > NO_SOIL for r in floor if r["row"] >= SETTLED]
+    drives = len({r["seed"] for r in floor})
+    return (
+        f"{markdown(('drives', 'rows', *head, 'refused'), lines)}\n\nHard floor: {drives} drives; "
+        f"refused {100 * np.mean(after):.0f} % of the rows from the {SETTLED}th on."
+    )
 
 
-def table(seeds: Sequence[int] = TESTED, worlds: Sequence[str] = tuple(WORLDS)) -> str:
-    """The tables of its page."""
-    three = " | ".join(f"{n}: rmse | covered | width" for n in ("filter", "known soil", "line"))
-    lines = [f"| drives | rows | {three} | refused |", "|---" + "|---:" * 11 + "|"]
-    for name, found in scores(seeds, worlds).items():
-        cells = " | ".join(one.cells() for one in found)
-        refused = np.mean(found[0].no_soil > NO_SOIL)
-        lines.append(f"| {name} | {len(found[0].true)} | {cells} | {100 * refused:.1f} % |")
-        for low, high in ((-1.0, 0.1), (0.1, 0.3), (0.3, 1.0)):
-            rows = (found[0].true[:, 0] >= low) & (found[0].true[:, 0] < high)
-            cells = " | ".join(one.cells(rows) for one in found)
-            lines.append(f"| - slip {low:g} to {high:g} | {rows.sum()} | {cells} | |")
-    floor = floors(seeds)
-    after = floor[:, SETTLED:] > NO_SOIL
-    lines += [
-        "",
-        f"Hard floor: {len(floor)} drives; refused {100 * np.mean(after):.0f} % of the rows from "
-        f"the {SETTLED}th on.",
-    ]
-    return "\n".join(lines)
-
-
-if __name__ == "__main__":
-    print(table())
+SLIP_UNKNOWN = Bench("slip-unknown", "Slip without odometry", ABOUT, cases, one_drive, tables)

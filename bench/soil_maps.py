@@ -1,4 +1,4 @@
-"""Maps of simulated drives on stretches that were held out: `python bench/run.py map`.
+"""Maps of simulated drives on stretches that were held out.
 
 Fixed numbers of `soilml.soil_maps` were chosen on drives of the seeds `TUNED`; the tables are of
 others.
@@ -6,14 +6,12 @@ others.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from functools import partial
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from benchmarks_file import ROOT
 from mapped_drives import SLIP_STD, TORQUE_NOISE, simulate_map_drive
+from runner import ROOT, Bench, Row, Sample, each, markdown, table
 from scipy.special import ndtri
 from slip_drives import GRAVITY, MASS, SLIPS, ground_forces, loads
 
@@ -48,6 +46,7 @@ SLOPE = np.deg2rad(15.0)  # That the rover is to climb
 EVERY = 8  # Of the rows held out, one in so many is asked whether the slope is climbed
 SLIP_LIMIT = 0.6
 Z_90 = 1.645
+BANDS = {"said 0 to 0.2": (0.0, 0.2), "0.2 to 0.8": (0.2, 0.8), "0.8 to 1": (0.8, 1.0)}
 ABOUT = (
     f"Drives of docs/how-to/map.md by the reference wheel of `datagen/blind_sets`, {len(TESTED)} a "
     "line: four wheels, 240 rows each over 60 m of a winding path. Soils change sharply up to "
@@ -65,16 +64,17 @@ ABOUT = (
 )
 
 
-def case() -> Any:
-    """The rover of the example."""
-    return read_case(ROOT / "examples/map/rover.toml")
+def cases(sample: Sample) -> list[Row]:
+    """Each drive of each world."""
+    return [{"world": w, "seed": seed} for w in WORLDS for seed in sample.of(TESTED, 2)]
 
 
-def one_drive(seed: int, world: Mapping[str, Any]) -> dict[str, dict[str, Floats]]:
-    """Measures by method, each an array over rows or soils."""
-    simulated = simulate_map_drive(seed, **world)
-    drive, rover = read_map_drive(simulated.columns, case()), case()
-    soil, rng = simulated.soil[drive.row], np.random.default_rng([seed, 2])
+def one_drive(case: Row) -> list[Row]:
+    """Measures of a drive by method."""
+    simulated = simulate_map_drive(case["seed"], **WORLDS[case["world"]])
+    rover = read_case(ROOT / "examples/map/rover.toml")
+    drive = read_map_drive(simulated.columns, rover)
+    soil, rng = simulated.soil[drive.row], np.random.default_rng([case["seed"], 2])
     begin = np.asarray(MIDDLES) + rng.uniform(-MOVED, MOVED, len(MIDDLES)) - 0.5 * LENGTH
     stretch = (drive.station[:, None] > begin) & (drive.station[:, None] < begin + LENGTH)
     held = stretch.any(axis=1)
@@ -86,37 +86,43 @@ def one_drive(seed: int, world: Mapping[str, Any]) -> dict[str, dict[str, Floats
     low = np.asarray([f.prior.lower for f in free])
     width = np.asarray([f.prior.upper for f in free]) - low
     true, places = ndtri((soil[held] - low) / width), drive.place[held]
-    one, one_read = (moments(e.run(**kept.rows), free) for e in (estimator, exact))
-    tracked, tracked_read = _tracked(estimator, exact, drive, held, free)
     count = int(held.sum())
+    one, one_read = (
+        (np.tile(mean, (count, 1)), np.tile(covariance, (count, 1, 1)))
+        for mean, covariance in (moments(e.run(**kept.rows), free) for e in (estimator, exact))
+    )
     answers = {
         "map": (field.at(places), field.at(places, as_read=True)),
-        "tracker": (tracked, tracked_read),
-        "one soil": (_spread(one, count), _spread(one_read, count)),
+        "tracker": tracked(estimator, exact, drive, held, free),
+        "one soil": (one, one_read),
     }
     at = np.arange(0, count, EVERY)
-    climbs = np.asarray([_climbs(simulated.soil[drive.row[held]][i]) for i in at])
-    found = {}
+    climbs = np.asarray([climbs_slope(soil[held][i]) for i in at])
+    found = []
     for name, ((mean, covariance), as_read) in answers.items():
         std = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
         climb = map_ability(rover, soils, mean[at], covariance[at], np.asarray([0.0, SLOPE]))
         likely = np.clip(climb.climbed[:, 1], 0.01, 0.99)
-        noise_of_draws = np.random.default_rng(0)
-        found[name] = {
-            "covered": np.abs(true - mean) < Z_90 * std,
-            "width": std,
-            "density": _log_normal(true - mean, covariance),
-            "torque": torque_score(rover, exact, drive.part(held), soils, as_read, noise_of_draws),
-            "climb": np.log(np.where(climbs, likely, 1.0 - likely)),
-            "said": likely,
-            "climbs": climbs,
-        }
+        draws = np.random.default_rng(0)
+        torque = torque_score(rover, exact, drive.part(held), soils, as_read, draws)
+        found.append(
+            {
+                "method": name,
+                "covered": (np.abs(true - mean) < Z_90 * std).mean(axis=0),
+                "width": np.median(std, axis=0),
+                "density": log_normal(true - mean, covariance).mean(),
+                "torque": torque.mean(),
+                "climb": np.log(np.where(climbs, likely, 1.0 - likely)).mean(),
+                "said": likely,
+                "climbs": climbs,
+            }
+        )
     return found
 
 
-def _tracked(
+def tracked(
     estimator: Estimator, exact: Estimator, drive: MapDrive, held: Floats, free: list[Any]
-) -> list[tuple[Floats, Floats]]:
+) -> list[tuple[Floats, ...]]:
     """Moments of the tracker's estimate before each row held out; and as sensors show the soil."""
     tracker, used, known = SoilTracker(estimator), [], {}
     found: list[list[Any]] = [[], []]
@@ -132,22 +138,18 @@ def _tracked(
             known[len(used)] = [moments(e, free) for e in (tracker.state.estimate, read)]
         for own, answer in zip(found, known[len(used)], strict=True):
             own.append(answer)
-    return [tuple(np.asarray(part) for part in zip(*own, strict=True)) for own in found]  # type: ignore[misc]
+    return [tuple(np.asarray(part) for part in zip(*own, strict=True)) for own in found]
 
 
-def _spread(answer: tuple[Floats, Floats], count: int) -> tuple[Floats, Floats]:
-    mean, covariance = answer
-    return np.tile(mean, (count, 1)), np.tile(covariance, (count, 1, 1))
-
-
-def _log_normal(residual: Floats, covariance: Floats) -> Floats:
+def log_normal(residual: Floats, covariance: Floats) -> Floats:
+    """Log density (n,) of normal distributions with these covariances at residuals (n, q)."""
     root = np.linalg.cholesky(covariance)
     white = np.linalg.solve(root, residual[..., None])[..., 0]
     volume = np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
     return -0.5 * (white**2).sum(axis=1) - volume - 1.5 * np.log(2.0 * np.pi)
 
 
-def _climbs(soil: Floats) -> bool:
+def climbs_slope(soil: Floats) -> bool:
     """Whether the reference wheel's rover climbs the slope on a soil, by a slip up to the limit."""
     names = ("cohesion", "friction_angle", "shear_modulus")
     sand = {"kc": 990.0, "kphi": 1528430.0, "n": 1.1, "a0": 0.4, "a1": 0.15, "unit_weight": 15e3}
@@ -157,54 +159,36 @@ def _climbs(soil: Floats) -> bool:
     return bool(pull.sum(axis=1).max() >= MASS * GRAVITY * np.sin(SLOPE))
 
 
-def scores(
-    seeds: Sequence[int], worlds: Sequence[str], workers: int = 2
-) -> dict[str, list[dict[str, dict[str, Floats]]]]:
-    """Measures of each drive, by world."""
-    with ProcessPoolExecutor(workers) as pool:
-        return {
-            name: list(pool.map(partial(one_drive, world=WORLDS[name]), seeds)) for name in worlds
-        }
-
-
-def _cell(each: Sequence[Floats]) -> str:
+def with_error(key: str) -> Callable[[list[Row]], str]:
     """Mean over drives, and its standard error."""
-    means = np.asarray([float(values.mean()) for values in each])
-    return f"{means.mean():.2f} ± {means.std(ddof=1) / np.sqrt(len(means)):.2f}"
+
+    def cell(rows: list[Row]) -> str:
+        means = np.asarray([row[key] for row in rows])
+        return f"{means.mean():.2f} ± {means.std(ddof=1) / np.sqrt(len(means)):.2f}"
+
+    return cell
 
 
-def table(seeds: Sequence[int] = TESTED, worlds: Sequence[str] = tuple(WORLDS)) -> str:
-    """The tables of its page."""
-    head = ("drives", "answer", "covered: c / phi / K", "width", "density", "torque", "climb")
-    lines = [f"| {' | '.join(head)} |", "|---|---" + "|---:" * 5 + "|"]
-    every: list[dict[str, dict[str, Floats]]] = []
-    for name, drives in scores(seeds, worlds).items():
-        every += drives
-        for method in METHODS:
-            own = [drive[method] for drive in drives]
-            covered = np.mean([one["covered"].mean(axis=0) for one in own], axis=0)
-            width = np.mean([np.median(one["width"], axis=0) for one in own], axis=0)
-            cells = [
-                " / ".join(f"{100 * share:.0f} %" for share in covered),
-                " / ".join(f"{w:.2f}" for w in width),
-                *(_cell([one[key] for one in own]) for key in ("density", "torque", "climb")),
-            ]
-            lines.append(f"| {name} | {method} | {' | '.join(cells)} |")
-    lines += ["", "| answer | said 0 to 0.2 | 0.2 to 0.8 | 0.8 to 1 |", "|---|---:|---:|---:|"]
-    for method in METHODS:
-        said, climbs = (
-            np.concatenate([drive[method][key] for drive in every]) for key in ("said", "climbs")
-        )
-        cells = []
-        for low, high in ((0.0, 0.2), (0.2, 0.8), (0.8, 1.0)):
-            own = (said >= low) & (said < high)
-            cells.append(
-                f"{100 * climbs[own].mean():.0f} % of {own.sum()} (said "
-                f"{100 * said[own].mean():.0f} %)" if own.any() else "-"
-            )  # fmt: skip
-        lines.append(f"| {method} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+def said(rows: Sequence[Row], low: float, high: float) -> str:
+    """How often the rover climbs where this was said of it."""
+    told, climbs = (np.concatenate([row[key] for row in rows]) for key in ("said", "climbs"))
+    own = (told >= low) & (told < high)
+    if not own.any():
+        return "-"
+    shares = 100 * climbs[own].mean(), 100 * told[own].mean()
+    return f"{shares[0]:.0f} % of {own.sum()} (said {shares[1]:.0f} %)"
 
 
-if __name__ == "__main__":
-    print(table())
+def tables(rows: list[Row]) -> str:
+    """Scores of each method in each world; what was said of a slope, and what happened."""
+    columns = {"covered: c / phi / K": each("covered", ".0%"), "width": each("width", ".2f")}
+    columns |= {key: with_error(key) for key in ("density", "torque", "climb")}
+    lines = [
+        (name, *(said([r for r in rows if r["method"] == name], *ends) for ends in BANDS.values()))
+        for name in METHODS
+    ]
+    scores = table(rows, {"drives": "world", "answer": "method"}, columns)
+    return f"{scores}\n\n{markdown(('answer', *BANDS), lines)}"
+
+
+SOIL_MAPS = Bench("map", "Soil along the way", ABOUT, cases, one_drive, tables)

@@ -1,254 +1,252 @@
-"""A day of driving: the tracker beside plain steps, `python bench/run.py streams`.
-
-`python bench/streams.py [DAYS [WORLD...]]` prints coverage and flags of the tracker over many days,
-with standard errors.
-"""
+"""Simulated days of driving: the tracker beside plain steps."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
+from typing import Any
 
 import numpy as np
-from benchmarks_file import ROOT
-from driven_days import SLIP_STD, TORQUE_NOISE, Day, Floats, Kind, simulate_day
+from driven_days import SLIP_STD, TORQUE_NOISE, Day, Kind, simulate_day
+from runner import ROOT, Bench, Row, Sample, table
 
 from soilml import Estimator, SoilTracker
-from soilml.io.text_tables import format_table
-from soilml.onboard.estimate import Estimate
 from soilml.onboard.tracking import Event
 
-#: Days of each line, of a table of many days, and the first seed. Limits of the tracker were chosen
-#: on days of other seeds.
+#: Days of each line, and of the table of many days, and the first seed. Limits of the tracker were
+#: chosen on days of other seeds.
 DAYS, MANY_DAYS, SEED = 12, 100, 100
 #: Rows after a change from which the soil counts as steady.
 SETTLED = 20
 #: A soil that changed is found if the tracker says so within so many rows.
 WITHIN = 40
 #: Sizes of a change, as rms relative change of torque, by which delays are listed.
-SIZES = (0.0, 0.1, 0.2, np.inf)
-#: Lines of the table: mechanism that the files do not model, its size, and size of usual errors.
-WORLDS = (
-    ("as modelled", "", 0.0, 0.0),
-    ("slip-sinkage 0.3", "slip-sinkage", 0.3, 0.0),
-    ("grousers of 10 mm", "grousers", 0.01, 0.0),
-    ("all typical errors", "", 0.0, 1.0),
-)
+SIZES = {"below 10 %": 0.0, "10 to 20 %": 0.1, "above 20 %": 0.2}
+#: Worlds: mechanism that the files do not model, its size, and size of usual errors.
+WORLDS = {
+    "as modelled": ("", 0.0, 0.0),
+    "slip-sinkage 0.3": ("slip-sinkage", 0.3, 0.0),
+    "grousers of 10 mm": ("grousers", 0.01, 0.0),
+    "all typical errors": ("", 0.0, 1.0),
+}
 #: Those of the table of many days: a right model, and errors as the averaged answer expects them.
 LONG_WORLDS = ("as modelled", "all typical errors")
+#: Answers: whether the tracker gives them, and what the file is told of errors of its model.
+AVERAGED = "tracker, averaged"
+ANSWERS: dict[str, tuple[bool, dict[str, float]]] = {
+    "tracker, `model_error` 0": (True, {"model_error": 0.0}),
+    AVERAGED: (True, {}),
+    "`step`, `model_error` 0": (False, {"model_error": 0.0}),
+    "`step`, averaged": (False, {}),
+}
 #: Deviation in standard deviations of a soil that the estimate is wrong about.
 FAR = 3.0
+ABOUT = (
+    "Simulated days of the reference wheel of `datagen/blind_sets`. A day has three soils of 100 "
+    "rows, 2 % torque noise, and slip with a standard deviation of 0.02. Of the rows, 2 % are "
+    "glitches (torque doubled or zero, slip off by a half); torque is stuck for 20 rows, slip for "
+    "15, and a pause lasts 10. Over the last 150 rows the friction angle falls by 7 degrees or the "
+    "zero of the torque sensor rises by 0.5 N m.\n\n"
+    "Width: median standard deviation over that of the prior. Intervals and flag `in_range`: rows "
+    f"from the {SETTLED}th on one soil on, glitches apart; the flag of rows that the tracker used. "
+    "Alarms: sound rows of unchanged soil that were set aside or called a change, drift or stuck "
+    "sensor. Changes by rms change of torque: how many were detected "
+    f"within {WITHIN} rows; median and largest delay in rows. Drift: how many were flagged; median "
+    "and largest delay. Last column: of the rows in a drift whose mean is off by more than so many "
+    "standard deviations, the share that carries a flag, and their number. Averaged: over sizes of "
+    "the model's errors, as by default. Slip stuck: the most rows of it that were used on a day, "
+    "up to the last. All typical errors: those of sensors are drawn for each day, those of bearing "
+    "and contact for each soil."
+)
 
 
-@dataclass
-class Tally:
-    """What happened in days of one world."""
-
-    covered: list[Floats] = field(default_factory=list)
-    widths: list[Floats] = field(default_factory=list)  # standard deviations over the prior's
-    answered: list[bool] = field(default_factory=list)
-    delays: list[tuple[float, float]] = field(default_factory=list)  # size and rows
-    false_alarms: list[bool] = field(default_factory=list)
-    glitches: list[bool] = field(default_factory=list)
-    stuck: list[bool] = field(default_factory=list)
-    slip_stuck: list[float] = field(default_factory=list)  # rows until each is set aside
-    paused: list[bool] = field(default_factory=list)
-    drifts: list[float] = field(default_factory=list)  # rows until flagged
-    far: list[bool] = field(default_factory=list)  # of rows far off in a drift: whether flagged
+def cases(sample: Sample) -> list[Row]:
+    """Each day of each world with each answer."""
+    days = sample.of(range(SEED, SEED + DAYS))
+    return [{"world": w, "answer": a, "seed": s} for w in WORLDS for a in ANSWERS for s in days]
 
 
-def tracked(estimator: Estimator, days: Sequence[Day]) -> Tally:
-    """The days as the tracker follows them."""
-    tally = Tally()
-    for day in days:
-        tracker = SoilTracker(estimator)
-        states = [tracker.read(**day.row(i)) for i in range(len(day.kinds))]
-        events = [state.event for state in states]
-        used = [event is Event.ACCEPTED for event in events]
-        _add_coverage(tally, day, [state.estimate for state in states], used)
-        told = [i for i, e in enumerate(events) if e in (Event.SOIL_CHANGED, Event.DRIFT)]
-        for row, size in day.changes:
-            delay = next((i - row + 1.0 for i in told if row <= i < row + WITHIN), np.inf)
-            tally.delays.append((size, delay))
-        for i, (kind, event) in enumerate(zip(day.kinds, events, strict=True)):
-            alarm = event in (Event.SOIL_CHANGED, Event.DRIFT, Event.SET_ASIDE, Event.STUCK)
-            unchanged = i < day.changes[0][0] or _rows_after_change(day, i) >= WITHIN
-            if kind is Kind.SOUND and unchanged:
-                tally.false_alarms.append(alarm)
-            elif kind is Kind.GLITCH:
-                tally.glitches.append(event in (Event.SET_ASIDE, Event.UNUSABLE))
-            elif kind is Kind.STUCK:
-                tally.stuck.append(event in (Event.STUCK, Event.SET_ASIDE))
-            elif kind is Kind.PAUSED:
-                tally.paused.append(event in (Event.REPEATED, Event.UNUSABLE))
-        tally.slip_stuck.append(_rows_used(day, events))
-        begin = day.kinds.index(Kind.DRIFTING)
-        tally.drifts.append(next((i - begin + 1.0 for i in told if i >= begin), np.inf))
-        flags = [state.drifting or state.rows_in_question > 0 for state in states]
-        _add_far(tally, day, [state.estimate for state in states], flags)
-    return tally
+def many(sample: Sample) -> list[Row]:
+    """More days, with the averaged answer."""
+    days = sample.of(range(SEED, SEED + MANY_DAYS), 2)
+    return [{"world": w, "answer": AVERAGED, "seed": s} for w in LONG_WORLDS for s in days]
 
 
-def stepped(estimator: Estimator, days: Sequence[Day]) -> Tally:
-    """The same days with `Estimator.step`, whose only alarm is `in_range`."""
-    tally = Tally()
-    for day in days:
-        memory, estimates = estimator.start(), []
-        for i in range(len(day.kinds)):
-            found, memory = estimator.step(memory, **day.row(i))
-            estimates.append(found)
-        _add_coverage(tally, day, estimates, [True] * len(estimates))
-        flags = [not found.in_range for found in estimates]
-        tally.false_alarms += flags[: day.changes[0][0]]
-        _add_far(tally, day, estimates, flags)
-    return tally
+def one_day(case: Row) -> Row:
+    """What happened on a day."""
+    mechanism, size, errors = WORLDS[case["world"]]
+    drift = ("friction", "zero")[case["seed"] % 2]
+    day = simulate_day(case["seed"], drift, mechanism, size, errors)
+    tracks, told = ANSWERS[case["answer"]]
+    noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
+    estimator = Estimator.load(ROOT / "exported" / "wheel.onnx").on(noise=noise, **told)
+    return tracked(estimator, day) if tracks else stepped(estimator, day)
 
 
-def _rows_after_change(day: Day, row: int) -> int:
+def tracked(estimator: Estimator, day: Day) -> Row:
+    """The day as the tracker follows it."""
+    tracker = SoilTracker(estimator)
+    states = [tracker.read(**day.row(i)) for i in range(len(day.kinds))]
+    events, estimates = [s.event for s in states], [s.estimate for s in states]
+    used = [event is Event.ACCEPTED for event in events]
+    changed = [i for i, e in enumerate(events) if e in (Event.SOIL_CHANGED, Event.DRIFT)]
+    alarms = (Event.SOIL_CHANGED, Event.DRIFT, Event.SET_ASIDE, Event.STUCK)
+    unchanged = [
+        i < day.changes[0][0] or rows_after_change(day, i) >= WITHIN for i in range(len(events))
+    ]
+
+    def those(kind: Kind, *told: Event) -> list[bool]:
+        return [e in told for k, e in zip(day.kinds, events, strict=True) if k is kind]
+
+    stuck = [i for i, kind in enumerate(day.kinds) if kind is Kind.SLIP_STUCK]
+    begin = day.kinds.index(Kind.DRIFTING)
+    flags = [state.drifting or state.rows_in_question > 0 for state in states]
+    return steady(day, estimates, used) | {
+        "delays": [
+            (size, delay(row, [i for i in changed if i < row + WITHIN]))
+            for row, size in day.changes
+        ],
+        "alarms": [
+            e in alarms
+            for k, e, same in zip(day.kinds, events, unchanged, strict=True)
+            if k is Kind.SOUND and same
+        ],
+        "glitches": those(Kind.GLITCH, Event.SET_ASIDE, Event.UNUSABLE),
+        "stuck": those(Kind.STUCK, Event.STUCK, Event.SET_ASIDE),
+        # up to the last that is used: a later one counts as never set aside
+        "slip_stuck": max((j + 1 for j, i in enumerate(stuck) if used[i]), default=0),
+        "paused": those(Kind.PAUSED, Event.REPEATED, Event.UNUSABLE),
+        "drift": delay(begin, changed),
+        "far": far_rows(day, estimates, flags),
+    }
+
+
+def stepped(estimator: Estimator, day: Day) -> Row:
+    """The same day with `Estimator.step`, whose only alarm is `in_range`."""
+    memory, estimates = estimator.start(), []
+    for i in range(len(day.kinds)):
+        found, memory = estimator.step(memory, **day.row(i))
+        estimates.append(found)
+    flags = [not found.in_range for found in estimates]
+    return steady(day, estimates, [True] * len(flags)) | {
+        "alarms": flags[: day.changes[0][0]],
+        "far": far_rows(day, estimates, flags),
+    }
+
+
+def delay(begin: int, told: Sequence[int]) -> float | None:
+    """Rows from a begin to the first that tells of it; None if none does."""
+    return next((i - begin + 1.0 for i in told if i >= begin), None)
+
+
+def rows_after_change(day: Day, row: int) -> int:
+    """Rows since the last change of soil."""
     return row - max([0, *(first for first, _ in day.changes if first <= row)])
 
 
-def _rows_used(day: Day, events: Sequence[Event]) -> float:
-    """Rows of a stuck slip up to the last that is used; a later one counts as never set aside."""
-    rows = [i for i, kind in enumerate(day.kinds) if kind is Kind.SLIP_STUCK]
-    used = [j + 1.0 for j, i in enumerate(rows) if events[i] is Event.ACCEPTED]
-    return max(used, default=0.0)
-
-
-def _add_coverage(
-    tally: Tally, day: Day, estimates: Sequence[Estimate], used: Sequence[bool]
-) -> None:
+def steady(day: Day, estimates: Sequence[Any], used: Sequence[bool]) -> Row:
     """Of steady rows: whether the intervals hold, and of used ones, whether they are in range."""
-    for i, (kind, found) in enumerate(zip(day.kinds, estimates, strict=True)):
-        if kind is Kind.SOUND and _rows_after_change(day, i) >= SETTLED:
-            soil = day.soils[i]
-            tally.covered.append((found.low <= soil) & (soil <= found.high))
-            tally.widths.append(found.std / found.prior_std)
-            tally.answered += [bool(found.in_range)] if used[i] else []
+    rows = [
+        i
+        for i, kind in enumerate(day.kinds)
+        if kind is Kind.SOUND and rows_after_change(day, i) >= SETTLED
+    ]
+    own = [(estimates[i], day.soils[i]) for i in rows]
+    return {
+        "covered": [(e.low <= soil) & (soil <= e.high) for e, soil in own],
+        "width": [e.std / e.prior_std for e, _ in own],
+        "answered": [bool(estimates[i].in_range) for i in rows if used[i]],
+    }
 
 
-def _add_far(tally: Tally, day: Day, estimates: Sequence[Estimate], flags: Sequence[bool]) -> None:
+def far_rows(day: Day, estimates: Sequence[Any], flags: Sequence[bool]) -> list[bool]:
     """Of rows in a drift whose estimate is far from the soil: whether that was flagged."""
-    for i, (kind, found) in enumerate(zip(day.kinds, estimates, strict=True)):
-        if kind is Kind.DRIFTING and np.any(np.abs(found.mean - day.soils[i]) > FAR * found.std):
-            tally.far.append(flags[i])
-
-
-def _percent(values: Sequence[bool]) -> str:
-    return f"{np.mean(values):.0%}" if values else "-"
-
-
-def _rows(delays: Sequence[float]) -> str:
-    """Share found, median and largest delay of those."""
-    found = [delay for delay in delays if np.isfinite(delay)]
-    if not found:
-        return f"0 of {len(delays)}"
-    return f"{len(found)} of {len(delays)}; {np.median(found):.0f}, {max(found):.0f}"
-
-
-def _line(name: str, tally: Tally) -> str:
-    covered = np.mean(tally.covered, axis=0)
-    of_size = [
-        _rows([rows for size, rows in tally.delays if low <= size < high])
-        for low, high in pairwise(SIZES)
-    ]
-    cells = [
-        name,
-        " / ".join(f"{share:.0%}" for share in covered),
-        " / ".join(f"{width:.2f}" for width in np.median(tally.widths, axis=0)),
-        _percent(tally.answered),
-        f"{1000 * np.mean(tally.false_alarms):.1f}",
-        *(of_size if tally.delays else ["-"] * len(of_size)),
-        _percent(tally.glitches),
-        _percent(tally.stuck),
-        f"{max(tally.slip_stuck):.0f}" if tally.slip_stuck else "-",
-        _percent(tally.paused),
-        _rows(tally.drifts) if tally.drifts else "-",
-        f"{_percent(tally.far)} of {len(tally.far)}",
-    ]
-    return f"| {' | '.join(cells)} |"
-
-
-def _driven(days: int, mechanism: str, size: float, errors: float) -> list[Day]:
     return [
-        simulate_day(seed, ("friction", "zero")[seed % 2], mechanism, size, errors)
-        for seed in range(SEED, SEED + days)
+        flags[i]
+        for i, (kind, e) in enumerate(zip(day.kinds, estimates, strict=True))
+        if kind is Kind.DRIFTING and np.any(np.abs(e.mean - day.soils[i]) > FAR * e.std)
     ]
 
 
-def table(file: Path, days: int = DAYS) -> str:
-    """The table of its page."""
-    noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
-    estimator = Estimator.load(file).on(noise=noise, model_error=0.0)
-    averaged = Estimator.load(file).on(noise=noise)
-    edges = ("below 10 %", "10 to 20 %", "above 20 %")
-    heads = (
-        "world and method",
-        "coverage of 90 % intervals: c / phi / K",
-        "width",
-        "in range",
-        "alarms per 1000 rows",
-        *(f"change {edge}" for edge in edges),
-        "glitches set aside",
-        "torque stuck",
-        "slip stuck, rows used",
-        "pause",
-        "drift",
-        f"flagged beyond {FAR:g} std",
-    )
-    lines = [f"| {' | '.join(heads)} |", "|---|" + "---:|" * (len(heads) - 1)]
-    for name, mechanism, size, errors in WORLDS:
-        driven = _driven(days, mechanism, size, errors)
-        lines.append(_line(f"{name}, tracker, `model_error` 0", tracked(estimator, driven)))
-        lines.append(_line(f"{name}, tracker, averaged", tracked(averaged, driven)))
-        lines.append(_line(f"{name}, `step`, `model_error` 0", stepped(estimator, driven)))
-        lines.append(_line(f"{name}, `step`, averaged", stepped(averaged, driven)))
-    return "\n".join(lines)
+def joined(rows: list[Row], member: str) -> list[Any]:
+    """Lists of all days as one."""
+    return [value for row in rows for value in row.get(member, ())]
 
 
-def table_of_many_days(file: Path, days: int, worlds: Sequence[str] = LONG_WORLDS) -> str:
+def all_days(member: str, form: str, of: Any = np.mean, scale: float = 1.0):  # type: ignore[no-untyped-def]
+    """A statistic of what the rows of all days have."""
+
+    def cell(rows: list[Row]) -> str:
+        values = joined(rows, member)
+        found = np.atleast_1d(of(values, axis=0)) * scale if values else []
+        return " / ".join(format(value, form) for value in found) or "-"
+
+    return cell
+
+
+def delays(found: list[float | None]) -> str:
+    """Share found, median and largest delay of those."""
+    told = [rows for rows in found if rows is not None]
+    many = f"{len(told)} of {len(found)}" if found else "-"
+    return f"{many}; {np.median(told):.0f}, {max(told):.0f}" if told else many
+
+
+def tables(rows: list[Row]) -> str:
+    """A line for each world and answer."""
+    ends = [*SIZES.values(), np.inf]
+    columns = {
+        "coverage of 90 % intervals: c / phi / K": all_days("covered", ".0%"),
+        "width": all_days("width", ".2f", np.median),
+        "in range": all_days("answered", ".0%"),
+        "alarms per 1000 rows": all_days("alarms", ".1f", scale=1000.0),
+    }
+    for name, (low, high) in zip(SIZES, pairwise(ends), strict=True):
+        columns[f"change {name}"] = lambda own, low=low, high=high: delays(
+            [rows for size, rows in joined(own, "delays") if low <= size < high]
+        ) if "delays" in own[0] else "-"  # fmt: skip
+    columns |= {
+        "glitches set aside": all_days("glitches", ".0%"),
+        "torque stuck": all_days("stuck", ".0%"),
+        "slip stuck, rows used": lambda own: max(r.get("slip_stuck", "-") for r in own),
+        "pause": all_days("paused", ".0%"),
+        "drift": lambda own: delays([r["drift"] for r in own if "drift" in r]),
+        f"flagged beyond {FAR:g} std": lambda own: (
+            f"{all_days('far', '.0%')(own)} of {len(joined(own, 'far'))}"
+        ),
+    }
+    return table(rows, {"world": "world", "answer": "answer"}, columns)
+
+
+def tables_of_many(rows: list[Row]) -> str:
     """Coverage and flags of the averaged answer, with standard errors over days."""
-    noise = {"slip": (SLIP_STD, 0.0), "torque": (0.0, TORQUE_NOISE)}
-    averaged = Estimator.load(file).on(noise=noise)
-    heads = "many days", "days", "c", "phi", "K", "in range", "alarms", "slip stuck", "torque stuck"
-    lines = []
-    for name, *world in WORLDS:
-        if name in worlds:
-            tallies = []
-            for day in _driven(days, *world):
-                tallies.append(tracked(averaged, [day]))
-                print(name, len(tallies), _long_line(tallies), file=sys.stderr, flush=True)
-            lines.append((name, *_long_line(tallies)))
-    return format_table(heads, lines)
+
+    def covered(k: int):  # type: ignore[no-untyped-def]
+        def cell(own: list[Row]) -> str:
+            shares = 100 * np.asarray([np.mean(row["covered"], axis=0)[k] for row in own])
+            error = shares.std(ddof=len(own) > 1) / np.sqrt(len(own))
+            return f"{shares.mean():.1f} ± {error:.1f}"
+
+        return cell
+
+    columns = {"days": len} | {name: covered(k) for k, name in enumerate(("c", "phi", "K"))}
+    columns |= {
+        "in range": all_days("answered", ".1f", scale=100.0),
+        "alarms": all_days("alarms", ".1f", scale=1000.0),
+        "slip stuck": lambda own: max(row["slip_stuck"] for row in own),
+        "torque stuck": all_days("stuck", ".1f", scale=100.0),
+    }
+    return table(rows, {"many days": "world"}, columns)
 
 
-def _long_line(tallies: Sequence[Tally]) -> tuple[str, ...]:
-    """Numbers of some days: shares in per cent, alarms per 1000 rows, most rows of a stuck slip."""
-
-    def percent(part: str) -> str:
-        return f"{100 * np.mean(np.concatenate([getattr(one, part) for one in tallies])):.1f}"
-
-    covered = 100 * np.asarray([np.mean(one.covered, axis=0) for one in tallies])
-    error = covered.std(axis=0, ddof=len(tallies) > 1) / np.sqrt(len(tallies))
-    return (
-        str(len(tallies)),
-        *(f"{c:.1f} +- {e:.1f}" for c, e in zip(covered.mean(axis=0), error, strict=True)),
-        percent("answered"),
-        f"{1000 * np.mean(np.concatenate([one.false_alarms for one in tallies])):.1f}",
-        f"{max(rows for one in tallies for rows in one.slip_stuck):.0f}",
-        percent("stuck"),
-    )
-
-
-def main() -> None:
-    """Print the table of many days."""
-    number = int(sys.argv[1]) if len(sys.argv) > 1 else MANY_DAYS
-    wheel = ROOT / "exported" / "wheel.onnx"
-    print(table_of_many_days(wheel, number, sys.argv[2:] or LONG_WORLDS))
-
-
-if __name__ == "__main__":
-    main()
+STREAMS = Bench("streams", "A day of driving", ABOUT, cases, one_day, tables)
+MANY = Bench(
+    "many-days",
+    "Many days of driving",
+    "Days of `streams`, with the averaged answer of the tracker. Coverage in per cent of rows, "
+    "with the standard error over days; alarms of 1000 sound rows of unchanged soil; most rows of "
+    "a stuck slip that were used on a day.",
+    many,
+    one_day,
+    tables_of_many,
+    long=True,
+)

@@ -22,12 +22,12 @@ from training.spec import read_any_wheel_spec
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
-from exact_sets import exact_set_posterior
+from exact_sets import exact_set_posterior, posterior_of_memory
 from reference_sets import (
+    ONE_WHEEL,
     generate_reference_sets,
     packaged_posteriors,
 )
-from set_comparison import posterior_of_memory
 
 pytestmark = pytest.mark.slow
 
@@ -168,3 +168,21 @@ def test_the_log_density_at_the_truth_is_that_of_the_exact_posterior(triples):
     gap = [e.log_density - m.log_density for _, m, e in triples]
     assert abs(np.mean(gap)) < 0.2
     assert np.mean([e.log_density for _, _, e in triples]) > 1.0  # both are far above the prior
+
+
+def test_sets_are_scored_beside_their_exact_posterior():
+    import sets
+    from runner import rows_of
+
+    case = {"name": f"wheel, {ONE_WHEEL}", "rows": 6, "count": 3}
+    rows = rows_of([{"case": case, "rows": sets.measured(case)}])
+    assert len(rows) == 3 and all(row["answered"] for row in rows)
+    ratio, _ = sets.rmse_ratio(rows)
+    assert np.all((ratio > 0.7) & (ratio < 1.4))
+    exact = [row | {"error": [row["error"][1]] * 2, "log_density": [2.0, 2.3]} for row in rows]
+    assert sets.rmse_ratio(exact)[0] == pytest.approx(1.0)
+    text = sets.tables([row | {"held90": np.ones((2, 3), bool)} for row in exact])
+    assert "| 0.300 |" in text and "100.0% / 100.0%" in text
+    even = np.random.default_rng(3).random((2000, 1))
+    assert sets.uniformity_p_values(even, (0.1, 0.5, 0.9))[0] > 0.01
+    assert sets.uniformity_p_values(even**2, (0.1, 0.5, 0.9))[0] < 1e-6

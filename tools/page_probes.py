@@ -160,37 +160,6 @@ def _moon(script: ModuleType) -> None:
     script.LAWS, script.RADII, script.draw = ("open",), (0.1,), _nothing
 
 
-def _c_review(script: ModuleType) -> None:
-    """Memory alone: the others need a compiler, an emulator, or half a minute."""
-    script.SETS, sys.argv = ("wheel_small",), ["", "memory"]
-
-
-def _stream_order(script: ModuleType) -> None:
-    script.CASES = ((0, 6, 3), (4, 8, 2))
-
-
-def _streams(script: ModuleType) -> None:
-    """One day on soils of 45 rows, with errors."""
-    days = sys.modules["driven_days"]
-    days.ROWS_PER_SOIL, days.ROWS_DRIFTING = 45, 20  # type: ignore[attr-defined]
-    days.ROWS_SLIP_STUCK, days.SLIP_STUCK_AT = 5, 30  # type: ignore[attr-defined]
-    script.LONG_WORLDS, script.MANY_DAYS, sys.argv = script.LONG_WORLDS[1:], 1, [""]
-
-
-def _few_rows(script: ModuleType) -> Callable[[], object]:
-    script.SIZES, script.ROWS_OF_THE_TEST = ((20, 1),), 200
-    whole = script.read_recipe
-    script.read_recipe = lambda name: whole(name).sized(1500, 4)
-    script.SOILS = {"unknown": script.SOILS["unknown"]}
-    return lambda: script.run(1)
-
-
-def _challenge(script: ModuleType) -> Callable[[], object]:
-    """Two sets in place of 24, of a seed whose figures hardly depend on rounding."""
-    script.SETS, script.SEED = 2, 3
-    return lambda: script.run(_folder(), ("gap", "stepwise", "lasso", "gp"))
-
-
 #: What makes a script small, by its path.
 PROBES: dict[str, Shrink] = {
     "examples/papers/lunar_lssvm.py": _lunar,
@@ -205,11 +174,6 @@ PROBES: dict[str, Shrink] = {
     "examples/gravity/moon.py": _moon,
     "examples/map/compare.py": _map_compare,
     "examples/slip/compare.py": _slip_compare,
-    "bench/c_review.py": _c_review,
-    "bench/challenge.py": _challenge,
-    "bench/few_rows.py": _few_rows,
-    "bench/stream_order.py": _stream_order,
-    "bench/streams.py": _streams,
 }
 
 

@@ -1,13 +1,14 @@
 """Published single-wheel tests through the gap workflow: `make gap-real SOILML_DATA=...`.
 
 Every set is analysed with three sets of priors; the reports are in
-`demo/gap/real/SET/PRIORS/report`, and `--write` writes docs/benchmarks/gap-measured.md.
+`demo/gap/real/SET/PRIORS/report`, and `--write` writes bench/results/gap-measured.md.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import datetime
 import io
 import json
 import math
@@ -22,8 +23,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent))
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
-from benchmarks_file import TITLES, machine, page_file, source_state
 from measured_sets import PRIORS, SETS, MeasuredSet, model_text, table_text
+from runner import RESULTS, machine, source_state, source_version
 from slips_kept_back import Errors, errors, table, verdict
 
 from soilml.cli import main
@@ -33,7 +34,7 @@ from soilml.processes import process_map
 
 HERE = Path(__file__).parent
 OUT = Path("demo/gap/real")
-PAGE = page_file("gap-measured")
+PAGE = RESULTS / "gap-measured.md"
 KEPT_BACK = "init"  # The priors with which slips are kept back
 SUSPECTED = "suspected"  # The status of a report that ranks suspects and states no cause
 UNDECIDED = "undecided"
@@ -180,8 +181,8 @@ def page(sets: list[MeasuredSet], found: Found, kept: dict[str, Errors]) -> str:
         rows.append([one.title, *cells, _survives(firsts[one.name], odds)])
     agree, open_ = (sum(row[-1] == text for row in rows) for text in ("yes", UNDECIDED))
     return template.render(
-        title=TITLES[PAGE.stem],
-        machine=machine(),
+        title="Gap workflow: published tests",
+        measured=f"{datetime.date.today()}, {source_version()}. {machine()}",
         sets=[{"name": s.name, "title": s.title, "table": _set_table(found[s.name])} for s in sets],
         beliefs=tomllib.loads((HERE / "beliefs.toml").read_text()),
         summary=_table(["set", *PRIORS, "survives"], rows),

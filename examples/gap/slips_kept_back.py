@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from gap_hybrid import predicted, process_of_readings
+from gap_baselines import predicted, process_of_readings
 
 from soilml import read_case, read_table
 from soilml.config.case import Case

@@ -45,7 +45,6 @@ friction angle and shear modulus, each with its uncertainty.
   from soil to a simulator     soilml export-soil
   runs of your own simulator   soilml design-runs
   comparison of methods        soilml compare
-  a challenge of blind sets    soilml challenge
   slopes that can be climbed   soilml pull (from measured rows)
                                soilml climb (from stress on the rims)
   wheels for a slope           soilml design
@@ -74,7 +73,6 @@ COMMANDS = {
     "gap": "soilml.cli.commands.gap",
     "adapt": "training.commands.adapt",
     "generate": "datagen.commands.generate",
-    "challenge": "datagen.commands.challenge",
     "train": "training.commands.train",
     "export-c": "training.commands.export_c",
     "export-fusion": "training.commands.export_fusion",

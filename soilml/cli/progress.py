@@ -101,13 +101,21 @@ class _CountedRows:
 def _bars(*, counted: bool, transient: bool) -> Progress:
     """Bars on a terminal, with or without the numbers of items."""
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
     return Progress(
         TextColumn("{task.description}"),
         BarColumn(),
         *([TextColumn("{task.completed}/{task.total}")] if counted else []),
         TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=transient,
     )
@@ -115,16 +123,27 @@ def _bars(*, counted: bool, transient: bool) -> Progress:
 
 def _lines(text: str, total: int | None, first: float | None = None) -> Callable[[int], None]:
     """A function of the number of items done that prints a line where it is time for one."""
-    due = time.monotonic() + (FIRST_LINE if first is None else first)
+    started = time.monotonic()
+    due = started + (FIRST_LINE if first is None else first)
 
     def tell(done: int) -> None:
         nonlocal due
-        if time.monotonic() < due or (total is not None and done >= total):
+        now = time.monotonic()
+        if now < due or (total is not None and done >= total):
             return
-        due = time.monotonic() + BETWEEN_LINES
-        _say(f"{text}: {100 * done // total} %" if total else f"{text} ...")
+        due = now + BETWEEN_LINES
+        if not total:
+            _say(f"{text} ...")
+            return
+        left = f", about {_duration((now - started) * (total - done) / done)} left" if done else ""
+        _say(f"{text}: {100 * done // total} %{left}")
 
     return tell
+
+
+def _duration(seconds: float) -> str:
+    """Such as 40 s, or 3 min."""
+    return f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
 
 
 def _say(text: str) -> None:

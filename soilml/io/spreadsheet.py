@@ -34,6 +34,7 @@ _UNCOUNTED = re.compile(  # a formula without a value
     _CELL % b"" + rb"\s*<(?:\w+:)?f(?:\s[^>]*)?(?:/>|>[^<]*</(?:\w+:)?f>)\s*"
     rb"(?:<(?:\w+:)?v\s*/>|<(?:\w+:)?v></(?:\w+:)?v>)?\s*</(?:\w+:)?c>"
 )
+_NUMBERS = (int, float)  # Types of cells that are numbers
 _PERCENT_FORMATS = ("9", "10")  # Numbers of the built-in formats with %
 
 Place = tuple[int, int]  # Row and column, from 0
@@ -90,7 +91,7 @@ def sheet_rows(path: Path) -> list[list[str]]:
             if row < len(rows) and column < len(rows[row]):
                 rows[row][column] = found[3].decode()
         _check_merged(where, rows, sheet.merged_cell_ranges or ())
-        if formula := _UNCOUNTED.search(xml):
+        if (b"<f" in xml or b":f" in xml) and (formula := _UNCOUNTED.search(xml)):
             raise TableError(
                 f"{where}, cell {_cell_name(_place(formula))}: a formula whose value is not in the "
                 "file; open it in a spreadsheet program and save it"
@@ -243,11 +244,13 @@ def _check_merged(where: str, rows: Cells, merged: Sequence[tuple[Place, Place]]
 def _check_dates(where: str, rows: Cells) -> None:
     """Refuse a date in a column of numbers: a spreadsheet takes 1.4 for the first of April."""
     width = len(rows[0]) if rows else 0
+    if not any(isinstance(value, datetime.date) for row in rows for value in row):
+        return
     # lines before a table, as `date: 2024-05-31`, have a name and a value
     wide = [i for i, row in enumerate(rows) if sum(v != "" for v in row) > min(2, width - 1)]
     for column in range(width):
         dates = [i for i in wide if isinstance(rows[i][column], datetime.date)]
-        if dates and any(_is_number(rows[i][column]) for i in wide):
+        if dates and any(type(rows[i][column]) in _NUMBERS for i in wide):
             raise TableError(
                 f"{where}, cell {_cell_name((dates[0], column))}: a date among numbers; the "
                 "spreadsheet has taken a number such as 1.4 for it: type it anew, in cells "
@@ -257,16 +260,16 @@ def _check_dates(where: str, rows: Cells) -> None:
 
 def _texts(rows: Cells, percents: set[Place]) -> list[list[str]]:
     """The cells as texts, without blank ones at the ends of rows and without blank last rows."""
-    in_percent: set[int] = set()  # columns whose head says %
-    found: list[list[str]] = []
-    for i, row in enumerate(rows):
-        texts = []
+    heads: set[int] = set()  # columns whose head says %
+    for i, row in enumerate(rows if percents else ()):
         for j, value in enumerate(row):
             if isinstance(value, str) and "%" in value:
-                in_percent.add(j)
-            elif (i, j) in percents and j in in_percent and _is_number(value):
-                value = float(f"{100.0 * value:.15g}")
-            texts.append(_text(value))
+                heads.add(j)
+            elif (i, j) in percents and j in heads and type(value) in _NUMBERS:
+                row[j] = float(f"{100.0 * value:.15g}")
+    found = []
+    for row in rows:
+        texts = [str(v).removesuffix(".0") if type(v) is float else _text(v) for v in row]
         while texts and not texts[-1]:
             texts.pop()
         found.append(texts)
@@ -280,15 +283,9 @@ def _text(value: Any) -> str:
         return " ".join(value.split())  # a tab or a new line would divide the cell
     if isinstance(value, bool):
         return str(int(value))
-    if isinstance(value, float):
-        return str(value).removesuffix(".0")
     if isinstance(value, datetime.date):
         return f"{value}" if isinstance(value, datetime.datetime) else f"{value} 00:00:00"
     if isinstance(value, datetime.timedelta):
         seconds = value.total_seconds()
         return f"{int(seconds // 3600):02d}:{int(seconds % 3600 // 60):02d}:{seconds % 60:09.6f}"
     return str(value)
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

@@ -85,6 +85,14 @@ class Estimate:
         The prior of the same quantities.
     misfit : ndarray, shape (...)
         Least sum of squared residuals in standard deviations, from a set posterior; else NaN.
+    disagrees : ndarray of bool, shape (...)
+        The fault detector of a set posterior: the rows disagree with the exact model, and with
+        sensors that have the errors that are declared or usual; the interval allows for errors of
+        the model. A unit, a sensor, the wheel or the model is then wrong. One in a hundred sound
+        sets is flagged; where it is False, nothing is proven.
+    exact_misfit, exact_probability : ndarray, shape (...)
+        The misfit with the exact model, and the share of sound sets with a larger one, which is
+        calibrated at 1 %; else NaN.
     rows_used, rows_set_aside : ndarray of int, shape (...)
         Rows in the training range, which the estimate uses, and rows out of it, which it does not.
         Rows that repeat another one are in neither.
@@ -115,6 +123,9 @@ class Estimate:
     prior: PriorSummary
     errors: HeldOutErrors | None = field(default=None, repr=False)
     misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
+    disagrees: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
+    exact_misfit: Floats = field(default_factory=lambda: _NOT_GIVEN)
+    exact_probability: Floats = field(default_factory=lambda: _NOT_GIVEN)
     rows_used: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     rows_set_aside: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
     reason: NDArray[Any] = field(default_factory=lambda: _NOT_GIVEN)
@@ -123,16 +134,18 @@ class Estimate:
     #: The fields that are arrays with the leading dimensions of the readings.
     ARRAYS: ClassVar[tuple[str, ...]] = (
         *("mean", "std", "covariance", "low", "high", "in_range"),
-        *("misfit", "rows_used", "rows_set_aside", "reason", "load"),
+        *("misfit", "disagrees", "exact_misfit", "exact_probability"),
+        *("rows_used", "rows_set_aside", "reason", "load"),
     )
 
     def __post_init__(self) -> None:
         """Fields that are not given are those of single readings."""
         inside = np.asarray(self.in_range)
-        if self.misfit is _NOT_GIVEN:
-            object.__setattr__(self, "misfit", np.full(inside.shape, np.nan))
-        if self.load is _NOT_GIVEN:
-            object.__setattr__(self, "load", np.full(inside.shape, np.nan))
+        for name in ("misfit", "exact_misfit", "exact_probability", "load"):
+            if getattr(self, name) is _NOT_GIVEN:
+                object.__setattr__(self, name, np.full(inside.shape, np.nan))
+        if self.disagrees is _NOT_GIVEN:
+            object.__setattr__(self, "disagrees", np.zeros(inside.shape, dtype=bool))
         if self.rows_used is _NOT_GIVEN:
             object.__setattr__(self, "rows_used", inside.astype(int))
         if self.rows_set_aside is _NOT_GIVEN:

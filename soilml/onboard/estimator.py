@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, without_copies
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
@@ -294,7 +295,8 @@ class Estimator:
         sets = self._configured_sets
         found, memory = sets.update(self.session, rows, memory)
         head = self.names, self.units, self.prior
-        return estimate_of_set(*head, found, memory, sets.least_share_in_range), memory
+        estimate = estimate_of_set(*head, found, memory, sets.least_share_in_range)
+        return with_exact_check(estimate, sets, self.session, memory), memory
 
     def __deepcopy__(self, memo: object = None) -> Estimator:
         """The estimator itself, which nothing changes."""

@@ -24,6 +24,12 @@ from soilml.report.terminal import shown_unit, significant
 
 #: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
 MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
+#: What the fault detector says of a run.
+DISAGREES = (
+    "the rows disagree with the exact model, as one in a hundred sound sets does; the interval "
+    "allows for errors of the model, not for a fault: check units, definition of slip, sensors, "
+    "and wheel"
+)
 #: Runs with the same remark have a line each up to this number, and one together beyond it.
 MOST_LINES = 10
 
@@ -135,6 +141,8 @@ def refusal_remarks(
         if reason == Reason.ESTIMATED and aside:
             text = f"{of_rows}; they are set aside, and the estimate is that of the others"
             found.append((name, Remark("rows-set-aside", text, severity="note")))
+        if estimate.disagrees[i] and reason != Reason.INCONSISTENT:
+            found.append((name, Remark("rows-disagree", DISAGREES)))
         if reason == Reason.ESTIMATED:
             continue
         why, what = reason.words, "the estimate is the prior"

@@ -32,6 +32,7 @@ from soilml.systems.wheel_legs.slip_models import (
     fit_torque_slip,
     fit_vibration_slip,
 )
+from soilml.systems.wheel_legs.soil_errors import LINEAR, SIMPLIFIED, SINKAGE
 from soilml.systems.wheel_legs.stances import (
     GRAVITY,
     SLIPS,
@@ -48,7 +49,10 @@ STIFFNESSES = np.linspace(3000.0, 6000.0, 7)
 DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))
 FRICTION = math.radians(40.0)
 #: Standard deviations (%) of the errors of torque, vibration and sinkage, table VIII, all soils.
-STD = {"friction": (14.0, 14.0, 9.0), "stiffness": (54.0, 27.0, 24.0)}
+STD = {
+    name: tuple(one.scatter[k] for one in (SIMPLIFIED, LINEAR, SINKAGE))
+    for k, name in enumerate(("friction", "stiffness"))
+}
 
 
 @cache

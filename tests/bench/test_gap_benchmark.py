@@ -2,7 +2,7 @@
 
 import json
 import sys
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,11 @@ from datagen.blind_sets import Plan
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
-import gap_enlarged
-import gap_records
+import gap_bench
+import gap_figures
 import gap_reliability
-import gap_table
-from gap_case import judged
+import gap_tables
+from runner import plain
 
 
 def record(**changed):
@@ -25,13 +25,13 @@ def record(**changed):
         "tier": "A",
         "design": "sweep",
         "discrepancy": 0.0,
-        "truth": ("slip-sinkage",),
+        "truth": ["slip-sinkage"],
         "catalogued": True,
         "rows": 64,
         "signal": 20.0,
         "snr": 10.0,
         "status": "named",
-        "cause_set": [("slip-sinkage",)],
+        "cause_set": [["slip-sinkage"]],
         "suspects": [],
         "probabilities": {"slip-sinkage": 0.99, "grousers": 0.01},
         "seconds": 0.5,
@@ -43,20 +43,20 @@ def record(**changed):
 
 def null(**changed):
     """A set in which nothing was hidden and nothing was found."""
-    empty = {"tier": "N0", "truth": (), "catalogued": False, "signal": 0.0, "snr": 0.0}
+    empty = {"tier": "N0", "truth": [], "catalogued": False, "signal": 0.0, "snr": 0.0}
     empty |= {"status": "no-gap", "cause_set": [], "probabilities": {"grousers": 0.01}}
     return record(**(empty | changed))
 
 
 def figure(sets, start):
     """The one figure whose name starts so."""
-    (found,) = [f for f in gap_table.figures(sets) if f.name.startswith(start)]
+    (found,) = [f for f in gap_figures.figures(sets) if f.name.startswith(start)]
     return found
 
 
 def test_the_right_cause_counts_where_the_runs_can_name_it():
     sets = [record() for _ in range(19)]
-    sets += [record(snr=1.0, cause_set=[("grousers",)]) for _ in range(5)]  # too weak to count
+    sets += [record(snr=1.0, cause_set=[["grousers"]]) for _ in range(5)]  # too weak to count
     sets += [record(design="one-load", cause_set=[]) for _ in range(5)]  # judged by suspects
     name = "right cause in the cause set, SNR >= 3, discrepancy 0%"
     assert figure(sets, name).met and "19/19" in figure(sets, name).measured
@@ -68,10 +68,10 @@ def test_the_right_cause_counts_where_the_runs_can_name_it():
 
 
 def test_names_where_nothing_was_hidden_are_false():
-    named = {"status": "named", "cause_set": [("grousers",)]}
+    named = {"status": "named", "cause_set": [["grousers"]]}
     sets = [null() for _ in range(30)] + [null(tier="D", discrepancy=0.02, **named)]
     sets += [null(design="unequal-soils"), null(tier="N1", **named)]
-    sets += [null(tier="C", truth=("crust",), status="unknown"), null(tier="C", **named)]
+    sets += [null(tier="C", truth=["crust"], status="unknown"), null(tier="C", **named)]
     assert figure(sets, "falsely unique: null").measured.endswith("0/30")
     assert figure(sets, "falsely unique: null").met
     assert figure(sets, "falsely unique: scatter").measured.endswith("1/2")
@@ -93,9 +93,7 @@ def test_probabilities_are_judged_by_all_their_bins_and_by_what_chance_does():
         names = [f"e{i}" for i in range(10)]
         for p, t in zip(stated.reshape(300, 10), hidden.reshape(300, 10), strict=True):
             given = dict(zip(names, p.tolist(), strict=True))
-            yield record(
-                probabilities=given, truth=tuple(n for n, h in zip(names, t, strict=True) if h)
-            )
+            yield record(probabilities=given, truth=[n for n, h in zip(names, t, strict=True) if h])
 
     error, (below, above), (usual, seldom) = gap_reliability.calibration_error(list(sets(exact)))
     assert below <= error <= above and usual < seldom and error < 1.2 * seldom
@@ -115,10 +113,10 @@ def test_a_group_is_enlarged_until_it_has_enough_sets():
     def snr(given):
         return 4.0 if given.seed % 2 else 1.0
 
-    found = list(gap_enlarged.added(plans, sample, 10, snr))
-    assert {group for _, group in found} == {gap_enlarged.LARGE} and len(found) == 8
+    found = list(gap_bench.added(plans, sample, 10, snr))
+    assert {group for _, group in found} == {gap_figures.LARGE} and len(found) == 8
     assert all(snr(p) > 3.0 and p not in sample and p.discrepancy == 0.04 for p, _ in found)
-    assert len(list(gap_enlarged.added(plans, sample, 99, snr))) == 18  # as far as there are any
+    assert len(list(gap_bench.added(plans, sample, 99, snr))) == 18  # as far as there are any
 
 
 def test_region_soil_and_time_are_compared_with_their_gates():
@@ -140,10 +138,53 @@ def test_region_soil_and_time_are_compared_with_their_gates():
 @pytest.mark.slow
 def test_a_set_is_analysed_and_compared_with_its_truth():
     plan = Plan("A", "slip-sinkage", 1.0, 0.02, 8, "dry-sand", 3, 7, discrepancy=0.01)
-    found = judged((1, plan))
-    assert found["truth"] == ("slip-sinkage",) and found["catalogued"] and found["rows"] == 64
+    found = gap_bench.judged(asdict(plan) | {"number": 1})
+    assert found["truth"] == ["slip-sinkage"] and found["catalogued"] and found["rows"] == 64
     assert found["snr"] > 3.0 and found["seconds"] > 0.0 and found["status"] != "crash"
     assert set(found["soil"]) == {"cohesion", "friction_angle", "shear_modulus"}
     assert found["region"]["soil"] > found["region"]["named"] > 0.0 or not found["cause_set"]
-    (kept,) = gap_records.from_json(json.loads(json.dumps([found])))
-    assert kept["truth"] == found["truth"] and kept["cause_set"] == found["cause_set"]
+    assert json.loads(json.dumps(plain(found)))["cause_set"] == found["cause_set"]
+
+
+METHODS = dict.fromkeys(gap_tables.METHODS, 4.0)
+
+
+def held(**changed):
+    """A set with rows held out."""
+    parts = {"between": METHODS | {"named": 1.0, "process of readings": 2.0}}
+    parts |= {"region": METHODS | {"named": 2.0}, "gap": {"train": [10.0, 1.0]}}
+    return record(cause="slip-sinkage", relatives=[], **(parts | changed))
+
+
+def law(**changed):
+    """A set whose shear law is a hyperbola."""
+    hidden = {"tier": "L", "truth": ["hyperbolic-shear"], "cause_set": [["shear-softening"]]}
+    family = {"relatives": ["hyperbolic-shear", "shear-softening"]}
+    return held() | {"cause": "hyperbolic-shear"} | hidden | family | changed
+
+
+def test_predictions_are_compared_where_the_soil_alone_leaves_something():
+    sets = [held() for _ in range(3)]
+    sets += [held(between=METHODS | {"soil": 0.5, "named": 5.0})]  # nothing left to improve
+    over = "held out between, returned model over soil alone: "
+    assert figure(sets, over + "median").met and figure(sets, over + "worst").met
+    process = figure(sets, "held out between, over a Gaussian process alone, discrepancy 0%")
+    assert process.measured.startswith("0.500 (3 sets)") and process.met
+    worse = [*sets, held(between=METHODS | {"named": 6.0})]
+    assert not figure(worse, over + "worst").met
+    assert figure(worse, "held out between, worse than").measured.endswith("1/4")
+    none = figure(sets, "held out between, over a Gaussian process alone, discrepancy 4%")
+    assert none.met is None and none.measured == "-"
+
+
+def test_a_law_of_the_same_family_is_right_and_any_other_is_false():
+    wrong = law(cause_set=[["slip-sinkage"]])
+    several = law(status="class", cause_set=[["slip-sinkage"], ["shear-softening"]])
+    found = [law(), wrong, several]
+    assert figure(found, "a law differs").measured.endswith("1/3")
+    assert figure(found, "falsely unique: another law").measured.endswith("1/3")
+    mixed = law(cause_set=[["shear-softening", "slip-sinkage"]])
+    assert figure([mixed], "falsely unique: another").measured.endswith("1/1")
+    assert gap_bench.relatives("C", "stiff-layer", ["stiff-layer"]) == ["firm-base"]
+    assert gap_bench.relatives("T", "trend/friction", ["trend"]) == ["friction-drift"]
+    assert "## Other laws" in gap_tables.tables(found)

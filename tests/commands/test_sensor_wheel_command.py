@@ -63,6 +63,14 @@ def test_the_modulus_is_found_and_predicts_the_pull_of_the_slopes(files, capsys)
     assert "k_x of run flat" in said.err
 
 
+def test_a_stress_in_kpa_is_told(files, capsys):
+    head, *rows = (line.split(",") for line in (files / "stress.csv").read_text().splitlines())
+    lines = [",".join(head), *(f"{run},{angle},{float(p) / 1000}" for run, angle, p in rows)]
+    (files / "stress.csv").write_text("\n".join(lines) + "\n")
+    assert main(COMMAND) == 0
+    assert "2e+03 times the measured one: probably normal_Pa is in kPa" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("file", "old", "new", "options", "expected"),
     [

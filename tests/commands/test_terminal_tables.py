@@ -55,7 +55,6 @@ ELSEWHERE = {
     "completion",
     "import",
     "generate",
-    "challenge",
     "train",
     "design-runs",
     "export-c",

@@ -59,6 +59,7 @@ def test_the_motion_of_a_turn_has_the_commanded_slip(tmp_path, capsys):
         (["--legs", "2.5"], "needed are whole numbers"),
         (["--legs", "9"], "9 legs; the model is for 1 to 6"),
         (["--mass", "-1"], "needed is 0.01 to 100000 kg"),
+        (["--slip", "0,50"], "--slip is 50; needed is 1 - v/(r omega)"),
         (["--stiffness", "1e6", "--offset"], "has no stress at the surface"),
         (["--stiffness", "1e5:1e6:200", "--legs", "3:6:4"], "800 walks; at most 400"),
         (["--legs", "4,5", "--foot", "none,LTF,SRF"], "a picture shows the turns of 8 or fewer"),

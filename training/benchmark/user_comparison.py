@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -33,8 +34,11 @@ Progress = Callable[[str, int, int], None]
 
 
 #: Most sets of one size that are scored, and how many of these the slower analytic methods get.
-MAX_SETS = 4000
+MAX_SETS = 2000
 ANALYTIC_SETS = 120
+#: Wall time, s, that the analytic methods take about where no number of sets is asked for, and the
+#: sets of each that tell how long one takes: they are the fewest that are scored.
+ANALYTIC_SECONDS, PILOT = 75.0, 4
 #: Fewest sets of a size that are scored: the standard error of 90 % coverage is then 7 %.
 MIN_SETS = 20
 
@@ -102,7 +106,7 @@ def compare(
     table: Table,
     estimators: Mapping[str, Estimator],
     progress: Progress = lambda text, done, total: None,
-    analytic_sets: int = ANALYTIC_SETS,
+    analytic_sets: int | None = None,
 ) -> MethodScores:
     """Score the prior, model files and analytic methods on single readings and on whole runs.
 
@@ -114,7 +118,8 @@ def compare(
     table: Test data with the true soil in columns; runs of equal length are the sets.
     estimators: Model files by label; all must estimate the same soil parameters.
     progress: Called with a description, the number of estimates done, and their total.
-    analytic_sets: Number of sets of each size for the analytic methods.
+    analytic_sets: Number of sets of each size for the analytic methods; by default at most
+        `ANALYTIC_SETS`, and as many as they can do in about `ANALYTIC_SECONDS`.
 
     Returns: A list of `MethodResult`, by size of set, then by method; its `plot` draws it.
 
@@ -130,7 +135,9 @@ def compare(
     fast = [prior_method(priors)]
     for label, estimator in estimators.items():
         fast.append(model_file_method(label, estimator))
-    slow = [analytic_method(case, name, names) for name in METHODS]
+    # the quickest first: what they leave of the time is for the others
+    order = sorted(METHODS, key=lambda name: name in ("averaged", "posterior"))
+    slow = [analytic_method(case, name, names) for name in order]
     scores = []
 
     def score(
@@ -150,14 +157,35 @@ def compare(
         )
         scores.append(result)
 
-    for size, sets in _sets_by_size(table).items():
+    by_size = _sets_by_size(table)
+    for size, sets in by_size.items():
         for method in fast:
-            score(method, sets)
-        fewer = sets[:: max(len(sets) // analytic_sets, 1)][:analytic_sets]
-        for method in slow:
-            if all(column(c) in fewer[0] for c in method.channels):
-                score(method, fewer, partial(progress, f"{method.label}, {size} rows"))
+            score(method, sets, partial(progress, f"{method.label}, {size} rows"))
+    jobs = [
+        (method, size)
+        for method in slow
+        for size, sets in by_size.items()
+        if all(column(c) in sets[0] for c in method.channels)
+    ]
+    started = time.monotonic()
+    for number, (method, size) in enumerate(jobs):
+        sets, count = by_size[size], analytic_sets
+        if count is None:
+            left = ANALYTIC_SECONDS - (time.monotonic() - started)
+            count = _affordable(method, sets, len(names), left / (len(jobs) - number))
+        fewer = sets[:: max(len(sets) // count, 1)][:count]
+        score(method, fewer, partial(progress, f"{method.label}, {size} rows"))
+    labels = [method.label for method in (*fast, *slow)]
+    scores.sort(key=lambda one: (one.rows, labels.index(one.method)))
     return MethodScores(scores, names)
+
+
+def _affordable(method: Method, sets: Sequence[Table], q: int, seconds: float) -> int:
+    """How many sets a method can estimate in a time, by the time of the first; at least these."""
+    started = time.monotonic()
+    method.estimate_sets(sets[:PILOT], q)
+    each = (time.monotonic() - started) / min(PILOT, len(sets))
+    return int(np.clip(seconds / max(each, 1e-6) - PILOT, PILOT, ANALYTIC_SETS))
 
 
 def _check_parameters(estimators: Mapping[str, Estimator]) -> None:

@@ -90,8 +90,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--analytic-sets",
         type=whole_number_from(1),
         metavar="N",
-        default=120,
-        help="own data: number of sets of each size for the analytic methods (default: 120)",
+        help="own data: number of sets of each size for the analytic methods (default: up to "
+        "120, as many as they do in a minute or two)",
     )
     add_workers_option(parser)
 

@@ -5,12 +5,18 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from soilml import __version__
 from soilml.onboard.metadata import read_fields
-from soilml.onboard.set_contract import MEMORY_INPUTS, SET_PREFIX
+from soilml.onboard.set_contract import (
+    MEMORY_INPUTS,
+    MODEL_ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
+    SET_PREFIX,
+)
 from soilml.onboard.tracking.soil_tracker import DEFAULT_LENGTH
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
 from training.export_c.c_text import array, number
@@ -110,7 +116,7 @@ def write_c(
     constants = [parts for parts in shared.constants.values() if parts[0] in used]
     environment = template_environment()
     environment.filters["scalar"] = lambda output: output.removeprefix(SET_PREFIX) in SCALARS
-    environment.globals["arguments"] = lambda function: _arguments(interface, function)
+    environment.globals["arguments"] = partial(_arguments, interface)
     sizes = _sizes(interface, functions, constants, rows)
     fields = read_fields(metadata)
     values = {
@@ -118,6 +124,7 @@ def write_c(
         "NAME": name.upper(),
         "origin": origin,
         "version": __version__,
+        "model_version": metadata["soilml_version"],
         "identity": {key: metadata[key] for key in IDENTITY if key in metadata},
         "noise": fields["sets"].noise if fields["sets"] else {},
         "sha": metadata["graph_sha256"],
@@ -134,6 +141,8 @@ def write_c(
         "factors": fields["pooling"].single_row_coverage_factor.tolist(),
         "z90": Z_90,
         "vague": NOT_IDENTIFIED_ABOVE,
+        "exact_columns": _exact_columns(interface),
+        "least_share": fields["sets"].least_share_in_range if fields["sets"] else 0.0,
         "tracker": tracker_values(interface, sizes["memory_bytes"], length) if depends else None,
         **sizes,
     }
@@ -179,7 +188,7 @@ def _sizes(
     work = sum(BYTES[kind] * length for kind, length in _arrays(functions).values())
     if interface.sets:
         work += len(interface.rows) * rows * BYTES["float"]
-        work += interface.columns * BYTES[interface.precision] + 16  # rows that were added last
+        work += interface.columns * BYTES[interface.precision] + 24  # rows that were added last
     triangle = interface.columns * (interface.columns + 1) // 2
     precision, shared = BYTES[interface.precision], 4 + len(interface.context)
     memory = triangle * precision + shared * BYTES["float"] + 24
@@ -190,9 +199,21 @@ def _sizes(
     }
 
 
-def _arguments(interface: Interface, function: GraphFunction) -> str:
-    """What a function of a set is given after its counts, as lines of C."""
-    given = [_argument(interface, name) for name in function.inputs]
+def _exact_columns(interface: Interface) -> int:
+    """Columns of a memory without errors of the model; 0 for a file whose model has none."""
+    known = any(field.name == MODEL_ERROR_INPUT for field in interface.context)
+    return interface.columns - len(MODEL_ERROR_COLUMNS) if interface.sets and known else 0
+
+
+def _arguments(
+    interface: Interface, function: GraphFunction, instead: Mapping[str, str] | None = None
+) -> str:
+    """What a function of a set is given after its counts, as lines of C.
+
+    instead: What it is given for some inputs in place of the memory's.
+    """
+    others = instead or {}
+    given = [others.get(name) or _argument(interface, name) for name in function.inputs]
     given += [f"&out_{name}" for name in function.outputs]
     indent = " " * 8
     lines = textwrap.wrap(", ".join(given), WIDTH, initial_indent=indent, subsequent_indent=indent)

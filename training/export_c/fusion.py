@@ -25,6 +25,9 @@ from soilml.onboard.set_contract import Floats
 from soilml.quantities import Z_90
 from training.export_c.c_file import template_environment
 
+#: Standard deviations over that of the prior with which an estimate is fused, and the largest
+#: distance from the prior's mean: float holds the squares of all, and of what is divided by them.
+SOUND_LEAST, SOUND_MOST = 1e-6, 1e6
 MOST_FILES = 4  # Files that are fused at most: rules are kept for every subset of them
 
 
@@ -77,6 +80,8 @@ def write_fusion(
         "disagreement": DISAGREEMENT,
         "same_load": SAME_LOAD,
         "z90": Z_90,
+        "sound_least": SOUND_LEAST,
+        "sound_most": SOUND_MOST,
     }
     environment = template_environment()
     source, header = (

@@ -174,7 +174,7 @@ class _Translation:
         shape = self.state.shape[first], self.state.shape[1 - first]
         unpacked = self.program.new(self.state.kind, shape)
         self.program.shared.unpacking[function] = None
-        self.program.emit(f"    {function}(memory, {unpacked.name});", unpacked)
+        self.program.emit(f"    {function}(work, memory, {unpacked.name});", unpacked)
         return unpacked
 
     def _is_only_squared(self, node: Any) -> bool:

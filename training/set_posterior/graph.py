@@ -127,7 +127,8 @@ class SetPosteriorGraph:
         of_set = (*self.family.inputs(), *COMMON_ERROR_INPUTS)
         names = (*ROW_INPUTS, *of_set, *MEMORY_INPUTS)
         inputs = {name: Value(graph, name) for name in names}
-        inputs = complete_inputs(inputs, of_set, self.noise)
+        positive = [name for name, (least, _) in self.family.limits().items() if least > 0.0]
+        inputs = complete_inputs(inputs, of_set, self.noise, positive)
         context, rows = add_residual_rows(self.family, self.response, inputs, self.small)
         state, counts = (inputs[name] for name in MEMORY_INPUTS)
         outputs = [prefix + name for name in MEMORY_OUTPUTS]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from training.onnx_graph.value import (
     maximum,
     sqrt,
     stack_rows,
+    where,
 )
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
@@ -105,6 +106,8 @@ def add_residual_rows(
     Readings out of range, or with too much noise for a logarithm, are left out.
 
     readings: Readings and standard deviations (1, rows), and inputs of the whole set (1,), by name.
+    small: Whether they stay in the system, with a weight of zero: what is computed of rows out of
+        range, such as a pull over a load of zero, is then zero too, so that it stays finite.
     """
     context = family.add_context(readings)
     operating, outside = _operating(readings), _outside(response, context.features)
@@ -115,9 +118,14 @@ def add_residual_rows(
     per_load = one / readings["load"]
     # derivatives of the three scales by torque, sinkage and drawbar pull
     slope = stack_rows([context.torque_slope, one / sinkage, per_load])
+    if small:
+        slope = where(in_range, slope, 0.0)
     noise = stack_rows([readings[f"{name}_std"] for name in RESPONSE_CHANNELS]) * slope
     log_sinkage = log(sinkage / context.length)
     y = stack_rows([context.torque, log_sinkage, readings["drawbar_pull"] * per_load])
+    if small:
+        y = where(in_range, y, 0.0)
+        context = replace(context, features=where(in_range, context.features, 0.0))
     most_noise = np.asarray([[context.most_torque_noise], [MOST_RELATIVE_NOISE], [MOST_PULL_NOISE]])
     used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
     weight = used / sqrt(noise * noise + response.error[:, None] ** 2)

@@ -39,10 +39,11 @@ ROWS = (*READING_INPUTS, *ROW_STDS)
 FileNoise = Mapping[str, Sequence[float]]
 
 #: Sums of inputs by row up to this are finite in float32; one with NaN or an infinity is not below
-#: it. Sums of context inputs, and of squares of a state, are far smaller than this, so that their
+#: it. Context inputs, and sums of squares of a state, are far smaller than this, so that their
 #: products are finite too.
 LARGEST_SUM, LARGEST_CONTEXT, LARGEST_MEMORY = 3e38, 1e9, 1e30
-#: Readings of channels are limited to this: they are as impossible, and float32 tells them from an
+SENSELESS = 3.2e38  # Stands for the sum of a row's inputs where a context input is senseless
+#: Readings are limited to this: they are as impossible, and float32 tells them from an
 #: error that all readings share.
 LARGEST_READING = 1e8
 IMPOSSIBLE_SLIP = -1.0  # Slip of a row that is not finite: out of every range
@@ -52,8 +53,6 @@ MARKER_SHARE = 0.5  # Readings below this share of the marker were not measured
 #: Standard deviation of a reading that was not measured: on the scale of every response, also of
 #: drawbar pull over any load, it is far beyond what is used, and its square is finite.
 NO_WEIGHT_STD = 1e15
-#: Standard deviations from this up are given; zero is not, except for those that may be.
-LEAST_GIVEN_STD = 1e-30
 
 
 def default_values() -> dict[str, NDArray[Any]]:
@@ -64,7 +63,10 @@ def default_values() -> dict[str, NDArray[Any]]:
 
 
 def complete_inputs(
-    inputs: Mapping[str, Value], context: Sequence[str], noise: FileNoise
+    inputs: Mapping[str, Value],
+    context: Sequence[str],
+    noise: FileNoise,
+    positive: Sequence[str] = (),
 ) -> dict[str, Value]:
     r"""Inputs by row (1, rows), without markers, and everything finite.
 
@@ -73,8 +75,8 @@ def complete_inputs(
     - A context input that is not finite, or senseless, puts all rows out of range; a state that is
       not finite is replaced by counts that no set can outweigh (`DAMAGED_COUNTS`), so that the set
       stays refused.
-    - A negative standard deviation, and one of zero unless it may be zero, becomes that of the
-      file's noise,
+    - A negative standard deviation, and one below `LEAST_STD` unless it may be zero, becomes that
+      of the file's noise: a torque of zero, whose logarithm is that of `LEAST_STD`, is then noise,
 
     .. math:: \sigma = \sqrt{\sigma_{constant}^2 + (\sigma_{share} y)^2}
 
@@ -83,6 +85,7 @@ def complete_inputs(
 
     inputs: All inputs of the graph.
     context: Names of those of a whole set.
+    positive: Those of them that must be above zero.
     noise: Noise of the file.
     """
     complete = dict(inputs)
@@ -91,10 +94,14 @@ def complete_inputs(
     rows = total.node("Shape")
     if context:
         values = concat([inputs[name] for name in context], axis=0)
-        of_set = values.sum(keepdims=True)  # (1,)
-        values = where(absolute(of_set) <= LARGEST_CONTEXT, values, 1.0)
+        squares = values.sum_of_squares(keepdims=True)  # (1,): large values do not cancel
+        sensible = squares <= LARGEST_CONTEXT**2
+        if positive:
+            least = values.take([context.index(name) for name in positive], axis=0)
+            sensible = sensible & (least.reduce("ReduceMin", axis=0, keepdims=True) > 0.0)
+        values = where(sensible, values, 1.0)
         complete |= zip(context, values.split(len(context), axis=0), strict=True)
-        total = total + of_set
+        total = where(sensible, total, SENSELESS)
     finite = absolute(total) <= LARGEST_SUM
     stacked = where(finite, _stacked(by_row, rows), constant(total.graph, HARMLESS))
     state, counts = (inputs[name] for name in MEMORY_INPUTS)
@@ -123,7 +130,7 @@ def _stacked(by_row: Sequence[Value], rows: Value) -> Value:
 
 
 def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
-    """Slip and load as they are, channels and standard deviations without markers, (1, rows)."""
+    """Slip and load, and channels and standard deviations without markers, (1, rows)."""
     k, others = len(RESPONSE_CHANNELS), len(ROW_STDS) - len(RESPONSE_CHANNELS)
     operating, _, std = stacked.split([len(OPERATING_NOISE), k, len(ROW_STDS)], axis=0)
     read = [ROWS.index(_reading_of(name)) for name in ROW_STDS]
@@ -133,14 +140,14 @@ def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:
     least = np.where(may_be_zero, 0.0, LEAST_STD)
     own = reading * parts[:, 1:]
     own = sqrt(own * own + np.maximum(parts[:, :1], least) ** 2)
-    std = where(std < np.where(may_be_zero, 0.0, LEAST_GIVEN_STD), own, std)
+    std = where(std < least, own, std)
     marked = reading < MARKER_SHARE * NOT_MEASURED
     no_weight = constant(std.graph, np.where(may_be_zero, ABSENT_STD, NO_WEIGHT_STD))
     std = where(marked | (std >= ABSENT_STD), no_weight, std)
     channels = where(marked, constant(std.graph, ABSENT_READING), reading)
     channels = channels.clip(-LARGEST_READING, LARGEST_READING)
     groups = [
-        (OPERATING_NOISE, operating),
+        (OPERATING_NOISE, operating.clip(-LARGEST_READING, LARGEST_READING)),
         (RESPONSE_CHANNELS, channels.split([k, others], axis=0)[0]),
     ]
     of_channels, bias, of_operating = std.split([k, 1, others - 1], axis=0)

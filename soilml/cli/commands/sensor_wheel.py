@@ -24,14 +24,18 @@ reference, then predicts the drawbar pull of all (Nagatani et al. 2009).
 MODEL.toml has the wheel (radius, width) and the soil, of which cohesion and
 friction angle are used. RUNS.csv has a row for each run: run, slip, load_N (the
 weight on the wheel), slope_rad (0 if absent), and optionally slip_std,
-load_N_std and slope_rad_std, from which the standard deviation of k_x follows.
-STRESS.csv has run, angle_rad (from straight down, positive forward) and
-normal_Pa. The reference is the run of least slope. One k_x serves up to a slip
+load_N_std and slope_rad_std. STRESS.csv has run, angle_rad (from straight down,
+positive forward) and normal_Pa, optionally normal_Pa_std; without it the noise
+of the stress is taken from its scatter. The standard deviations of k_x and of
+the pull follow from these errors; those of cohesion and friction angle are not
+included. The reference is the run of least slope. One k_x serves up to a slip
 of about 0.5. pull_on_slope_N is the pull that the slope requires. --diameter
 removes what a round sensor averages over its disc (0.0095 m in the source):
 uncorrected, the arc appears longer and k_x too large. A whole rover with two
 such wheels: soilml climb.
 """
+#: Ratio of true to measured stress, or its inverse, that no loss of sensors explains.
+MOST_MAGNIFICATION = 30.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,14 +63,17 @@ def run(args: argparse.Namespace) -> int:
     """Solve the balances and write the table."""
     from dataclasses import replace
 
+    import numpy as np
+
     from soilml.cli.output import tell, write_columns
     from soilml.config.case import read_case_of_one_gear
     from soilml.io.read_table import read_table
     from soilml.physics.effects import EFFECTS
     from soilml.physics.gears import Wheel
+    from soilml.quantities import Z_90
     from soilml.report.column_panels import ColumnPanels
     from soilml.systems.force_sensor_wheel import MohrCoulomb, SensingWheel, SteadyRun
-    from soilml.systems.force_sensor_wheel.runs_on_slopes import read_profiles, solve_runs
+    from soilml.systems.force_sensor_wheel.runs_on_slopes import read_stresses, solve_runs
 
     case = read_case_of_one_gear(args.model, EFFECTS, args.gear)
     gear, soil = case.model.gear, case.soil
@@ -95,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     discs = None if args.diameter is None else replace(wheel, diameter=args.diameter)
     found = solve_runs(
         runs,
-        read_profiles(read_table(args.stress, need, filled=need), discs),
+        read_stresses(read_table(args.stress, need, filled=need), discs),
         wheel,
         MohrCoulomb(friction_angle=soil.friction_angle, cohesion=soil.cohesion),
         args.reference,
@@ -107,10 +114,24 @@ def run(args: argparse.Namespace) -> int:
         "shear_modulus_m_std": found.shear_modulus_std,
         "magnification": found.magnification,
         "drawbar_pull_N": found.drawbar_pull,
+        "drawbar_pull_N_std": found.drawbar_pull_std,
+        "drawbar_pull_N_p05": found.drawbar_pull - Z_90 * found.drawbar_pull_std,
+        "drawbar_pull_N_p95": found.drawbar_pull + Z_90 * found.drawbar_pull_std,
         "pull_on_slope_N": found.required,
     }
     panels = [("shear_modulus_m",), ("drawbar_pull_N", "pull_on_slope_N")]
     write_columns(columns, args.out, args.picture, ColumnPanels(columns, "slip", panels))
+    middle = float(np.nanmedian(found.magnification))
+    if not 1.0 / MOST_MAGNIFICATION < middle < MOST_MAGNIFICATION:
+        tell(
+            f"! the true stress is {middle:.3g} times the measured one: probably normal_Pa is in "
+            f"{'kPa' if middle > 1.0 else 'another unit'}, or load_N is"
+        )
+    if discs is None:
+        tell(
+            "the stress is taken as given: where round sensors averaged it over their disc, k_x is "
+            "too large (by 14 % on the wheel of the source); --diameter removes that"
+        )
     tell(f"drawbar_pull_N is predicted by k_x of run {found.reference}")
     for name, why in found.why.items():
         tell(f"run {name} has no k_x: {why}")

@@ -74,6 +74,11 @@ def run(args: argparse.Namespace) -> int:
     if np.any(counts != counts.round()):
         raise InputError(f"--legs is {args.legs!r}; needed are whole numbers")
     slips = [np.nan] if args.slip is None else parse_numbers("--slip", args.slip).tolist()
+    for slip in slips:
+        if abs(slip) >= 1.0:
+            raise InputError(
+                f"--slip is {slip:g}; needed is 1 - v/(r omega), between -1 and 1, not per cent"
+            )
     given = {"mass": args.mass, "speed": args.speed}
     changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):

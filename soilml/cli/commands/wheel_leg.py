@@ -30,9 +30,9 @@ from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
 (at midstance); blank where not measured. Each sensor has an estimate, with a
-standard deviation, and `fused` is that of all by eq. 30. It takes the errors of
-sensors as independent. Those of torque and sinkage are not: its standard
-deviations are then too small.
+standard deviation, and `fused` is that of all by the weights of eq. 30. Standard
+deviations include the error that all strides on a soil share, as large as on
+the four soils of the source (table VIII): more strides do not lessen it.
 
 On a known soil the same relations give the slip of each stride:
 

@@ -234,12 +234,14 @@ def _pull(columns: Mapping[str, Floats], radius: Floats | float | None) -> Itera
         )
     slip = columns.get("slip")
     if slip is not None and known.sum() >= 4 and np.ptp(slip[known]) > 0.2:
-        # at large slip a pull may fall, but not from small slip on
+        # a wheel that sinks with slip may lose pull from small slip on, but seldom all of it
         order = np.corrcoef(slip[known], ratio)[0, 1] if np.ptp(ratio) > 0.05 else 0.0
-        if order < -0.8 and float(np.min(slip[known])) < 0.25:
+        late = ratio[slip[known] >= np.median(slip[known])]
+        turned = order < -0.8 and float(np.mean(late)) < 0.0
+        if turned and float(np.min(slip[known])) < 0.25:
             yield Remark(
                 "sign",
-                "drawbar pull falls as slip grows: probably its sign is turned",
+                "drawbar pull falls below zero as slip grows: probably its sign is turned",
                 ("drawbar_pull_N",),
             )
 

@@ -12,6 +12,7 @@ import numpy as np
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import Estimator
+from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import READABLE, as_number
 from soilml.onboard.memory import Memory
 from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS
@@ -99,9 +100,9 @@ class SoilTracker:
     next rows agree with those before, it was a glitch. Rows that differ from earlier ones only
     taken together are a drift, or a small change; the earlier ones are forgotten. Of the others,
     the last `length` are remembered. Memory and time per row are bounded: at most five calls of the
-    graph, and one more where rows are forgotten. Rows are judged with a model that is right but for
-    more noise; the estimate has the errors of the estimator's model, and noise as large as the rows
-    show.
+    graph, one more for the fault detector, and one where rows are forgotten. Rows are judged with a
+    model that is right but for more noise; the estimate has the errors of the estimator's model,
+    and noise as large as the rows show.
 
     Parameters
     ----------
@@ -352,7 +353,10 @@ class SoilTracker:
         memory, variance = self._filter.window.memory, self._filter.variance
         if self._estimated is None or self._estimated[0] is not memory:
             fit = fit_memory(self.estimator, with_noise(memory, variance))
-            self._estimated = memory, fit.estimate
+            sets, session = self.estimator.sets, self.estimator.session
+            assert sets is not None
+            checked = with_exact_check(fit.estimate, sets, session, memory, self._fit.estimate)
+            self._estimated = memory, checked
             shown = variance * excess_noise(fit.misfit, fit.readings, len(self.estimator.names))
             variance = float(np.clip(shown, 1.0, MOST_VARIANCE))
             self._filter = replace(self._filter, variance=variance)

@@ -25,7 +25,7 @@ class ExitAngle(SlipLoadScaling):
     Give one of the two forms; both are refused. The angle is about sqrt(kappa) theta_1: a tenth of
     kappa is a third of the angle. Behind the axle the shear of a driving wheel pulls it down. The
     wider contact mostly lifts the wheel, but in some 4 % of the driving rows of the box of
-    BENCHMARKS.md (kappa 0.15) it sinks deeper. Under a braking wheel whose contact is nearly
+    the tests (kappa 0.15) it sinks deeper. Under a braking wheel whose contact is nearly
     symmetric (kappa = 1, b0 = -1) the law "slip-sign" can yield power instead of spending it: do
     not brake with such values by that law. References: kappa, Ishigami, Miwa, Nagatani and Yoshida,
     J. Field Robotics 24(3), 2007; b0, Ding et al. 2011. For wheels.

@@ -25,7 +25,7 @@ class LinearWheel(RigidWheel):
     Terramechanics 42(1), 2005; Xue et al. 2016, eqs. 5-8, integrated here. Driving at slip 0.1 to
     0.6, a wheel of 0.15 m radius under 60 N in dry sand has a torque above that of the full
     integrals, most at small slip: by 0 to 7 % at K = 5 mm, 3 to 11 % at 15 mm and 4 to 12 % at 30
-    mm. Over the box of BENCHMARKS.md the difference is -9 to +30 % in nine rows of ten. While it
+    mm. Over the input box of the tests the difference is -9 to +30 % in nine rows of ten. While it
     brakes, the shear stress at each point has the sign of its displacement, as under `Wheel`.
     """
 

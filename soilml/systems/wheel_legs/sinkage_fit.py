@@ -12,6 +12,7 @@ from soilml.errors import FitError, InputError
 from soilml.systems.wheel_legs.gait_metrics import gait_metrics
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
+from soilml.systems.wheel_legs.soil_errors import SINKAGE, SoilErrors
 from soilml.systems.wheel_legs.walk import walk
 
 #: Stiffness of a soil poured loose, raked and vibrated, relative to the raked state; the paper
@@ -95,6 +96,7 @@ class SinkageFit:
     friction_scatter: float  # rad
     shallowest: float  # m
     deepest: float
+    soil_errors: SoilErrors | None = None  # on known soils, where they are known
 
     def __call__(self, sinkage: Real, sinkage_std: Real = 0.0) -> SoilFromSinkage:
         """Estimate the soil from sinkage and its standard deviation, m.
@@ -128,6 +130,7 @@ PRINTED_SINKAGE = SinkageFit(
     friction_scatter=0.06,
     shallowest=0.002,
     deepest=0.036,
+    soil_errors=SINKAGE,
 )
 
 

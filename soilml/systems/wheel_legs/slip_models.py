@@ -10,6 +10,13 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
+from soilml.systems.wheel_legs.soil_errors import (
+    EMPIRICAL,
+    LINEAR,
+    PLANAR,
+    SIMPLIFIED,
+    SoilErrors,
+)
 
 Real = float | Floats
 
@@ -35,6 +42,7 @@ class TorqueSlip:
     stiffness: tuple[float, float, float]  # c_sigma, b_sigma, a_sigma
     slip_std: float  # standard error of the slip
     intercept: float | None = None
+    soil_errors: SoilErrors | None = None  # on known soils, where they are known
 
     @property
     def matrix(self) -> Floats:
@@ -84,6 +92,7 @@ class VibrationSlip:
     b_mu: float  # 1/(g degree)
     slip_std: float
     assumed: float | None = None  # N/m, k_S where c_K = 0
+    soil_errors: SoilErrors | None = None  # on known soils, where they are known
 
     @property
     def matrix(self) -> Floats:
@@ -153,26 +162,31 @@ def _line(matrix: Floats, first: Real, second: Real) -> tuple[Floats, Floats]:
 
 _SHEAR, _NORMAL = (1.0, -0.58, 0.0), (-0.7, 20.928, 15.997)
 
-#: Table IV, with the variances of slip of table VI.
+#: Table IV, with the variances of slip of table VI and the errors of table VIII.
 TORQUE_SLIP: dict[str, TorqueSlip] = {
     "terramechanics": TorqueSlip(
-        friction=(0.661, -0.466, -0.377), stiffness=(-0.356, 1.434, 0.0), slip_std=0.074**0.5
+        friction=(0.661, -0.466, -0.377), stiffness=(-0.356, 1.434, 0.0), slip_std=0.074**0.5,
+        soil_errors=EMPIRICAL,
     ),
-    "empirical": TorqueSlip(friction=_SHEAR, stiffness=_NORMAL, slip_std=0.005**0.5),
+    "empirical": TorqueSlip(
+        friction=_SHEAR, stiffness=_NORMAL, slip_std=0.005**0.5, soil_errors=EMPIRICAL
+    ),
     "simplified": TorqueSlip(
-        friction=_SHEAR, stiffness=_NORMAL, slip_std=0.018**0.5, intercept=-0.33
+        friction=_SHEAR, stiffness=_NORMAL, slip_std=0.018**0.5, intercept=-0.33,
+        soil_errors=SIMPLIFIED,
     ),
-}
+}  # fmt: skip
 
 #: Table V, with the variances of slip of table VI. Without c_K the intercept is that of the
 #: planar model at one stiffness, c_I' = c_I + c_K k_S.
 VIBRATION_SLIP: dict[str, VibrationSlip] = {
     "planar": VibrationSlip(
-        c_i=-1.434, c_mu=0.022, c_k=0.789, a_mu=6.609, b_mu=-0.156, slip_std=0.015**0.5
+        c_i=-1.434, c_mu=0.022, c_k=0.789, a_mu=6.609, b_mu=-0.156, slip_std=0.015**0.5,
+        soil_errors=PLANAR,
     ),
     "linear": VibrationSlip(
         c_i=-0.882, c_mu=0.022, c_k=0.0, a_mu=6.609, b_mu=-0.156, slip_std=0.020**0.5,
-        assumed=(1.434 - 0.882) / 0.789 * STIFFNESS,
+        assumed=(1.434 - 0.882) / 0.789 * STIFFNESS, soil_errors=LINEAR,
     ),
 }  # fmt: skip
 

@@ -17,6 +17,7 @@ from soilml.systems.wheel_legs.slip_models import (
     find_slip_model,
     spring_soil,
 )
+from soilml.systems.wheel_legs.soil_errors import SoilErrors
 
 MIN_RANGE = 1.0  # Smallest range of slips for a regression, in standard deviations of the slip
 MAX_EXCESS = 3.0  # Standard deviations from the physical range at which an estimate is refused
@@ -26,14 +27,16 @@ MAX_EXCESS = 3.0  # Standard deviations from the physical range at which an esti
 class LegSoil:
     """Friction angle (rad) and normal stiffness sigma_1 (Pa) of one soil, with their covariance.
 
-    `covariance` (2, 2) includes the residual scatter of the slip model and the sensor noise, but
-    not the error of the model's coefficients: it is too small for soils unlike those of the fit,
-    and for another wheel-leg.
+    `covariance` (2, 2) includes the residual scatter of the slip model and the sensor noise, which
+    more strides lessen, and `shared`, the error that all strides on a soil have in common: that of
+    the model on soils that were known. It is too small for another wheel-leg, and for a model
+    whose errors on known soils are not stated.
     """
 
     friction_angle: float
     normal_stiffness: float
     covariance: Floats
+    shared: Floats
 
     @property
     def std(self) -> Floats:
@@ -73,7 +76,7 @@ def soil_from_torque(
     --------
     >>> found = soil_from_torque(1.1, 0.25)
     >>> [round(float(np.rad2deg(v))) for v in (found.friction_angle, found.std[0])]  # degrees
-    [40, 4]
+    [40, 6]
     """
     law = find_slip_model(model, TORQUE_SLIP)
     torque, slip = _check_pairs(torque, slip, "torque", torque_std)
@@ -87,9 +90,8 @@ def soil_from_torque(
         a, covariance = law.intercept, np.diag([0.0, var])
     angle, stiffness = law.soil(a, b)
     jacobian = np.asarray([law.friction[:0:-1], np.asarray(law.stiffness[:0:-1]) * 1e4])
-    return _check_physical(
-        LegSoil(float(angle), float(stiffness), jacobian @ covariance @ jacobian.T)
-    )
+    of_strides = jacobian @ covariance @ jacobian.T
+    return _checked(float(angle), float(stiffness), of_strides, law.soil_errors)
 
 
 def soil_from_vibration(
@@ -128,9 +130,8 @@ def soil_from_vibration(
     jacobian = np.column_stack(
         [soil_of(coefficients + step) - value for step in np.eye(len(coefficients))]
     )
-    return _check_physical(
-        LegSoil(float(value[0]), float(value[1]), jacobian @ covariance @ jacobian.T)
-    )
+    of_strides = jacobian @ covariance @ jacobian.T
+    return _checked(float(value[0]), float(value[1]), of_strides, law.soil_errors)
 
 
 def _check_pairs(reading: Floats, slip: Floats, name: str, std: float) -> tuple[Floats, Floats]:
@@ -154,10 +155,16 @@ def _check_pairs(reading: Floats, slip: Floats, name: str, std: float) -> tuple[
     return reading, slip
 
 
-def _check_physical(estimate: LegSoil) -> LegSoil:
-    """The estimate; raises `FitError` if it is not physical within its standard deviations."""
-    angle, stiffness = estimate.friction_angle, estimate.normal_stiffness
-    angle_margin, stiffness_margin = MAX_EXCESS * estimate.std
+def _checked(
+    angle: float, stiffness: float, of_strides: Floats, errors: SoilErrors | None
+) -> LegSoil:
+    """The estimate with the errors that strides share.
+
+    Raises `FitError` if it is not physical within the errors of its strides.
+    """
+    shared = np.zeros((2, 2)) if errors is None else errors.covariance(angle, stiffness)
+    estimate = LegSoil(angle, stiffness, of_strides + shared, shared)
+    angle_margin, stiffness_margin = MAX_EXCESS * np.sqrt(np.diag(of_strides))
     if not -angle_margin <= angle <= 0.5 * np.pi + angle_margin or stiffness < -stiffness_margin:
         raise FitError(
             f"these pairs give a friction angle of {angle:.3g} rad and a stiffness of "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +11,8 @@ from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
 from soilml.onboard.fusion_rules import pairwise
 from soilml.systems.wheel_legs.sinkage_fit import PRINTED_SINKAGE, SinkageFit
+from soilml.systems.wheel_legs.slip_models import TORQUE_SLIP, VIBRATION_SLIP, find_slip_model
+from soilml.systems.wheel_legs.soil_errors import SINKAGE, SoilErrors, correlation_of
 from soilml.systems.wheel_legs.soil_from_slip import LegSoil, soil_from_torque, soil_from_vibration
 
 
@@ -45,8 +47,8 @@ def soil_of_strides(
 ) -> StrideSoil:
     """Estimate one soil from slip and torque, vibration and sinkage at midstance.
 
-    Fused by the rule of the paper, which takes the errors of sensors as independent. Where they go
-    together, as those of torque and sinkage do, its standard deviations are too small.
+    Fused with the weights of the paper, which follow from the scatter of its table VIII. The errors
+    that all strides on a soil share are correlated between sensors as those of the table are.
 
     Parameters
     ----------
@@ -116,16 +118,37 @@ def soil_of_strides(
     std = np.stack([one.std for one in found.values()])
     names = tuple(found)
     if len(found) > 1:
-        fused = pairwise(mean, std)
-        mean, std = np.vstack([mean, fused.mean]), np.vstack([std, fused.std])
+        errors = {
+            "torque": find_slip_model(torque_model, TORQUE_SLIP).soil_errors,
+            "vibration": find_slip_model(vibration_model, VIBRATION_SLIP).soil_errors,
+            "sinkage": sinkage_model.soil_errors or SINKAGE,
+        }
+        one, one_std = _fused(list(found.values()), [errors[sensor] for sensor in found])
+        mean, std = np.vstack([mean, one]), np.vstack([std, one_std])
         names, strides = (*names, "fused"), [*strides, max(strides)]
     return StrideSoil(names, mean, std, tuple(strides), unused, in_range)
+
+
+def _fused(
+    estimates: Sequence[LegSoil], errors: Sequence[SoilErrors | None]
+) -> tuple[Floats, Floats]:
+    """Mean and std (2,) by the weights of eq. 30, whose variances are those of table VIII."""
+    known = [one for one in errors if one is not None]
+    values = np.asarray([(e.friction_angle, e.normal_stiffness) for e in estimates])
+    weights = pairwise(values, np.asarray([one.scatter for one in known])).weights
+    variance = np.empty(2)
+    for k in range(2):
+        total = np.asarray([e.covariance[k, k] for e in estimates])
+        shared = np.sqrt([e.shared[k, k] for e in estimates])
+        covariance = np.outer(shared, shared) * correlation_of(known, k)
+        np.fill_diagonal(covariance, total)
+        variance[k] = weights[:, k] @ covariance @ weights[:, k]
+    return (weights * values).sum(axis=0), np.sqrt(variance)
 
 
 def _from_sinkage(sinkage: Floats, relations: SinkageFit) -> LegSoil:
     """By relations whose error is of the soil: more strides do not lessen it."""
     found = relations(sinkage.mean())
     std = np.asarray([found.friction_angle_std, found.normal_stiffness_std])
-    return LegSoil(
-        float(found.friction_angle), float(found.normal_stiffness), np.diag(std.astype(float) ** 2)
-    )
+    shared = np.diag(std.astype(float) ** 2)
+    return LegSoil(float(found.friction_angle), float(found.normal_stiffness), shared, shared)

@@ -138,6 +138,10 @@ def test_hints_of_a_table(changes, hint):
     assert any(hint in remark.text for remark in found), found
 
 
+def test_a_pull_that_a_sinking_wheel_loses_with_slip_is_no_turned_sign():
+    assert table_hints(rows(drawbar_pull_N=lambda x: 15.0 - x), RADIUS) == []
+
+
 @pytest.mark.slow
 def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, capsys):
     lines = [f"a,{s},{LOAD / 9.81:.4f},{t:.4f}" for s, t in zip(*rows_of_torque(), strict=True)]

@@ -27,6 +27,7 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
         "soilml.onboard",
         "soilml.onboard.estimate",
         "soilml.onboard.estimator",
+        "soilml.onboard.exact_check",
         "soilml.onboard.features",
         "soilml.onboard.gaussian_pooling",
         "soilml.onboard.held_out_errors",

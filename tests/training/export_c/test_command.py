@@ -43,6 +43,12 @@ def test_a_name_that_c_does_not_take_is_refused(name, tmp_path, capsys):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("name", ["math.c", "string.c", "stdbool.c"])
+def test_a_name_that_would_hide_a_header_of_the_library_is_refused(name, tmp_path, capsys):
+    refused([LINEAR, tmp_path / name], capsys, "would hide <")
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_operator_that_is_not_known_is_named():
     model = onnx.load(str(LINEAR))
     metadata = {entry.key: entry.value for entry in model.metadata_props}

@@ -128,10 +128,14 @@ def test_different_loads_and_bad_estimates_are_refused(slip):
     assert code(25.0, 27.4) >= 0 and code(25.0, 22.6) >= 0
     for second in (27.6, 22.4, np.nan, np.inf):
         assert code(25.0, second) == fusion.codes["DIFFERENT_LOADS"]
-    for value in (0.0, -1.0, np.nan, np.inf):
+    for value in (0.0, -1.0, np.nan, np.inf, 1e-38, 1e38):
         kept, one.std[0] = one.std[0], value
         assert code(25.0, 25.0) == fusion.codes["BAD_ESTIMATE"]
         one.std[0] = kept
+    for key in ("mean", "low", "high", "covariance"):
+        kept, getattr(one, key)[0] = getattr(one, key)[0], np.nan
+        assert code(25.0, 25.0) == fusion.codes["BAD_ESTIMATE"]
+        getattr(one, key)[0] = kept
     assert fusion.call("fuse", None, ctypes.c_float(0), other, ctypes.c_float(25), fused) == 0
     assert list(fused.used) == [False, True] and fused.mean[0] == other.mean[0]
     nothing = fusion.call("fuse", None, ctypes.c_float(0), None, ctypes.c_float(0), fused)

@@ -174,4 +174,6 @@ def test_version_and_checksums_can_be_read(name, compiled, exported):
     text, header = identity().decode(), (exported(name) / f"{name}.h").read_text()
     for key in ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256"):
         assert f"{key} {metadata[key]}" in text and f'"{metadata[key]}"' in header
-    assert text.startswith(f"{name} by soilml ")
+    version = metadata["soilml_version"]
+    assert text.startswith(f"{name} by soilml {version} ")
+    assert f'_SOILML_VERSION "{version}"' in header

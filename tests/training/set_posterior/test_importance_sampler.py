@@ -13,7 +13,7 @@ from training.set_posterior.validation import graph_outputs, posterior_session
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "bench"))
 
-from set_comparison import posterior_of_memory
+from exact_sets import posterior_of_memory
 
 pytestmark = pytest.mark.slow
 

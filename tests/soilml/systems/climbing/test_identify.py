@@ -43,10 +43,12 @@ def test_unknown_wheel_loads_give_the_same_soil(true, climbs):
 
 def test_intervals_cover_the_truth_of_random_rovers(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parents[4] / "bench"))
-    from climbing_coverage import simulate_coverage
+    import climbing
 
     """Six rovers: three or fewer inside bands of nine tenths would come once in sixty."""
-    found = simulate_coverage(range(6), np.deg2rad([0.0, 4.0]).tolist())
-    for name, covered in found.items():
-        assert covered.inside > 0.6, name
-        assert 0.3 < covered.score < 1.9, name
+    fixed, slopes = ("cohesion", "friction_angle"), np.deg2rad([0.0, 4.0]).tolist()
+    rows = [row for seed in range(6) for row in climbing.predicted(seed, slopes, fixed, True)]
+    for name in dict.fromkeys(row["of"] for row in rows):
+        own = [row for row in rows if row["of"] == name]
+        assert climbing.inside(own) > 0.6, name
+        assert 0.3 < climbing.score(own) < 1.9, name

@@ -1,0 +1,195 @@
+"""The tables of docs/validation.md, from those in `bench/results`: `python bench/validation.py`.
+
+`make pages` writes them into the page, with the figure that `bench/run.py gap` draws.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from runner import RESULTS
+
+from soilml.io.text_tables import format_table
+
+Line = dict[str, str]
+_NAMED, _FALSE = "right cause in the cause set, SNR >= 3, discrepancy", "falsely unique:"
+_HELD, _INTERVAL = "held out between,", "coverage, discrepancy 2%"
+_SET = "set of 16 on board, onnxruntime,"
+#: Figures of the gap workflow that the page shows: their beginnings, and what the page calls them.
+GATES = {
+    f"{_NAMED} 0%": "right cause in the set, no smooth error",
+    f"{_NAMED} 4%": "the same, smooth error of 4 %",
+    "right when unique, all tiers": "right where one cause is named",
+    f"{_FALSE} null": "one cause named, nothing hidden",
+    f"{_FALSE} discrepancy alone": "one cause named, smooth error alone",
+    f"{_FALSE} tiers L, T and C": "wrong cause named, laws, changes, others",
+    "one load, SNR >= 3: truth first among suspects": "one load: right suspect first",
+    "5 to 10 rows at one load, SNR >= 3: truth in the": "5 to 10 rows: in the first three",
+    "stated probabilities from 0.02, expected": "error of stated probabilities",
+    f"{_HELD} returned model over soil alone: median": "rows kept back, error over soil alone",
+    f"{_HELD} over a Gaussian process alone, discrepancy 2%": "the same over a process",
+    "heavier loads, returned model over soil alone: worst": "heavier loads, worst set",
+    f"90 % interval of c: {_INTERVAL}": "coverage of c after naming",
+    f"90 % interval of phi: {_INTERVAL}": "coverage of phi after naming",
+    f"90 % interval of K: {_INTERVAL}": "coverage of K after naming",
+}
+#: Speeds: result, beginning of the line, column, name on the page, goal.
+SPEEDS = (
+    ("speed", "rigid wheel, driving", 1, "equilibria of a driving wheel in a second", "800,000"),
+    ("commands", "`identify` 64 rows, nonlinear", 1, "`identify`, 64 rows, nonlinear", "50 ms"),
+    ("commands", "`identify` 64 rows, posterior", 1, "`identify`, 64 rows, posterior", "1 s"),
+    ("commands", "one reading on board", 1, "one reading, `wheel`, onnxruntime", "60 us"),
+    ("commands", f"{_SET} `wheel", 1, "16 readings, `wheel`, onnxruntime", "150 us"),
+    ("commands", f"{_SET} `any_wheel", 1, "16, `any_wheel`, onnxruntime", "350 us"),
+    ("c", "wheel set of 16, with errors", 4, "16, `wheel`, in C, us", "half of onnxruntime"),
+    ("c-memory", "wheel_small", 3, "working memory of `wheel_small` in C, kB", "24"),
+)
+
+
+def tables_of(name: str) -> list[list[list[str]]]:
+    """All tables of a result, as rows of cells with the heading first: Markdown or text."""
+    found: list[list[list[str]]] = []
+    for block in re.split(r"\n\s*\n", (RESULTS / f"{name}.md").read_text(encoding="utf-8")):
+        lines = [line for line in block.splitlines() if not line.startswith("```")]
+        if all(line.startswith("|") for line in lines) and len(lines) > 1:
+            rows = [[c.strip() for c in line.strip().strip("|").split("|")] for line in lines]
+            found.append([rows[0], *rows[2:]])
+        elif len(lines) > 1 and re.fullmatch(r"[-\s]+", lines[1]):
+            found.append([re.split(r"\s{2,}", line.strip()) for line in (lines[0], *lines[2:])])
+    return found
+
+
+def lines_of(name: str, *heads: str) -> list[Line]:
+    """Lines of the first table of a result that has these headings."""
+    for head, *rows in tables_of(name):
+        if set(heads) <= set(head):
+            return [dict(zip(head, row, strict=False)) for row in rows]
+    raise SystemExit(f"bench/results/{name}.md has no table with {', '.join(heads)}")
+
+
+def gap_table() -> str:
+    """Gates of the gap workflow, and how many are met."""
+    every = lines_of("gap", "figure", "measured", "gate")
+    gated = [line for line in every if line["met"]]
+    rows = []
+    for start, words in GATES.items():
+        own = next(line for line in every if line["figure"].startswith(start))
+        shown = re.sub(r" \((\d+ sets)\)|; by chance.*", "", own["measured"])
+        rows.append((words, shown, own["gate"], own["met"].replace("*", "")))
+    missed = [line["figure"] for line in gated if line["met"] != "yes"]
+    said = f"{len(gated) - len(missed)} of {len(gated)} gates are met"
+    said += f"; missed: {'; '.join(missed)}." if missed else "."
+    head = ("blind sets", "measured (95 % interval), of", "gate", "met")
+    return f"Gap workflow: {said}\n\n{format_table(head, rows, 2)}"
+
+
+def sets_table() -> str:
+    """Files beside the exact posterior: RMSE over all sizes, log density, coverage."""
+    ratios = lines_of("sets", "file, sets", "rows", "refused")
+    gaps = {x["file, sets"]: x for x in lines_of("sets", "gap, nat") if x["subset"] == "all"}
+    covered = {x["file, sets"]: x for x in lines_of("sets", "joint") if x["subset"] == "all"}
+    rows = []
+    for name in dict.fromkeys(line["file, sets"] for line in ratios):
+        if name not in covered:
+            continue
+        own = [float(x[s]) for x in ratios if x["file, sets"] == name for s in ("c", "phi", "K")]
+        held = ", ".join(covered[name][s].split(" / ")[0] for s in ("c", "phi", "K"))
+        ends = f"{min(own):.3f} to {max(own):.3f}"
+        rows.append((name, ends, gaps.get(name, {}).get("gap, nat", ""), held))
+    head = ("file, sets of 1 to 32 rows", "RMSE over exact", "log density below, nat", "coverage")
+    return f"Sets beside the Bayes limit\n\n{format_table(head, rows)}"
+
+
+#: Parts of `model-errors` and their names on the page; answers, and theirs.
+PARTS = {
+    "Wrong sensors, wrong laws": "sensors and laws wrong",
+    "Mechanisms of the blind sets that no error describes": "unlisted mechanisms",
+}
+ANSWERS = {"typical errors of sensors": "sensors' errors", "inferred": "model errors inferred"}
+
+
+def worlds_table() -> str:
+    """Coverage and score where sensors or model are wrong."""
+    rows, text = [], (RESULTS / "model-errors.md").read_text(encoding="utf-8")
+    for channels in ("torque", "all channels"):
+        for title, short in PARTS.items():
+            section = text.partition(f"### {title}, {channels}\n")[2].partition("\n###")[0]
+            for line in section.splitlines():
+                cells = [c.strip() for c in line.strip("|").split("|")]
+                if "mean" in cells[0] and cells[1] in ANSWERS:
+                    rows.append((f"`wheel`, {short}, {channels}", ANSWERS[cells[1]], *cells[3:5]))
+    for line in lines_of("identify-errors", "what is wrong", "channels", "answer"):
+        if line["what is wrong"] == "mean":
+            name = f"`identify`, {PARTS['Wrong sensors, wrong laws']}, {line['channels']}"
+            rows.append((name, line["answer"], line["90 % of c, phi, K"], line["score"]))
+    head = ("mean over worlds", "answer", "coverage, %", "score")
+    return f"Where sensors or the model are wrong\n\n{format_table(head, rows, 2)}"
+
+
+def faults_line() -> str:
+    """How many faults are flagged, and what the others do."""
+    said = []
+    for part, lines in zip(("torque alone", "all channels"), tables_of("flags")[:2], strict=True):
+        count = Counter(row[5] for row in lines[1:] if row[0] != "no fault")
+        said.append(f"{part}: " + ", ".join(f"{n} {what}" for what, n in count.most_common()))
+    return "Faults, sets of 16 rows.\n" + ";\n".join(said) + "."
+
+
+#: Worlds of days and maps that the page shows.
+DAYS = ("as modelled", "slip-sinkage 0.3", "all typical errors")
+MAPS = ("changes and drift", "changes and drift, all typical errors")
+
+
+def drives_table() -> str:
+    """A day of driving, slip without odometry, maps."""
+    rows = []
+    for line in lines_of("streams", "world", "answer"):
+        if line["answer"] == "tracker, averaged" and line["world"] in DAYS:
+            held = line["coverage of 90 % intervals: c / phi / K"]
+            said = f"{line['alarms per 1000 rows']} alarms"
+            rows.append((f"tracker, {line['world']}", held, said))
+    for line in lines_of("slip-unknown", "drives", "filter: rmse"):
+        if not line["drives"].startswith("-"):
+            name = f"slip, {line['drives']}"
+            rows.append((name, line["filter: covered"], f"rmse {line['filter: rmse']}"))
+    for line in lines_of("map", "drives", "answer"):
+        if line["answer"] == "map" and line["drives"] in MAPS:
+            told = f"log density {line['density'].split()[0]}"
+            rows.append((f"map, {line['drives']}", line["covered: c / phi / K"], told))
+    head = ("simulated drives", "coverage of 90 % intervals", "and")
+    return f"Drives\n\n{format_table(head, rows, 3)}"
+
+
+def speed_table() -> str:
+    """Speed and memory beside their goals."""
+    rows = []
+    for name, start, column, words, goal in SPEEDS:
+        every = [row for own in tables_of(name) for row in own[1:]]
+        row = next(r for r in every if " ".join(r).startswith(start))
+        rows.append((words, row[column], goal))
+    return f"Speed and memory\n\n{format_table(('what', 'measured', 'goal'), rows)}"
+
+
+def adapt_line() -> str:
+    """What a board gains by an adaptation."""
+    (_, *rows), (_, own, right) = tables_of("adapt")[:2]
+    return (
+        f"Adaptations.\n{len(rows)} campaigns with a hidden effect. The error on other soils, "
+        f"after over before, has the\nmedian {own[1]}; it is larger in {own[3]}. Over that with "
+        f"the old model taken as right: {right[1]}; {right[3]}."
+    )
+
+
+def main() -> None:
+    """Print all tables."""
+    tables = (gap_table(), sets_table(), worlds_table(), faults_line(), adapt_line())
+    print("\n\n".join((*tables, drives_table(), speed_table())))
+
+
+if __name__ == "__main__":
+    main()

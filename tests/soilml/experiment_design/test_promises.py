@@ -1,0 +1,29 @@
+"""What a file promises of the advised reading is what it then leaves."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from soilml import Estimator
+from soilml.identification.model_error_inputs import with_exact_model
+
+pytestmark = pytest.mark.slow
+
+BENCH = Path(__file__).parents[3] / "bench"
+
+
+@pytest.mark.parametrize("mode", [lambda file: file, with_exact_model], ids=["default", "exact"])
+def test_a_file_leaves_what_it_promised_in_the_mode_in_which_it_answers(mode, monkeypatch):
+    monkeypatch.syspath_prepend(str(BENCH))
+    for name in ("promises", "advice"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    from promises import promises
+
+    rows = promises(mode(Estimator.load("wheel")), soils=24, rows=2)
+    left, found = (
+        np.sqrt(np.mean([np.square(row[key]) for row in rows], axis=0))
+        for key in ("promised", "answered")
+    )
+    np.testing.assert_allclose(left, found, rtol=0.12)
