@@ -109,6 +109,15 @@ def test_a_small_wheel_feels_stress_over_the_front_thirty_of_seventy_degrees():
     np.testing.assert_allclose(across * 0.15 * 0.12, 60.0, rtol=1e-4)
 
 
+def test_a_wheel_of_half_a_metre_feels_the_soil_as_a_plate_does():
+    effect = EFFECTS["small-wheel-stiffness"](exponent=-0.5)
+    large = Model(Wheel(radius=0.25, width=0.12))
+    same((large + effect)(SAND, AT), large(SAND, AT))
+    small = Wheel(radius=0.0625, width=0.12)  # a quarter of it: twice as stiff at m = -1/2
+    stiff = replace(SAND, kc=2 * SAND.kc, kphi=2 * SAND.kphi)
+    same((Model(small) + effect)(SAND, AT), Model(small)(stiff, AT))
+
+
 def test_a_flexible_wheel_is_a_larger_rigid_one_with_the_lever_of_its_own_radius():
     effect = EFFECTS["wheel-flexibility"](compliance=5e-5)
     flexible = (WHEEL + effect)(SAND, AT)
@@ -131,6 +140,17 @@ def test_the_hump_of_the_shear_curve_is_one_at_its_peak_and_falls_to_the_residua
     assert curve[1:] == pytest.approx([1.0, 0.6])
     start = 0.6 * (1.0 + (1.0 / (0.6 * (1.0 - np.exp(-1.0))) - 1.0) * np.e) / 2.0
     assert curve[0] == pytest.approx(1e-9 * start, rel=1e-6)
+    half = replace(effect, share=0.5).on_stress(before, scene).shear
+    full = effect.on_stress(before, scene).shear
+    np.testing.assert_allclose(half, 0.5 * (before.shear + full), rtol=1e-12)
+
+
+def test_the_hyperbola_mobilises_half_the_strength_at_its_modulus_and_nine_tenths_at_nine():
+    modulus = SAND.shear_modulus
+    before, scene = sheared_by(modulus * np.asarray([1e-9, 1.0, -9.0]))
+    effect = EFFECTS["hyperbolic-shear"](share=1.0)
+    curve = np.abs(effect.on_stress(before, scene).shear) / strength(before)
+    assert curve == pytest.approx([1e-9, 0.5, 0.9])
     half = replace(effect, share=0.5).on_stress(before, scene).shear
     full = effect.on_stress(before, scene).shear
     np.testing.assert_allclose(half, 0.5 * (before.shear + full), rtol=1e-12)
@@ -326,6 +346,13 @@ def test_a_faster_wheel_meets_a_stronger_soil():
         same(found, WHEEL(other, AT))
 
 
+def test_the_fourth_pass_meets_twice_the_stiffness_where_it_grows_with_the_root():
+    model = WHEEL + EFFECTS["multipass"](growth=0.5)
+    same(model(SAND, replace(AT, pass_number=1.0)), WHEEL(SAND, AT))
+    stiff = replace(SAND, kc=2 * SAND.kc, kphi=2 * SAND.kphi)
+    same(model(SAND, replace(AT, pass_number=4.0)), WHEEL(stiff, AT))
+
+
 def test_a_wheel_that_slides_sideways_shears_along_its_slip_velocity():
     modulus, beta = SAND.shear_modulus, 0.4
     ahead = modulus * np.asarray([3.0, -3.0, 0.0])
@@ -407,6 +434,13 @@ def test_a_load_cell_that_reads_a_quarter_too_much():
     for channel in CHANNELS:
         expected = getattr(WHEEL(SAND, replace(RIG_AT, load=48.0)), channel)
         np.testing.assert_allclose(getattr(found, channel), expected, rtol=1e-9)
+
+
+def test_a_load_cell_that_lags_reads_too_little_while_loads_rise():
+    model = WHEEL + EFFECTS["load-hysteresis"](error=0.2)
+    for direction, load in ((1.0, 75.0), (-1.0, 50.0), (0.0, 60.0), (None, 60.0)):
+        found = model(SAND, replace(RIG_AT, load_direction=direction))
+        same(found, WHEEL(SAND, replace(RIG_AT, load=load)))
 
 
 @pytest.mark.parametrize(
