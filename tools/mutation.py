@@ -45,7 +45,7 @@ ROOMS = {
         "soilml/onboard",
         "soilml/onboard commands/test_contract.py commands/test_outputs.py"
         " commands/test_estimate_case.py test_flags.py test_onnx_interface.py test_ros2_example.py"
-        " training/test_trained_slip.py",
+        " training/test_trained_slip.py training/slip_step",
         "",
     ),
     "gap": ("soilml/gap", "soilml/gap commands/test_gap_command.py", "/html/|_figure"),

@@ -1,4 +1,4 @@
-"""Solutions in tiles and in parts: the same as at once, in the memory that was stated."""
+"""Solutions in tiles and in parts are those at once; gradients are those of differences."""
 
 import tracemalloc
 
@@ -8,6 +8,9 @@ import pytest
 from soilml.processes import limited_workers
 from training.regressors import exact_solution, nystrom_features
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.regressors.rbf_expansion import rbf
+from training.regressors.tanh_network import TanhNetwork
+from training.regressors.tiled_cholesky import TILE, TiledCholesky
 
 
 def curve(rows, seed=0, noise=0.1):
@@ -80,3 +83,42 @@ def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
         regressor.fit_with_validation(x, y, (other, noisy), lambda done, total: None)
         sound = np.sqrt(np.mean((regressor.predict(other) - truth) ** 2))
         assert sound < 0.75 * misled
+
+
+def no_progress(done, total):
+    pass
+
+
+@pytest.mark.parametrize("rows", [40, 2 * TILE, 2 * TILE + 77])
+def test_solution_and_diagonal_of_the_inverse_are_those_of_the_whole_matrix(rows):
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(rows, 3)), rng.normal(size=(rows, 2))
+    factor = TiledCholesky.of(x, 0.8, 30.0, no_progress)
+    inverse = np.linalg.inv(rbf(x, x, 0.8) + np.eye(rows) / 30.0)
+    np.testing.assert_allclose(factor.solve(y), inverse @ y, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(
+        factor.inverse_diagonal(no_progress), np.diag(inverse), rtol=1e-9, atol=1e-11
+    )
+
+
+def test_the_gradient_is_that_of_differences():
+    rng = np.random.default_rng(0)
+    x, y = (rng.normal(size=(20, k)).astype(np.float32) for k in (3, 2))
+    network = TanhNetwork([3, 8, 7, 2], rng)
+    network.backward(network.forward(x) - y)
+    layers = network.layers()
+
+    def loss(parts):
+        h = x.astype(np.float64)
+        for weights, bias in zip(parts[0:-2:2], parts[1:-2:2], strict=True):
+            h = np.tanh(h @ weights + bias)
+        return 0.5 * np.sum((h @ parts[-2] + parts[-1] - y) ** 2)
+
+    gradients = [part for layer in network._gradients for part in layer]
+    for k, part in enumerate(layers):
+        for index in list(np.ndindex(part.shape))[::5]:
+            shifted = [[p.copy() for p in layers] for _ in range(2)]
+            shifted[0][k][index] += 1e-5
+            shifted[1][k][index] -= 1e-5
+            slope = (loss(shifted[0]) - loss(shifted[1])) / 2e-5
+            assert gradients[k][index] == pytest.approx(slope, rel=1e-3, abs=1e-4)
