@@ -64,12 +64,17 @@ def test_comes_from_the_recipe_and_spec_in_the_tree(name):
     assert metadata["data_sha256"] in card
 
 
+@cache
+def others(recipe_name):
+    """Rows of a recipe that no file was trained on."""
+    return next(simulate_pieces(read_recipe(recipe_name).sized(12000, seed=4242)))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", FROM_DATA)
 def test_metrics_hold_on_another_seed(name):
     estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
-    recipe = read_recipe(FROM_DATA[name][0]).sized(12000, seed=4242)
-    rows = next(simulate_pieces(recipe))
+    rows = others(FROM_DATA[name][0])
     alone = np.char.startswith(rows["run"], "1x") & (rows["status"] == "ok")
     readings = {n: rows[column(n)][alone] for n in estimator.inputs}
     truth = np.stack([rows[column(n)][alone] for n in estimator.names], axis=1)
@@ -85,12 +90,14 @@ def test_metrics_hold_on_another_seed(name):
 #: Allowed deviation of the coverage: where the shear modulus varies by a factor of thirty, and
 #: where few points represent the posterior of 40 rows, whose intervals are then too narrow.
 DEVIATION = {"kls1_wheel": 0.08, "wheel_small": 0.1}
-STEADY = ((), ("load_N",), ("slip",), ("slip", "load_N"))
 
 
 def long(*values):
     """Values of a parameter whose case `make test` leaves to `make test-long`."""
     return pytest.param(*values, marks=pytest.mark.long)
+
+
+STEADY = ((), long(("load_N",)), long(("slip",)), ("slip", "load_N"))
 
 
 @cache

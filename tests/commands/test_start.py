@@ -33,13 +33,21 @@ def commands_among(modules):
     return {name for name in COMMANDS if COMMANDS[name] in modules}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
-def test_an_error_of_usage_loads_no_library_and_no_other_command(command):
-    loaded, printed = modules_after(command, "--nonsense")
-    assert printed[-1] == "status 2"
-    assert {name.split(".")[0] for name in loaded} <= set(OWN)
-    assert commands_among(loaded) == {command}
+def test_an_error_of_usage_loads_no_library_and_no_other_command():
+    """All commands in one process, one after the other."""
+    code = LISTING.replace(
+        'print("status", main())',
+        "for name in sys.argv[1:]:\n    print('status', main([name, '--nonsense']), *sys.modules)",
+    )
+    done = subprocess.run([sys.executable, "-c", code, *COMMANDS], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    *printed, loaded = done.stdout.splitlines()
+    libraries = {name.split(".")[0] for name in loaded.split()} - set(sys.stdlib_module_names)
+    assert libraries <= set(OWN)
+    lines = [line.split() for line in printed if line.startswith("status ")]
+    assert [words[1] for words in lines] == ["2"] * len(COMMANDS)
+    for i, words in enumerate(lines):
+        assert commands_among(words) == set(list(COMMANDS)[: i + 1])
 
 
 @pytest.mark.parametrize(
