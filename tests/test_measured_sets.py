@@ -5,10 +5,6 @@ import sys
 import tomllib
 from pathlib import Path
 
-import pytest
-
-from soilml.config.case import read_case
-
 HERE = Path(__file__).parents[1] / "examples" / "gap"
 
 
@@ -23,16 +19,6 @@ def module(name):
 real = module("real")
 measured_sets = module("measured_sets")
 SETS = {one.name: one for one in measured_sets.SETS}
-
-
-@pytest.mark.parametrize("priors", measured_sets.PRIORS)
-@pytest.mark.parametrize("name", SETS)
-def test_every_model_file_is_read(name, priors, tmp_path):
-    file = tmp_path / "model.toml"
-    file.write_text(measured_sets.model_text(SETS[name], priors))
-    case = read_case(file)
-    assert case.prior and set(case.noise) == set(SETS[name].noise)
-    assert bool(case.gears) == (len(SETS[name].wheels) > 1)
 
 
 def report(status="suspected", *names):

@@ -91,16 +91,6 @@ def test_a_recorded_bag_gives_the_rows_of_its_drive(node_module, store, tmp_path
     assert stamps == list(range(101, 160))
 
 
-def test_a_state_file_that_cannot_be_written_ends_it_with_one_line(node_module, tmp_path, capsys):
-    folder = tmp_path / "state"
-    folder.mkdir()
-    module = node_module(state_file=str(folder / "rows.npz"))
-    module.rclpy.spin = lambda node: folder.rmdir()
-    assert module.main() == 1
-    told = capsys.readouterr().err
-    assert told.startswith("soil_estimator: the rows are lost") and told.count("\n") == 1
-
-
 def test_a_wrong_parameter_ends_it_with_one_line(node_module, capsys):
     assert node_module(joint=None).main() == 2
     told = capsys.readouterr().err

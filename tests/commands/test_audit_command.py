@@ -77,17 +77,3 @@ def test_runs_to_add_are_ranked_by_what_they_gain_per_cost(usual, tmp_path):
     gains = [len(run["gained"]) / run["cost"] for run in found["added_runs"]]
     assert gains == sorted(gains, reverse=True)
     assert {run["kind"]: run["cost"] for run in found["added_runs"]}["other speed"] == 100.0
-
-
-def test_no_reading_is_looked_at_and_people_are_told_what_could_be_named(usual, tmp_path, capsys):
-    lines = design().splitlines()
-    text = "\n".join([lines[0] + ",torque_Nm", *(line + ",99" for line in lines[1:])]) + "\n"
-    found = audited(tmp_path, text)
-    assert found == usual
-    said = capsys.readouterr().out
-    assert said.splitlines()[0].split()[:2] == ["effect", "nameable"]
-    for name, e in by_name(found).items():
-        (line,) = [line for line in said.splitlines() if line.split()[:1] == [name]]
-        assert line.split()[1] == ("yes" if e["nameable"] else "no")
-    assert "rate: needs the column speed_m_s" in said
-    assert "runs to add, and the effects that could then be named:" in said

@@ -123,12 +123,6 @@ def test_other_faults(folder, capsys, monkeypatch, what):
     refused(folder, command, capsys, monkeypatch, said)
 
 
-def test_a_table_without_any_reading_that_the_model_needs_is_refused(folder, capsys, monkeypatch):
-    (folder / "blank.csv").write_text(RUNS.replace("3.0", "").replace("1.5", ""))
-    command = ["estimate", "good.onnx", "blank.csv", "--out", "o.csv"]
-    refused(folder, command, capsys, monkeypatch, "no row has all readings that the model needs")
-
-
 def test_a_log_of_another_wheel_is_refused(folder, capsys, monkeypatch):
     lugs = RUNS.replace("torque_Nm", "torque_Nm,grouser_height_m")
     (folder / "lugs.csv").write_text(lugs.replace("1.5", "1.5,0").replace("3.0", "3.0,0.01"))

@@ -39,16 +39,6 @@ def table(captured):
     return list(csv.DictReader(io.StringIO(captured.out)))
 
 
-def test_estimates_of_a_model_file_for_many_wheels_are_wider(folder, capsys):
-    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
-    plain = spoken(capsys, *command, "plain.toml", "--exact-model")
-    wide = spoken(capsys, *command, "model.toml")
-    assert "[discrepancy] of torque_Nm, drawbar_pull_N is included" in wide.err
-    assert "discrepancy" not in plain.err
-    for key in ("cohesion_Pa_std", "friction_angle_rad_std", "shear_modulus_m_std"):
-        assert float(table(wide)[0][key]) > 1.1 * float(table(plain)[0][key])
-
-
 @pytest.mark.slow
 def test_bands_of_pull_are_wider_and_say_what_they_include(folder, capsys):
     command = ("--load", "60", "--slip-limit", "0.4")

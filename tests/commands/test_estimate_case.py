@@ -49,13 +49,3 @@ def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
     assert "gear" not in capsys.readouterr().err
     assert main(["estimate", file, "--case", "model.toml"]) == 0
     assert "radius 0.15 m" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(("file", "case"), [(WHEEL, None), (ANY_WHEEL, "model.toml")])
-def test_a_table_of_another_wheel_is_refused(folder, capsys, file, case):
-    text = RUNS.replace("torque_Nm", "torque_Nm,wheel_radius_m")
-    (folder / "other.csv").write_text(text.replace("1.5", "1.5,0.15").replace("3.0", "3.0,0.12"))
-    command = ["estimate", file, "other.csv", *(["--case", case] if case else [])]
-    assert main(command) == 2
-    said = one_line(capsys.readouterr().err)
-    assert "other.csv line 3, column wheel_radius_m: 0.12 given" in said and "0.15" in said

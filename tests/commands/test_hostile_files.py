@@ -3,7 +3,6 @@
 import resource
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -53,15 +52,6 @@ def test_a_parquet_file_of_more_rows_than_a_csv_file_may_have_is_refused(tmp_pat
     assert file.stat().st_size < 200_000
     with pytest.raises(TableError, match="more than 10000000 rows"):
         read_parquet(file)
-
-
-def test_the_rows_of_a_folder_of_parquet_files_are_counted_together(tmp_path, monkeypatch):
-    for name in ("a", "b"):
-        pq.write_table(pa.table({"slip": [0.1] * 6}), tmp_path / f"{name}.parquet")
-    assert len(read_parquet(tmp_path)[0]["slip"]) == 12
-    monkeypatch.setattr("soilml.io.parquet.ROWS", replace(ROWS, most=11))
-    with pytest.raises(TableError, match="more than 11 rows"):
-        read_parquet(tmp_path)
 
 
 @pytest.mark.parametrize("command", ["identify", "gap", "advise", "pull", "audit"])

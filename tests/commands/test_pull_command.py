@@ -2,8 +2,6 @@
 
 import csv
 import io
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from soilml.physics.pull_efficiency import CLASSES
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
 ROWS = "run,slip,load_N,torque_Nm\na,0.2,60,{}\na,0.4,60,{}\n"
 COMMAND = ["pull", "model.toml", "runs.csv", "--load", "60", "--slip-limit", "0.4"]
 
@@ -124,24 +121,3 @@ def test_bad_input_is_one_line(folder, capsys, fault):
     told = [line for line in captured.err.splitlines() if not line.endswith(" ...")]  # progress
     assert len(told) == 1 and said in told[0], captured.err
     assert captured.out == "" and sorted(folder.iterdir()) == before
-
-
-def test_the_page_shows_what_the_command_prints_and_its_lines_run(tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs/pull.md").read_text()
-    (rows,), (shown,), (lines,) = (
-        re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL)
-        for kind in ("csv", "text", "python")
-    )
-    command = re.search(r"```\nsoilml (.*?)\n```", page)[1]
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    (tmp_path / "runs.csv").write_text(rows)
-    monkeypatch.chdir(tmp_path)
-    assert main(command.split()) == 0
-    printed = capsys.readouterr().out
-    number = r"-?\d+\.?\d*"
-    assert re.sub(number, "", printed).split() == re.sub(number, "", shown).split()
-    for ours, theirs in zip(*(re.findall(number, t) for t in (printed, shown)), strict=True):
-        assert float(ours) == pytest.approx(float(theirs), rel=0.05, abs=0.2)
-    exec(lines, {})
-    low, middle, high = (float(x) for x in re.findall(number, capsys.readouterr().out))
-    assert 0.0 < low < middle < high < 0.7

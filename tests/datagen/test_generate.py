@@ -1,7 +1,6 @@
 """Synthetic data: reproducible, whole, calibrated, and honest about failures."""
 
 import hashlib
-import json
 import os
 import signal
 import subprocess
@@ -9,7 +8,6 @@ import sys
 import time
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from conftest import RECIPE
 
@@ -49,19 +47,6 @@ def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
                 assert (values == whole[name][first:last]).all()
             else:  # vector units round the last digit by place
                 np.testing.assert_allclose(values, whole[name][first:last], rtol=1e-12)
-
-
-def test_metadata_holds_recipe_units_versions_and_seed(tmp_path):
-    made = recipe(tmp_path)
-    generate(made, tmp_path / "d.parquet")
-    schema = pq.read_schema(tmp_path / "d.parquet")
-    metadata = {k.decode(): v.decode() for k, v in schema.metadata.items()}
-    assert metadata["soilml_seed"] == "1" and metadata["soilml_rows"] == "600"
-    assert json.loads(metadata["soilml_recipe"])["gear"]["radius"] == 0.15
-    assert metadata["soilml_recipe_sha256"] == made.sha256
-    assert set(json.loads(metadata["soilml_versions"])) >= {"soilml", "numpy", "pyarrow"}
-    assert json.loads(metadata["soilml_units"])["torque_Nm"] == "N m"
-    assert schema.field("cohesion_Pa").metadata[b"unit"] == b"Pa"
 
 
 def test_readings_are_the_model_s_with_the_noise_declared(tmp_path):

@@ -12,7 +12,7 @@ from conftest import RECIPE
 from datagen.generate import WRITER, generate, generate_folder
 from datagen.recipe import read_recipe
 from datagen.simulation import pieces
-from soilml.errors import InputError, TableError
+from soilml.errors import InputError
 from soilml.io.read_table import read_table
 from soilml.processes import process_map
 
@@ -77,22 +77,6 @@ def test_files_that_are_right_are_kept_and_others_are_written_again(make, tmp_pa
     assert result.kept == 2000 - sum(pq.read_metadata(files[i]).num_rows for i in (1, 2, 3, 4))
     assert [file.read_bytes() for file in files] == before
     assert files[0].stat().st_mtime_ns == times[0]
-
-
-def test_an_incomplete_folder_is_no_table(make, tmp_path):
-    make()
-    first, second, *_ = sorted((tmp_path / "data").iterdir())
-    first.unlink()
-    with pytest.raises(TableError, match=r"has 1744 of 2000 rows: .* the same command completes"):
-        read_table(tmp_path / "data")
-    table = pq.ParquetFile(second).read()
-    pq.write_table(table.replace_schema_metadata({"soilml_rows": "2000"}), second)
-    with pytest.raises(TableError, match="not of one table"):
-        read_table(tmp_path / "data")
-    for file in (tmp_path / "data").iterdir():
-        file.unlink()
-    with pytest.raises(TableError, match="without a Parquet file"):
-        read_table(tmp_path / "data")
 
 
 def test_a_disk_that_is_too_small_is_refused_before_anything_is_written(

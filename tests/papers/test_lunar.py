@@ -63,14 +63,6 @@ def remaining_fraction(truth, slip, load, case=CASE):
     return posterior(case, slip, torque, load, rng, 4000)[:, :3].std(axis=0) / SPREAD
 
 
-def test_slips_at_one_load_identify_the_shear_modulus_only_if_the_bearing_is_known(truth):
-    slips, load = np.linspace(0.2, 0.6, 8), np.full(8, 50.0)
-    cohesion, _, modulus = remaining_fraction(truth, slips, load, KNOWN)
-    assert modulus < 0.3
-    assert cohesion > 0.8
-    assert remaining_fraction(truth, slips, load)[2] > 0.7
-
-
 def test_slips_at_three_loads_identify_the_strength_and_with_the_bearing_all(truth):
     assert (remaining_fraction(truth, *three_loads(), KNOWN) < 0.3).all()
     cohesion, angle, modulus = remaining_fraction(truth, *three_loads())

@@ -66,20 +66,3 @@ def test_a_kink_in_the_posterior_is_left_to_sampling_of_the_model():
     assert surface_sample(Bent(1e-3, kink=2.0), 2) is None
     smooth_elsewhere = Bent(1e-3, truth=(0.2, 0.3), kink=2.0)  # the posterior is far from the kink
     assert surface_sample(smooth_elsewhere, 2) is not None
-
-
-class ExponentialTails:
-    """Two independent exponential distributions of the mean 0.02."""
-
-    def predict(self, u):
-        return u
-
-    def of_predictions(self, y):
-        return -(y / 0.02).sum(axis=1)
-
-
-def test_a_long_tail_widens_the_region():
-    sample = surface_sample(ExponentialTails(), 2)
-    assert sample.mean(sample.u) == pytest.approx([0.02, 0.02], rel=0.1)
-    beyond = sample.weights[sample.u[:, 0] > 0.02 * 5.0].sum()
-    assert beyond == pytest.approx(np.exp(-5.0), rel=0.5)

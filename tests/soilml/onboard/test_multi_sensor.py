@@ -5,7 +5,7 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
-from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
+from soilml.onboard.multi_sensor import fuse_estimates
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.15]), np.asarray([-0.3]), np.asarray([0.9]))
 
@@ -49,22 +49,6 @@ def test_the_prior_counts_once():
     assert rms(once.mean[:, 0] - truth) == pytest.approx(exact, rel=0.02)
     inside = (once.low[:, 0] <= truth) & (truth <= once.high[:, 0])
     assert inside.mean() == pytest.approx(0.9, abs=0.01)
-
-
-@pytest.mark.parametrize("rule", [rule for rule in ACROSS_FILES if rule != "correlated"])
-def test_what_is_out_of_range_takes_no_part(rule):
-    flags = np.asarray([True, True, False, False]), np.asarray([True, False, True, False])
-    slips = np.full(4, 0.30)
-    both = fuse_estimates(
-        [estimate(slips, 0.05, flags[0]), estimate(0.34 + 0 * slips, 0.05, flags[1])], rule
-    )
-    found = both.estimate
-    np.testing.assert_array_equal(both.used, flags)
-    assert found.in_range.tolist() == [True, True, True, False]
-    np.testing.assert_allclose(found.mean[1:, 0], [0.30, 0.34, 0.30])
-    np.testing.assert_allclose(found.std[1:, 0], [0.05, 0.05, 0.15])
-    np.testing.assert_allclose(found.low[1, 0], 0.30 - 1.7 * 0.05)  # its own interval
-    assert 0.30 < found.mean[0, 0] < 0.34
 
 
 def test_sensors_that_contradict_each_other_give_the_prior():

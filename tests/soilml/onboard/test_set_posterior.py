@@ -1,7 +1,6 @@
 """Estimates from sets of readings of one soil, onboard."""
 
 import json
-import re
 
 import numpy as np
 import onnx
@@ -73,15 +72,6 @@ def test_copies_of_a_row_count_once(estimator, wheel_posterior):
     assert_similar(estimator.run(**copied), estimator.run(**run), 1e-5)
 
 
-def test_a_missing_sinkage_is_ignored(estimator, wheel_posterior):
-    run, sinkage = simulated_run(wheel_posterior, 8)
-    torque_only = estimator.run(**run)
-    assert_similar(estimator.run(**run, sinkage=np.full(8, np.nan)), torque_only, 1e-5)
-    half = np.where(np.arange(8) < 4, sinkage, np.nan)
-    partial, memory = estimator.step(estimator.start(), **run, sinkage=half)
-    assert partial.in_range and memory.counts.tolist() == [12.0, 8.0, 8.0]
-
-
 def test_a_declared_constant_noise_is_fed_as_the_interface_says(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 8)
     constant, share = 0.2, 0.01
@@ -107,28 +97,6 @@ def test_one_row_in_twenty_out_of_range_is_left_out(estimator, wheel_posterior):
     kept = {k: v[:19] for k, v in run.items()}
     run["load"][19] *= 10.0
     assert_similar(estimator.run(**run), estimator.run(**kept))
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"slip": [], "torque": [], "load": []}, "no reading given"),
-        ({"slip": [0.3, np.nan], "torque": [2.0, 2.0], "load": [60.0, 60.0]}, "slip is nan"),
-        ({"slip": 1.5}, "slip is 1.5"),
-        ({"load": -3.0}, "load is -3"),
-        ({"speed": 0.1}, "'speed' is not read by this model"),
-        ({"torque_std": -0.1}, "torque_std is -0.1"),
-        ({"torque_std": 0.0}, "torque_std is 0"),
-        ({"torque_std": np.nan}, "torque_std is nan"),
-        ({"sinkage": np.inf}, "sinkage is inf"),
-        ({"sinkage": [0.01, 0.02]}, "sinkage has shape"),
-    ],
-)
-def test_an_impossible_reading_is_named(estimator, change, message):
-    run = {"slip": 0.3, "torque": 2.0, "load": 60.0} | change
-    with pytest.raises(InputError, match=re.escape(message)) as error:
-        estimator.run(**run)
-    assert "\n" not in str(error.value)
 
 
 @pytest.mark.slow

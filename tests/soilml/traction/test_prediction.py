@@ -39,12 +39,6 @@ def test_on_the_climbed_slope_the_pull_equals_the_component_of_the_load(case):
     assert (found.slope < 0.0).any()  # some soils at some slips: downhill only
 
 
-def test_on_sand_without_cohesion_no_slope_is_steeper_than_its_friction_angle(case):
-    found = predict_traction(case, soils((0.0, 0.5, 0.01), (0.0, 0.7, 0.01)), 20.0, SLIPS)
-    assert (found.steepest_slope < [0.5, 0.7]).all()
-    assert found.steepest_slope[1] > found.steepest_slope[0]
-
-
 def test_a_known_soil_has_no_band_and_the_model_s_own_pull(case):
     one = (900.0, 0.6, 0.012)
     found = quantile_band(predict_traction(case, soils(one, one, one), 60.0, SLIPS).pull)

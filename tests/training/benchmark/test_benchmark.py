@@ -1,7 +1,6 @@
 """The fixed benchmark: sets, Bayes limit, scores of methods, acceptance goals."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +9,8 @@ import pytest
 from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.quantities import SHEAR
-from training.benchmark.acceptance import goals
 from training.benchmark.bayes_limit import UNMODELLED_EFFECTS, benchmark_sets
 from training.benchmark.bayes_limit_file import load_limit, packaged_limit
-from training.benchmark.methods import (
-    MethodKind,
-)
 from training.benchmark.suite import (
     LIMIT_LABEL,
     POSTERIOR_LABEL,
@@ -85,13 +80,3 @@ def test_an_unmodelled_effect_raises_rmse_and_flags(results):
         assert known.design == lacking.design
         assert (lacking.rmse > 1.5 * known.rmse).all()
         assert lacking.flagged_fraction > known.flagged_fraction
-
-
-def test_the_exact_posterior_meets_the_goals_and_the_prior_misses_them(results):
-    by_criterion = {g.criterion: g for g in goals(results) if g.method == "exact"}
-    assert by_criterion["every size: RMSE / limit <= 1.05"].met
-    function = {"method": "mine", "kind": MethodKind.USER_FUNCTION}
-    prior = [replace(r, **function) if r.kind is MethodKind.PRIOR else r for r in results]
-    by_criterion = {g.criterion: g for g in goals(prior) if g.method == "mine"}
-    assert not by_criterion["every size: RMSE / limit <= 1.05"].met
-    assert not next(g for what, g in by_criterion.items() if what.startswith("18 rows")).met

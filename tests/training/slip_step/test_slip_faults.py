@@ -67,21 +67,6 @@ class Driven:
         return self.model.call("step", self.state, own, answer, self.model.work), answer
 
 
-@pytest.mark.parametrize("torque", [1e20, -1e20, 1e38, 1e300])
-def test_a_wild_torque_is_set_aside_and_the_rows_after_it_are_answered(
-    torque, slip_stream, slip_drive
-):
-    state = plain = slip_stream.start()
-    for i in range(45, 50):
-        wild = {"torque": torque} if i == 46 else {}
-        found, state = slip_stream.step(state, **row_of(slip_drive, i, **wild))
-        assert ("torque-set-aside" in found.flags) == (i == 46 and abs(torque) < 1e30)
-        assert np.isfinite([found.speed, found.speed_std, *found.speeds, *found.slips.flat]).all()
-        missing = {"torque": np.nan} if i == 46 else {}
-        without, plain = slip_stream.step(plain, **row_of(slip_drive, i, **missing))
-        assert found.speed == pytest.approx(without.speed)
-
-
 @pytest.mark.parametrize(("name", "value"), IMPOSSIBLE)
 def test_what_is_not_possible_is_refused_and_the_state_goes_on(
     name, value, slip_stream, slip_drive

@@ -13,7 +13,6 @@ from soilml.systems.force_sensor_wheel import (
     SensingWheel,
     SteadyRun,
     StressProfile,
-    balanced_arc,
     forces_from_profile,
     parabolic_arc,
     solve_force_balance,
@@ -21,7 +20,6 @@ from soilml.systems.force_sensor_wheel import (
 
 SENSORS = SensingWheel(noise=0.0)
 PHI, TRUE, WEIGHT = math.radians(38.0), 0.0072, 28.92
-STRENGTH = MohrCoulomb(friction_angle=PHI)
 RIM = {"radius": 0.055, "width": 0.064}
 
 
@@ -84,19 +82,3 @@ def test_the_stress_of_the_model_gives_the_forces_of_the_model():
         profile, pulled, SENSORS, MohrCoulomb(friction_angle=float(sand.friction_angle))
     )
     assert back.shear_modulus == pytest.approx(TRUE, rel=0.02)
-
-
-def test_the_arc_implied_by_table_i_moves_forward_with_slip():
-    printed = {0.11: (0.0072, 0), 0.18: (0.0073, 2), 0.29: (0.0070, 4), 0.39: (0.0066, 6)}
-    printed[0.80] = (0.0026, 8)
-    peaks = [
-        balanced_arc(
-            math.radians(30.0),
-            SteadyRun(slip=s, weight=WEIGHT, slope=math.radians(a)),
-            SENSORS,
-            STRENGTH,
-            k,
-        ).peak_angle
-        for s, (k, a) in printed.items()
-    ]
-    assert (np.diff(peaks) > 0).all()

@@ -55,15 +55,3 @@ def test_the_truth_lies_within_the_reported_uncertainty(groups):
     truth = np.asarray([getattr(CASE.soil, name) for name in groups.names])
     assert (np.abs(groups.mean - truth) < 3.0 * groups.std).all()
     assert (np.abs(groups.pooled.values - truth) < 3.0 * groups.pooled.std).all()
-
-
-def test_the_average_as_a_fit_says_what_is_not_known_and_stays_within_the_groups(groups):
-    fit = groups.average
-    np.testing.assert_array_equal(fit.values, groups.mean)
-    np.testing.assert_allclose(fit.std, groups.std)
-    assert fit.rows_used == sum(one.rows_used for one in groups.fits)
-    assert ("not-identified", ("cohesion",)) in [(w.code, w.about) for w in fit.warnings]
-    low, high = fit.interval
-    ends = np.asarray([one.interval for one in groups.fits])
-    assert (low >= ends[:, 0].min(axis=0)).all() and (high <= ends[:, 1].max(axis=0)).all()
-    assert (low < fit.values).all() and (fit.values < high).all()

@@ -17,7 +17,6 @@ pytestmark = pytest.mark.slow
 
 LEG = SpringLeg(stiffness=4000.0, bending=0.5)
 PHI, GAP = np.deg2rad(40.0), np.deg2rad(10.0)
-SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])
 
 
 def test_the_soil_breaks_when_the_push_leaves_the_friction_cone():
@@ -52,12 +51,3 @@ def test_a_drop_of_friction_over_centimetres_makes_slip_linear_in_the_vibration(
 
     assert straight(replace(leg, softening=0.03)).min() > 0.93
     assert straight(leg).min() < 0.8
-
-
-def test_cases_are_independent():
-    one = vibration_amplitude(LEG, 0.25, PHI, GAP)
-    many = vibration_amplitude(LEG, SLIPS[:, None], PHI, np.asarray([0.05, GAP]))
-    assert many.shape == (5, 2)
-    assert many[2, 1] == pytest.approx(one, rel=1e-12)
-    stiff = SpringLeg(stiffness=np.asarray([2000.0, 4000.0]), bending=0.5)
-    assert vibration_amplitude(stiff, 0.25, PHI, GAP)[1] == pytest.approx(one, rel=0.02)
