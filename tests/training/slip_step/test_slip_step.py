@@ -82,6 +82,13 @@ def test_wrong_input_is_one_line(slip_stream, slip_drive, tmp_path, capsys):
     assert "no [rover]" in capsys.readouterr().err and not (tmp_path / "a.onnx").exists()
 
 
+def test_loads_are_those_of_the_rover(slip_case, slip_stream):
+    for slope, roll in ((0.0, 0.0), (0.2, 0.0), (-0.1, 0.15), (0.25, -0.1)):
+        assert slip_stream.loads(slope, roll) == pytest.approx(
+            slip_case.rover.loads(slope, roll), rel=1e-6
+        )
+
+
 def test_on_board_it_needs_numpy_and_onnxruntime_alone(slip_files):
     code = "import sys; from soilml.onboard.slip_stream import SlipStream as S; "
     code += f"s = S.load({str(slip_files / 'rover.onnx')!r}); s.start(); "
