@@ -111,22 +111,6 @@ def test_streams_of_300_rows(name, compiled):
 
 
 @pytest.mark.slow
-def test_many_rows_one_by_one(compiled):
-    """Both sides step row by row: errors of slip and load are linearised at what is known then."""
-    model, rng = compiled("wheel"), np.random.default_rng(4)
-    estimator = estimator_of("wheel", None)
-    rows = rows_of(rng, 500, None, ())
-    own, memory = model.start(), estimator.start()
-    for i, row in enumerate(model.rows(**rows)):
-        assert model.step(own, (type(row) * 1)(row))[0] == 0
-        expected, memory = estimator.step(memory, **{name: v[i] for name, v in rows.items()})
-    _, answer = model.answer(own)
-    assert own.counted[1] == 500 and answer["in_range"] == bool(expected.in_range)
-    found = differences(answer, expected)
-    assert max(found[:2]) < LONG and max(found[2:]) < LONG_ENDS, found
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("name", [*SETS, "kls1_wheel", "wheel_lssvm", "wheel_mlp"])
 def test_each_file_reproduces_its_probe(name, compiled):
     """Readings whose answers the file itself has."""
