@@ -9,7 +9,6 @@ from scipy.stats import binom
 from datagen.recipe import read_recipe
 from soilml import Estimator
 from soilml.errors import InputError
-from soilml.onboard.set_posterior import SetPosterior
 from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
 from training.set_posterior.families.recipe_family import RecipeFamily
@@ -126,35 +125,6 @@ def test_one_valid_set_in_a_hundred_is_flagged(wheel, rows):
     assert count <= binom.ppf(0.9995, len(sets.truth), 0.01)
 
 
-def test_a_slip_scale_error_mimics_a_larger_shear_modulus(wheel):
-    """Stress depends on slip over shear modulus: the error cannot be flagged, but is bounded."""
-    ratios = []
-    for k, soil in enumerate(((800.0, 0.6, 0.012), (1500.0, 0.55, 0.015), (400.0, 0.65, 0.01))):
-        rows = torque_only(simulate(soil, k))
-        estimate = wheel.run(**rows | {"slip": 1.1 * rows["slip"]})
-        assert estimate.in_range
-        ratios.append(estimate.mean[2] / wheel.run(**rows).mean[2])
-    assert 1.03 < np.mean(ratios) < 1.2
-
-
-def test_repeated_rows_count_once(wheel):
-    rows = simulate((900.0, 0.6, 0.012))
-    again = {name: np.tile(value, 25) for name, value in rows.items()}
-    once, often = wheel.run(**rows), wheel.run(**again)
-    np.testing.assert_array_equal(once.mean, often.mean)
-    np.testing.assert_array_equal(once.std, often.std)
-
-
-def test_hundreds_of_rows_narrow_the_posterior_around_the_truth(wheel):
-    rng, soil = np.random.default_rng(5), np.asarray((900.0, 0.6, 0.012))
-    many = simulate(soil, 6, rng.uniform(0.06, 0.58, 500), rng.uniform(32.0, 118.0, 500))
-    right = wheel.on(model_error=0.0)
-    estimate = right.run(**many)
-    assert estimate.in_range
-    assert (np.abs(estimate.mean - soil) < 4.0 * estimate.std).all()
-    assert (estimate.std < right.run(**simulate(soil)).std).all()
-
-
 def test_one_row_does_not_determine_three_unknowns(wheel):
     """One row narrows the prior at its ends only, and the intervals keep their coverage."""
     inside, widths = [], []
@@ -180,14 +150,3 @@ def test_channels_may_be_missing_in_some_rows(wheel):
     assert estimate.in_range
     assert (estimate.std < 1.02 * wheel.run(**torque_only(rows)).std).all()
     assert np.prod(estimate.std) > np.prod(all_of_them.std)
-
-
-def test_a_wheel_beyond_the_range_of_a_file_is_refused():
-    radius = {"wheel_radius": (0.04, 0.5)}
-    file = SetPosterior(
-        terms=35, noise={}, context_ranges=radius, context_values={}, sets_only=True
-    )
-    assert file.with_context({"wheel_radius": 0.3}, {}).context_values == {"wheel_radius": 0.3}
-    for wrong in (0.75, 300.0, -0.1, np.nan):  # too large, in mm, impossible, unknown
-        with pytest.raises(InputError, match="wheel_radius"):
-            file.with_context({"wheel_radius": wrong}, {})

@@ -92,23 +92,6 @@ def test_the_board_estimates_as_the_ground_does(board, tmp_path, small_model):
 
 
 @pytest.mark.network
-def test_the_board_estimates_for_any_wheel(board, tmp_path, any_set_file):
-    from conftest import MODEL
-
-    from soilml.cli import main
-
-    (tmp_path / "m.toml").write_text(MODEL + '[discrepancy]\ntorque_Nm = "2 %"\n')
-    (tmp_path / "runs.csv").write_text(RUNS)
-    command = ["estimate", str(any_set_file), "runs.csv", "--case", "m.toml", "--by", "run"]
-    done = run(board / "soilml", *command, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    out = tmp_path / "own.csv"
-    paths = [str(any_set_file), str(tmp_path / "runs.csv"), "--case", str(tmp_path / "m.toml")]
-    assert main(["estimate", *paths, "--by", "run", "--out", str(out)]) == 0
-    assert done.stdout == out.read_text()
-
-
-@pytest.mark.network
 def test_the_board_simulates_and_says_what_it_lacks(board, tmp_path):
     from conftest import MODEL
 

@@ -39,18 +39,6 @@ def test_estimates_of_five_points_at_one_load_stay_with_the_prior(capsys):
     assert "mostly the prior" in captured.err
 
 
-def test_the_model_can_be_simulated_at_the_tests_own_slips(capsys):
-    model = str(ROOT / "examples/kls1/model.toml")
-    assert main(["simulate", model, "--slip", "0.1:0.5:5", "--load", "58.86"]) == 0
-    assert capsys.readouterr().out.count("\n") == 6
-
-
-def test_a_table_with_several_wheels_asks_for_a_choice(capsys):
-    model = str(ROOT / "examples/kls1/model.toml")
-    assert main(["identify", model, str(KLS1)]) == 2
-    assert "--where" in capsys.readouterr().err
-
-
 def test_the_gap_workflow_on_published_tests(tmp_path, monkeypatch):
     """Wheels at one load are not named; what makes sinkage grow with slip is told."""
     spec = importlib.util.spec_from_file_location("real", ROOT / "examples" / "gap" / "real.py")

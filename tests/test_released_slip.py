@@ -69,27 +69,6 @@ def test_fused_slip_is_better_than_either_sensors_and_its_intervals_hold(soil):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("soil", SOILS)
-def test_eight_readings_of_one_soil_are_not_taken_for_independent(soil):
-    columns = rows(soil, 8 * 1000, Block(8, 1.0, ("slip", "load_N")))
-    runs = {k: v[: len(v) // 8 * 8].reshape(-1, 8) for k, v in columns.items()}
-    assert np.ptp(runs["slip"], axis=1).max() == 0.0
-    slip = runs["slip"][:, 0]
-    by_time = [estimates(soil, {k: v[:, i] for k, v in runs.items()}) for i in range(8)]
-    one = [error_and_cover(e, slip)[0] for e in by_time[0]]
-    for sensor in range(2):
-        repeated = [each[sensor] for each in by_time]
-        error, held = error_and_cover(fuse_estimates(repeated).estimate, slip)
-        assert error < 1.01 * one[sensor]
-        assert 0.88 <= held <= 0.92
-        assert error_and_cover(fuse_estimates(repeated, "prior-once").estimate, slip)[1] < 0.6
-    both = fuse_estimates([e for each in by_time for e in each]).estimate
-    error, held = error_and_cover(both, slip)
-    assert error < min(one)
-    assert 0.88 <= held <= 0.92
-
-
-@pytest.mark.slow
 def test_in_the_regime_of_the_paper_vibration_alone_tells_slip_and_fusion_keeps_it():
     columns = rows("paper", 8000, Block(1, 1.0))
     each = estimates("paper", columns)

@@ -1,27 +1,22 @@
 """What the ROS 2 example does without ROS: messages of all kinds in, rows and reports out."""
 
-import ast
 import math
 import sys
-import zipfile
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ros2_messages import GIVEN, LOAD, MODEL, RADIUS, ROOT, SAND, SECOND, contents, drive, play
+from ros2_messages import GIVEN, LOAD, MODEL, ROOT, SAND, SECOND, contents, drive, play
 
 from soilml import Estimator
 from soilml.errors import InputError, ModelFileError
 
 sys.path.insert(0, str(ROOT / "examples" / "ros2"))
 
-from soil_estimator.clock import Stamp, StampedSamples
 from soil_estimator.logic import Level, SoilLogic
-from soil_estimator.rows import RowCollector
-from soil_estimator.settings import DEFAULTS, PARAMETERS, REQUIRED, settings_of
-from soil_estimator.slip import slip_of
+from soil_estimator.settings import settings_of
 
 #: Rows of a drive of a minute: the last stretch is not known to be complete.
 WHOLE = 59
@@ -60,13 +55,6 @@ def test_a_drive_over_sand_is_recognised(prompt):
         assert last.values[f"{name}_low"] < last.values[name] < last.values[f"{name}_high"]
 
 
-@pytest.mark.parametrize("delay", [0.05, 0.3, 0.9, 1.2, 1.9])
-def test_odometry_that_arrives_late_gives_the_same_rows(prompt, delay):
-    late = play(logic(), contents(drive(), delay))
-    assert np.array_equal(rows_of(late), rows_of(prompt))
-    assert late[-1].values == prompt[-1].values
-
-
 def test_messages_that_wait_on_the_way_and_come_twice_give_the_same_rows(prompt):
     rng, ready, mixed = np.random.default_rng(0), {"joints": 0.0, "odometry": 0.0}, []
     for at, (kind, *parts) in contents(drive()):
@@ -77,21 +65,6 @@ def test_messages_that_wait_on_the_way_and_come_twice_give_the_same_rows(prompt)
     own = logic()
     assert np.array_equal(rows_of(play(own, mixed)), rows_of(prompt))
     assert own.inputs(160.0).values["repeated_stamps"] > 500
-
-
-@pytest.mark.parametrize("every", [2, 5])
-def test_slow_odometry_gives_as_many_rows(every):
-    assert len(play(logic(), contents(drive(), odometry_every=every))) == WHOLE
-
-
-def test_later_than_the_patience_is_told_and_a_longer_patience_helps():
-    own, late = logic(), contents(drive(), 2.5)
-    assert play(own, late[:1150]) == []
-    told = own.inputs(late[1149][0])
-    assert told.level is Level.WARN
-    assert "odometry is stamped 2.6 s before the others, and patience is 2 s" in told.message
-    assert told.values["late_samples"] > 200
-    assert len(play(logic(patience=3.0), late)) == WHOLE
 
 
 def test_fields_that_are_missing_are_no_samples():
@@ -169,17 +142,6 @@ def test_a_clock_that_is_set_back_begins_again_and_keeps_the_soil():
     assert again[-1].values["rows_remembered"] >= 36
 
 
-@pytest.mark.parametrize("clock", ["frozen", "backwards"])
-def test_stamps_that_do_not_advance_are_told(clock):
-    own, messages = logic(), contents(drive(20))
-    stamps = [content[1] for _, content in messages]
-    stamps = stamps[::-1] if clock == "backwards" else [stamps[0]] * len(stamps)
-    for stamp, (at, (kind, _, *parts)) in zip(stamps, messages, strict=True):
-        assert play(own, [(at, (kind, stamp, *parts))]) == []
-    told = own.inputs(messages[-1][0])
-    assert told.level is Level.WARN and told.message.startswith("stamps do not advance: ")
-
-
 def test_a_bag_that_is_played_three_times_counts_once(prompt):
     """Also where odometry is late, so that its last messages come after the clock was set back."""
     own, found = logic(), []
@@ -191,16 +153,6 @@ def test_a_bag_that_is_played_three_times_counts_once(prompt):
     # a stretch at the seam may be cut differently
     assert found[-1].values["rows_remembered"] <= 21
     assert found[-1].values["friction_angle_std"] > 0.9 * found[18].values["friction_angle_std"]
-
-
-def test_rows_of_a_bag_that_were_forgotten_are_read_again():
-    """The bag has two soils: when it begins again, the first one is found again."""
-    other = replace(SAND, cohesion=300.0, friction_angle=0.75, shear_modulus=0.01)
-    bag = [*contents(drive(40)), *contents(drive(40, other, begin=140, seed=1))]
-    own = logic()
-    play(own, bag)
-    again = play(own, bag[: len(bag) // 2])
-    assert "SOIL_CHANGED" in [report.values["event"] for report in again[:10]]
 
 
 def test_single_wrong_stamps_change_nothing(prompt):
@@ -230,69 +182,6 @@ def test_load_from_its_topic_and_a_wheel_beside_the_centre():
     plain = play(logic(), contents(drive(10)))
     assert rows_of(found) == pytest.approx(rows_of(plain))
     assert {report.values["row_load"] for report in found} == {LOAD + 2.0}
-
-
-def samples(wheel_speed=1.0, torque=1.0, speed=0.1):
-    return {"wheel_speed": wheel_speed, "torque": torque, "speed": speed}
-
-
-@pytest.mark.parametrize(
-    ("parts", "reason"),
-    [
-        ([samples(0.0), samples(0.01)], "the wheel stands"),
-        ([samples(), samples(torque=math.nan)], "1 samples of effort of the joint"),
-        ([samples(), samples(speed=math.inf)], "1 samples of odometry"),
-        ([samples(0.3), samples(1.0)], "the wheel starts or stops"),
-        ([samples(1.0), samples(1.01), samples(1.02)], "odometry repeats its speed"),
-        ([samples(1.0), samples(1.0, speed=0.11), samples(1.02)], ""),
-        ([samples(), samples(1.0, 1e308, 1e308)], ""),
-    ],
-)
-def test_a_stretch_that_says_nothing_gives_no_row(parts, reason):
-    rows = RowCollector(RADIUS, LOAD)
-    for i, part in enumerate(parts):
-        assert rows.add(SECOND + i * 7 * SECOND // 10 // (len(parts) - 1), part) == []
-    (found,) = rows.add(5 * SECOND // 2, samples())
-    assert found.reason.startswith(reason) and (found.row is None) == bool(reason)
-
-
-def test_a_stretch_with_samples_in_a_part_of_it_gives_no_row():
-    rows = RowCollector(RADIUS, LOAD)
-    for i in range(4):
-        rows.add(SECOND + i * SECOND // 10, samples())
-    (found,) = rows.add(5 * SECOND // 2, samples())
-    assert found.reason == "velocity of the joint for a part of the time only"
-
-
-def test_slip_of_driving_and_braking_wheels_forward_and_backward():
-    assert slip_of(0.2, 0.15) == pytest.approx(0.25)
-    assert slip_of(0.15, 0.2) == pytest.approx(-0.25)
-    rows = RowCollector(RADIUS, LOAD)
-    for i in range(2):
-        rows.add(SECOND + i * SECOND // 2, samples(-1.0, -2.0, -0.75 * RADIUS))
-    (found,) = rows.add(5 * SECOND // 2, samples())
-    assert found.row == pytest.approx({"slip": 0.25, "torque": 2.0, "load": LOAD})
-
-
-def test_a_stamp_is_believed_when_others_follow_it():
-    own = StampedSamples(reach=10)
-    assert [own.add(t, 1.0) for t in (100, 105, 105)] == [Stamp.USED, Stamp.USED, Stamp.REPEATED]
-    assert [own.add(t, 1.0) for t in (500, 106, 500, 800)] == [
-        Stamp.DOUBTFUL,
-        Stamp.USED,
-        Stamp.DOUBTFUL,
-        Stamp.DOUBTFUL,
-    ]
-    assert [own.add(t, 2.0) for t in (805, 806)] == [Stamp.DOUBTFUL, Stamp.SET_FORWARD]
-    assert own.newest == 806 and own.samples[805] == 2.0
-    assert [own.add(t, 3.0) for t in (1, 2, 3)][-1] is Stamp.SET_BACK
-    assert own.samples == dict.fromkeys((1, 2, 3), 3.0)
-
-
-@pytest.mark.parametrize("name", REQUIRED)
-def test_each_parameter_that_is_missing_is_named_in_one_line(name):
-    with pytest.raises(InputError, match=f"^the parameter {name} is missing: [^\n]+$"):
-        settings_of({k: v for k, v in GIVEN.items() if k != name})
 
 
 @pytest.mark.parametrize(
@@ -333,17 +222,6 @@ def test_a_file_for_many_wheels_needs_the_wheel_and_the_soil():
     assert len(play(SoilLogic(own), contents(drive(10)))) == 9
     with pytest.raises(ModelFileError):
         settings_of(GIVEN | {"model": "/nowhere.onnx"})
-
-
-def test_the_settings_are_printed_and_the_defaults_are_among_them():
-    text = settings_of(GIVEN).text
-    assert all(f"{name}=" in text for name in (*REQUIRED, *DEFAULTS))
-    example = (ROOT / "examples" / "ros2" / "config" / "wheel.yaml").read_text()
-    pairs = dict(line.strip().split(": ", 1) for line in example.splitlines()[2:])
-    assert set(REQUIRED) <= set(pairs) <= set(PARAMETERS)
-    words = ("model", "joint", "load", "state_file")
-    used = {n: v if n in words else ast.literal_eval(v) for n, v in pairs.items()}
-    assert settings_of(used).load is None  # the node starts with them, wherever it is
 
 
 def test_rows_are_kept_in_the_state_file(tmp_path):
@@ -397,25 +275,3 @@ def test_a_state_that_cannot_be_written_is_told_and_the_drive_goes_on(tmp_path):
     folder.mkdir()
     play(own, contents(drive(10, begin=110)))
     assert own.soil().level is Level.OK
-
-
-def test_a_large_state_file_is_not_read(tmp_path):
-    path = tmp_path / "rows.npz"
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as out:
-        out.writestr("system.npy", bytes(16 << 20))
-    assert path.stat().st_size < 100_000
-    told = logic(state_file=str(path)).remark
-    assert "is not used" in told and "holds 16 MB; a state of a tracker has at most 8 MB" in told
-
-
-def test_the_noise_of_the_shipped_parameters_does_not_stop_a_wheel_of_constant_load():
-    """All rows but the first two were stuck."""
-    text = (ROOT / "examples" / "ros2" / "config" / "wheel.yaml").read_text()
-    names = ("torque_noise", "slip_noise", "load_noise")
-    lines = [line.partition(":") for line in text.splitlines()]
-    shipped = {k.strip(): ast.literal_eval(v.strip()) for k, _, v in lines if k.strip() in names}
-    assert min(shipped["load_noise"]) > 0.0
-    own = logic(**shipped)
-    play(own, contents(drive(30)))
-    values = own.soil().values
-    assert values["rows_stuck"] == 0 and values["rows_remembered"] == 29

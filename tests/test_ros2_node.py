@@ -91,45 +91,6 @@ def test_a_recorded_bag_gives_the_rows_of_its_drive(node_module, store, tmp_path
     assert stamps == list(range(101, 160))
 
 
-def test_load_of_its_topic(node_module, store):
-    node = node_module(load="topic").SoilNode()
-    for topic, kind, stamp, message in messages(store, drive(3)):
-        node.callbacks[topic](store.again(message, kind))
-        wrench = store.of("geometry_msgs", "WrenchStamped", header=header(store, stamp))
-        wrench.wrench.force.z = 64.0
-        node.callbacks["wheel_load"](wrench)
-    values = {pair.key: pair.value for pair in node.published["soil"][-1].status[0].values}
-    assert float(values["row_load"]) == 64.0
-
-
-def test_a_stamp_at_the_end_of_time_can_be_published(node_module, store):
-    node = node_module().SoilNode()
-    last = (2**31 - 3) * SECOND
-    for topic, kind, stamp, message in messages(store, drive(3)):
-        message.header = header(store, last + stamp - 100 * SECOND)
-        node.callbacks[topic](store.again(message, kind))
-    assert node.published["soil"]
-
-
-def test_nodes_of_two_wheels_are_told_apart_in_diagnostics(node_module, monkeypatch):
-    module = node_module()
-    monkeypatch.setattr(module.SoilNode, "namespace", "/front_left", raising=False)
-    node = module.SoilNode()
-    node.callbacks["timer"]()
-    (health,) = node.published["/diagnostics"]
-    assert health.status[0].name == "front_left/soil_estimator: inputs"
-
-
-def test_a_state_file_that_cannot_be_written_ends_it_with_one_line(node_module, tmp_path, capsys):
-    folder = tmp_path / "state"
-    folder.mkdir()
-    module = node_module(state_file=str(folder / "rows.npz"))
-    module.rclpy.spin = lambda node: folder.rmdir()
-    assert module.main() == 1
-    told = capsys.readouterr().err
-    assert told.startswith("soil_estimator: the rows are lost") and told.count("\n") == 1
-
-
 def test_a_wrong_parameter_ends_it_with_one_line(node_module, capsys):
     assert node_module(joint=None).main() == 2
     told = capsys.readouterr().err

@@ -101,22 +101,6 @@ def test_its_twists_are_those_of_the_stream(node_module, store, drive, model):
         )
 
 
-def test_rows_without_an_answer_have_a_flag_and_no_twist(node_module, store, drive):
-    node = node_module().SlipNode()
-    play(node, messages(store, drive, range(45, 50)))
-    count = len(node.published["slip_twist"])
-    still = SimpleNamespace(
-        rim_speed=0.0 * drive.rim_speed, torque=0.0 * drive.torque, slope=drive.slope
-    )
-    play(node, messages(store, still, range(45, 50), begin=105))
-    # the row that ends as the wheels stop is the last one with an answer
-    assert len(node.published["slip_twist"]) <= count + 1
-    last = node.published["slip_flags"][-1].status[0]
-    assert last.message == "standing" and last.values[0].value == "False"
-    assert node.callbacks["~/restart"](None, SimpleNamespace()).success
-    assert node.logic._state.recent[1] < 0.0
-
-
 @pytest.mark.parametrize(
     ("field", "flag", "answered"),
     [("torque", "torque-set-aside", True), ("rim_speed", "row-not-possible", False)],
@@ -138,33 +122,3 @@ def test_a_wild_reading_is_flagged_and_the_next_rows_are_answered(
     assert len(twists) == len(told) - (0 if answered else 2)
     for twist in twists:
         assert np.isfinite([twist.twist.linear.x, *twist.covariance]).all()
-
-
-def test_a_message_without_an_orientation_is_no_attitude(node_module, store):
-    node = node_module().SlipNode()
-    node.callbacks["imu"](store.of("sensor_msgs", "Imu"))
-    assert not node.published["slip_flags"]
-
-
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"model": None}, "the parameter model is missing"),
-        ({"joints": ["a"]}, "names 1; "),
-        ({"joint_signs": [1.0, 1.0, 2.0, 1.0]}, "other numbers than 1.0 and -1.0"),
-        ({"wheel_radius": 0.0}, "wheel_radius is 0; it must be above zero"),
-        ({"wheel_radius": 0.2}, "wheel_radius is 0.2; "),
-        ({"wheel_radius": "wide"}, "wheel_radius is 'wide'; needed: radius of the wheels, m"),
-        ({"joints": "flfr"}, "the parameter joints is 'flfr'; needed is a list"),
-        ({"joints": 4}, "the parameter joints is 4; needed is a list"),
-        ({"joints": ["fl", "fr", "fl", "rr"]}, "the parameter joints names a joint twice"),
-        ({"joint_signs": [1.0, 1.0, "x", 1.0]}, "the parameter joint_signs is 'x'; needed: "),
-        ({"period": 1e300}, "the parameter period is 1e+300 s; needed is a time above zero"),
-        ({"model": 3}, "the parameter model is 3; needed is a text"),
-        ({"model": str(ROOT / "exported" / "wheel.onnx")}, "no file of soilml export-slip"),
-    ],
-)
-def test_a_wrong_parameter_ends_it_with_one_line(node_module, capsys, given, said):
-    assert node_module(**given).main() == 2
-    told = capsys.readouterr().err
-    assert told.startswith("slip_speed: ") and said in told and told.count("\n") == 1

@@ -1,8 +1,9 @@
 """Seeded sample of mutants of the rooms where numbers are made: `make mutation MUTANTS=12`.
 
 A mutant is the source with one change by mutmut. It is tried in a copy of the tree, by those tests
-of its room that call the changed function, shortest first, up to a minute (a constant of a module:
-the tests that call any function of the file, and those of the room's `test_declarations_*`). It is
+of its room and of the commands and files that use it (`ROOMS`) that call the changed function in
+their own process, shortest first, up to a minute (a constant of a module: the tests that call any
+function of the file, and those of the room's `test_declarations_*`). It is
 killed where a test fails, and survives where none does; survivors are written with their difference
 into `build/mutants.txt`. A time-out counts as killed. Drawing is left out. Some mutants change no
 result, as `<=` for `<` between numbers that are never equal, and survive rightly: the share that
@@ -35,13 +36,19 @@ from mutants import Mutant, MutantsOfFile
 from scipy.stats import binomtest
 
 ROOT = Path(__file__).parents[1]
-#: Source folders, the folders of their tests, and what is left out: drawing, and other rooms.
+#: Source folders, their tests below `tests`, and what is left out: drawing, and other rooms.
 ROOMS = {
-    "physics": ("soilml/physics", "tests/soilml/physics", ""),
-    "fitting": ("soilml/fitting", "tests/soilml/fitting", ""),
-    "identification": ("soilml/identification", "tests/soilml/identification", "/plot"),
-    "onboard": ("soilml/onboard", "tests/soilml/onboard", ""),
-    "gap": ("soilml/gap", "tests/soilml/gap", "/html/|_figure"),
+    "physics": ("soilml/physics", "soilml/physics commands/test_contract.py soilml/traction", ""),
+    "fitting": ("soilml/fitting", "soilml/fitting", ""),
+    "identification": ("soilml/identification", "soilml/identification", "/plot"),
+    "onboard": (
+        "soilml/onboard",
+        "soilml/onboard commands/test_contract.py commands/test_outputs.py"
+        " commands/test_estimate_case.py test_flags.py test_onnx_interface.py test_ros2_example.py"
+        " training/test_trained_slip.py training/slip_step",
+        "",
+    ),
+    "gap": ("soilml/gap", "soilml/gap commands/test_gap_command.py", "/html/|_figure"),
 }
 TESTS = "not network and not long and not browser"
 #: What mutants change, as the second table has it.
@@ -160,8 +167,9 @@ def difference(mutant: Mutant, source: str) -> str:
 def run(room: str, count: int, seed: int, tree: Path, out: Path, counts: Counter[str]) -> None:
     """Try a sample of the mutants of a room; count what became of them."""
     folder, tests, other = ROOMS[room]
+    paths = [f"tests/{name}" for name in tests.split()]
     print(f"{room}: the tests without a mutant ...", file=sys.stderr, flush=True)
-    if tested(tree, [tests], Recorder(tree), 3000.0) != 0:
+    if tested(tree, paths, Recorder(tree), 3000.0) != 0:
         raise RuntimeError((tree / "mutation.log").read_text()[-2000:])
     called = json.loads((tree / "mutation.json").read_text())
     files = [str(path.relative_to(tree)) for path in sorted((tree / folder).rglob("*.py"))]

@@ -98,18 +98,6 @@ def test_an_ended_run_goes_on_where_it_stopped(folders, monkeypatch):
     assert made[5:] == [("flat", 3)]
 
 
-def test_an_unknown_bench_is_named(folders, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main([bench(squared)], ["cubes"])
-    assert ended.value.code == 2
-    assert "no bench cubes; there are: squares" in capsys.readouterr().err
-
-
-def test_a_sample_of_cases_does_not_follow_how_they_repeat():
-    assert runner.thinned(list("abcdefghi"), 3) == ["a", "e", "i"]
-    assert runner.thinned(list("abc"), 1) == ["a", "b", "c"]
-
-
 def test_the_results_of_the_repository_fill_the_page_of_validation():
     import validation
 

@@ -13,10 +13,10 @@ from soilml.cli import main
 from soilml.io.text_tables import csv_text
 from training.adaptation import board_file
 from training.adaptation.supported_errors import CHECKED
-from training.adaptation.workflow import GAP_FILES, _read_gap
+from training.adaptation.workflow import GAP_FILES
 from training.commands.adapt import FILES
 from training.set_posterior import validation
-from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
+from training.set_posterior.error_scales import ErrorScales
 
 #: The packaged spec with a response that is learned in seconds.
 SMALL_SPEC = """\
@@ -121,39 +121,3 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, small
     assert capsys.readouterr().out == shown
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert (out / "adapted.h").is_file()
-
-
-@pytest.mark.long
-def test_a_campaign_of_few_runs_gives_a_file_that_is_not_judged(tmp_path, capsys, small_training):
-    out = tmp_path / "out"
-    words = write_log(tmp_path, SlipSinkage(n1=0.5), loads=(40.0, 70.0, 110.0))
-    assert main([*words, "--out", str(out), "--rows", "3000"]) == 0
-    shown = capsys.readouterr().out
-    assert shown.startswith("A file was trained and not judged, with slip-sinkage.")
-    content = json.loads((out / "adapt.json").read_text())
-    assert content["status"] == "not-judged" and content["kept_back"] == []
-    assert "few-runs" in [r["code"] for r in content["remarks"]]
-    metadata = soilml.Estimator.load(out / "adapted.onnx").metadata
-    assert json.loads(metadata["set"])["model_error_scales"] == USUAL_SCALES.as_list()
-    assert "judgement" not in content
-    assert all((out / name).is_file() for name in content["files"])
-    assert (out / "adapted.onnx").is_file() and not (out / "kept_back.csv").exists()
-    assert not (out / "before.onnx").exists()
-
-
-def test_a_gap_that_needs_other_priors_trains_nothing(tmp_path):
-    model = tmp_path / "model.toml"
-    model.write_text(THREE_CHANNEL_MODEL)
-    case = read_case(model)
-    effect = '[[effect]]\nname = "slip-sinkage"\nsuspected = true\nn1 = 0.4\n'
-    model.write_text(THREE_CHANNEL_MODEL + effect)
-    reason = {"code": "prior-opened", "about": ["kphi"], "severity": "warning", "text": ""}
-    content = {
-        "status": "suspected", "sentence": "", "reasons": [reason], "soil_before": {},
-    }  # fmt: skip
-    (tmp_path / "gap.json").write_text(json.dumps(content))
-    alone = _read_gap(tmp_path, case, suspected=False)
-    assert alone.refusal is not None and alone.refusal.code == "gap-suspected"
-    found = _read_gap(tmp_path, case, suspected=True)
-    assert found.effects == ("slip-sinkage",)
-    assert found.refusal is not None and found.refusal.code == "prior-opened"

@@ -7,17 +7,12 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 from conftest import MODEL
 
-from soilml import Estimator
 from soilml.cli import main
-from soilml.experiment_design.advice_after_results import advice_after_estimate
-from soilml.remarks import texts
 
 pytestmark = pytest.mark.slow
 
@@ -61,14 +56,6 @@ def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
     assert float(by["best for cohesion"]["cohesion_left"]) < 0.7
     assert float(by["best repeat"]["cohesion_left"]) > 0.9
     assert float(by["row 2 of 2"]["all_left"]) < float(by["row 1 of 2"]["all_left"])
-
-
-def test_every_candidate_can_be_had_the_best_first(folder, capsys):
-    command = ["advise", "model.toml", "--slips", "0.1:0.5:2", "--loads", "30:120:3", "--all"]
-    assert main(command) == 0
-    rows = rows_of(capsys.readouterr().out)
-    left = [float(r["all_left"]) for r in rows]
-    assert len(rows) == 6 and left == sorted(left)
 
 
 @pytest.mark.parametrize(
@@ -134,61 +121,6 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     assert "advice" in json.loads(capsys.readouterr().out)["runs"]["a"]
 
 
-def test_noise_that_only_the_table_declares_gives_an_answer_without_advice(folder, capsys):
-    (folder / "silent.toml").write_text(MODEL.split("[noise]")[0])
-    rows = "run,slip,load_N,torque_Nm,torque_Nm_std\na,0.2,60,2.9,0.06\na,0.2,60,2.95,0.06\n"
-    (folder / "own.csv").write_text(rows)
-    assert main(["identify", "silent.toml", "own.csv", "--method", "posterior"]) == 0
-    assert "advice" not in json.loads(capsys.readouterr().out)
-
-
-def test_an_estimate_abstains_in_words_and_keeps_its_table_clean(folder, small_model, capsys):
-    command = ["estimate", str(small_model), "runs.csv"]
-    assert main([*command, "--by", "run"]) == 0
-    captured = capsys.readouterr()
-    assert len(rows_of(captured.out)) == 1
-    assert "run a: cohesion: " in captured.err and "not identified by these rows" in captured.err
-    assert "Most informative next: slip" in captured.err
-    assert main(command) == 0
-    captured = capsys.readouterr()
-    assert len(rows_of(captured.out)) == 2
-    assert "a typical row: best next row for all parameters: slip" in captured.err
-
-
-@pytest.mark.parametrize(
-    "more",
-    [
-        {"bias": {"torque_Nm": "1 %"}},
-        {"operating": {"slip": [0.1, 0.5], "load_N": [30, 60], "speed_m_s": [0.01, 0.1]}},
-        {"operating": {"slip": [0.1, 0.5]}},
-        {"gear": {"type": "hover"}},
-        {"soil": 3},
-        {"noise": {"sinkage_m": 0.001}},
-    ],
-)
-def test_a_recipe_that_a_case_cannot_hold_gets_no_advice(small_model, more):
-    whole = Estimator.load(small_model)
-    one = whole(slip=0.2, torque=2.9, load=60.0)
-    readings = {"slip": 0.2, "load": 60.0, "torque": 2.9}
-    assert advice_after_estimate(whole, one.mean, one.covariance, readings)
-    recipe = json.dumps(json.loads(whole.metadata["recipe"]) | more)
-    other = replace(whole, metadata=whole.metadata | {"recipe": recipe})
-    assert advice_after_estimate(other, one.mean, one.covariance, readings) == []
-
-
-@pytest.mark.parametrize("rows", [1, 4, 40])
-def test_short_and_long_runs_at_one_load_ask_for_another(whole_file, rows):
-    estimator = Estimator.load(whole_file)
-    torque = 2.9 * (1.0 + 0.02 * np.random.default_rng(1).standard_normal(rows))
-    readings = {"slip": np.full(rows, 0.2), "load": np.full(rows, 60.0), "torque": torque}
-    one = estimator.run(**readings)
-    said = texts(advice_after_estimate(estimator, one.mean, one.covariance, readings))
-    cohesion = next(line for line in said if line.startswith("cohesion"))
-    left, again = (int(share) for share in re.findall(r"leaves (\d+)%", cohesion))
-    assert left < again - 5 and " at 60 N" not in cohesion.split(";")[0]
-    assert ("this row," if rows == 1 else "these rows,") in cohesion
-
-
 def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model):
     code = (
         "import sys\n"
@@ -209,16 +141,3 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr
     assert "mostly the prior" in done.stderr and "not identified by these rows" in done.stderr
-
-
-def test_the_noise_of_the_rows_suffices(tmp_path, model_file, capsys):
-    """Rows of `soilml import` have standard deviations, and their model file may have no noise."""
-    text = model_file.read_text()
-    (tmp_path / "quiet.toml").write_text(text[: text.index("[noise]")])
-    rows = ["run,slip,load_N,torque_Nm,torque_Nm_std"]
-    rows += [f"a,{s},{w},{t},0.04" for s, w, t in ((0.1, 60, 1.6), (0.3, 60, 2.7), (0.5, 80, 4.2))]
-    (tmp_path / "runs.csv").write_text("\n".join(rows) + "\n")
-    out = str(tmp_path / "next.csv")
-    files = [str(tmp_path / "quiet.toml"), str(tmp_path / "runs.csv")]
-    assert main(["advise", *files, "--out", out]) == 0
-    assert "taken from torque_Nm_std: 0.04" in capsys.readouterr().err

@@ -2,7 +2,7 @@
 
 import onnx
 import pytest
-from conftest import MODEL, RECIPE
+from conftest import MODEL
 
 from soilml.cli import main
 from soilml.onboard import Estimator
@@ -51,13 +51,6 @@ def test_model_files(tmp_path, capsys, what):
     refused(["simulate", str(path), "--slip", "0.1", "--load", "60"], capsys, said)
 
 
-def test_a_byte_order_mark_does_no_harm(tmp_path, capsys):
-    (tmp_path / "m.toml").write_text("\ufeff" + MODEL, encoding="utf-8")
-    assert main(["simulate", str(tmp_path / "m.toml"), "--slip", "0.1", "--load", "60"]) == 0
-    (tmp_path / "r.toml").write_text("\ufeff" + RECIPE.format(rows=9, seed=1), encoding="utf-8")
-    assert main(["generate", str(tmp_path / "r.toml"), str(tmp_path / "o.parquet")]) == 0
-
-
 @pytest.mark.parametrize("what", SPECS)
 @pytest.mark.filterwarnings("error")
 def test_specs(tmp_path, capsys, small_data, what):
@@ -101,10 +94,3 @@ def test_readings_beyond_single_precision_are_out_of_range_and_refused_in_a_tabl
     (tmp_path / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1e308\n")
     command = ["estimate", str(small_model), str(tmp_path / "runs.csv")]
     refused(command, capsys, "line 2, column torque_Nm: 1e+308 given")
-
-
-def test_a_hint_names_each_known_key_once(tmp_path, capsys):
-    (tmp_path / "m.toml").write_text(MODEL.replace("[gear]", "[gear]\nzzz = 1"))
-    assert main(["simulate", str(tmp_path / "m.toml"), "--slip", "0.1", "--load", "60"]) == 2
-    known = capsys.readouterr().err.split("known: ")[1].strip().split(", ")
-    assert len(known) == len(set(known)) >= 3

@@ -50,43 +50,6 @@ def test_both_tables_in_either_order_give_a_model_file_that_identify_takes(table
     assert main(["identify", "soil.toml", "runs.csv", "--method", "nonlinear"]) == 0
 
 
-@pytest.mark.parametrize("table", ["plates.csv", "shear.csv"])
-def test_one_table_gives_a_soil_section_and_says_what_is_missing(tables, table, capsys):
-    assert main(["bevameter", table, "--out", "soil.toml", "--picture", "soil.png"]) == 0
-    text = (tables / "soil.toml").read_text()
-    assert "[soil.prior]" in text and "[gear]" not in text
-    missing = "cohesion" if table == "plates.csv" else "kc"
-    assert f"soil.toml lacks {missing}" in capsys.readouterr().err
-
-
-def test_the_same_tables_give_the_same_file(tables):
-    for name in ("one.toml", "two.toml"):
-        assert main(["bevameter", "plates.csv", "shear.csv", "--out", name]) == 0
-    assert (tables / "one.toml").read_text() == (tables / "two.toml").read_text()
-
-
-MISTAKES = {
-    "millimetres": ("sinkage_m", "sinkage_mm", "sinkage is read in m"),
-    "millimetres without saying": (",0.04,", ",40,", "sinkage_m: 40 given"),
-    "radius in millimetres": ("plate_radius_m", "plate_radius_mm", "plate_radius_m"),
-    "no number": (",0.04,", ",nan,", "'nan' is not a number"),
-    "no name": ("large,0.08,0.04", ",0.08,0.04", "column test: the cell is blank"),
-    "unknown column": ("load_N", "force", "'force' is not known"),
-    "no test": ("test,", "probe,", "'probe' is not known"),
-    "negative radius": (",0.05,", ",-0.05,", "a radius above zero"),
-    "two plates in a test": ("large,0.08,0.04", "large,0.06,0.04", "give each plate a test"),
-}
-
-
-@pytest.mark.parametrize(("old", "new", "said"), MISTAKES.values(), ids=MISTAKES)
-def test_bad_plate_tables_end_with_one_line(tables, old, new, said, capsys):
-    (tables / "plates.csv").write_text(PLATES.replace(old, new))
-    assert main(["bevameter", "plates.csv", "--out", "soil.toml"]) == 2
-    error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1
-    assert not (tables / "soil.toml").exists()
-
-
 def test_bad_shear_tables_end_with_one_line(tables, capsys):
     for old, new, said in (
         ("normal_stress_Pa", "normal_stress_kPa", "name the column normal_stress_Pa"),

@@ -7,20 +7,6 @@ import sys
 
 import pytest
 
-from soilml.cli import main
-
-
-def test_a_shell_is_needed(capsys):
-    assert main(["completion"]) == 2
-    assert "required: shell" in capsys.readouterr().err
-
-
-def test_a_missing_library_names_its_extra(capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "shtab", None)
-    assert main(["completion", "bash"]) == 2
-    assert "pip install 'soilml[ground]'" in capsys.readouterr().err
-
-
 #: What is typed, and what the last word may become.
 TYPED = {
     "soilml pu": "pull",

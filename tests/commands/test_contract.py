@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import MODEL, RECIPE
+from conftest import RECIPE
 
 from soilml.cli import main
 
@@ -51,29 +51,6 @@ def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model
     assert "no equilibrium" in bad["status"]
 
 
-@pytest.mark.slow
-def test_estimate_leaves_rows_without_a_reading_blank(tmp_path, small_model, capsys):
-    text = "run,slip,load_N,torque_Nm\na,0.2,60,\na,0.3,60,3.0\nb,0.4,80,4.9\n"
-    (tmp_path / "runs.csv").write_text(text)
-    assert main(["estimate", str(small_model), str(tmp_path / "runs.csv")]) == 0
-    captured = capsys.readouterr()
-    first, second, _ = rows_of(captured.out)
-    assert first["cohesion_Pa"] == first["cohesion_Pa_std"] == "" and first["in_range"] == "0"
-    assert float(second["cohesion_Pa"]) > 0 and second["in_range"] == "1"
-    assert "line 2" in captured.err
-    assert main(["estimate", str(small_model), str(tmp_path / "runs.csv"), "--by", "run"]) == 0
-    assert [r["rows"] for r in rows_of(capsys.readouterr().out)] == ["1", "1"]
-
-
-def test_simulated_rows_can_be_identified(model_file, tmp_path, capsys):
-    out = str(tmp_path / "sim.csv")
-    command = ["simulate", str(model_file), "--slip", "0.1:0.6:6", "--load", "40,90"]
-    assert main([*command, "--run", "sim", "--out", out]) == 0
-    assert main(["identify", str(model_file), out, "--method", "nonlinear"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert found["parameters"]["shear_modulus"]["value"] == pytest.approx(0.025, rel=1e-3)
-
-
 def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--method", "posterior"]
     assert main([*command, "--by", "run"]) == 0
@@ -83,12 +60,6 @@ def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     assert main(command) == 0
     content = json.loads(capsys.readouterr().out)
     assert "runs-as-one-soil" in {one["code"] for one in content["warnings"]}
-
-
-def test_simulate_takes_braking_slip(model_file, capsys):
-    assert main(["simulate", str(model_file), "--slip", "-0.5:0.5:3", "--load", "60"]) == 0
-    torque = [float(r["torque_Nm"]) for r in rows_of(capsys.readouterr().out)]
-    assert torque[0] < 0 < torque[2]
 
 
 def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, capsys):
@@ -105,17 +76,6 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     capsys.readouterr()
     assert main(command[:-2]) == 0
     assert json.loads(capsys.readouterr().out) == content
-
-
-@pytest.mark.slow
-def test_identify_warns_of_one_load(model_file, runs_file, capsys):
-    command = ["identify", str(model_file), str(runs_file), "--where", "load_N=40"]
-    assert main([*command, "--method", "posterior"]) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert ("not-identified", ["cohesion"]) in [
-        (w["code"], w["about"]) for w in content["warnings"]
-    ]
-    assert content["rows_used"] == 5
 
 
 @pytest.mark.slow
@@ -157,44 +117,3 @@ def test_soils_and_effects_list_their_catalogues(capsys):
         assert name in listed
     assert main(["effects", "grousers"]) == 0
     assert "height" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    "command",
-    [
-        "simulate",
-        "generate",
-        "train",
-        "estimate",
-        "identify",
-        "compare",
-        "soils",
-        "effects",
-        "climb",
-        "pull",
-        "advise",
-    ],
-)
-def test_help_teaches_with_an_example(command, capsys):
-    assert main([command, "--help"]) == 0
-    assert f"soilml {command}" in capsys.readouterr().out.split("positional")[0]
-
-
-def test_the_root_lists_every_command_in_the_order_of_work(capsys):
-    assert main(["--help"]) == 0
-    said = capsys.readouterr().out
-    places = [
-        said.index(f"    {c} ")
-        for c in ("soils", "simulate", "identify", "generate", "train", "estimate", "compare")
-    ]
-    assert places == sorted(places)
-
-
-def test_model_file_of_the_contract(tmp_path, capsys):
-    text = MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n'
-    text = text.replace("[soil.prior]", "friction_angle = 0.60\n[soil.prior]")
-    (tmp_path / "m.toml").write_text(text)
-    command = ["simulate", str(tmp_path / "m.toml"), "--slip", "0.1,0.5", "--load", "60"]
-    assert main(command) == 0
-    first, last = rows_of(capsys.readouterr().out)
-    assert float(last["sinkage_m"]) > 1.4 * float(first["sinkage_m"])

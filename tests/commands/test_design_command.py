@@ -53,34 +53,6 @@ def test_the_answer_is_json_in_a_pipe(study, capsys):
 
 
 @pytest.mark.slow
-def test_files_and_the_verdict(study, tmp_path, capsys):
-    folder, out, png = tmp_path / "report", tmp_path / "d.json", tmp_path / "d.png"
-    outputs = ["--report", str(folder), "--out", str(out), "--picture", str(png)]
-    assert main(["design", str(study), *FEW, *outputs]) == 0
-    said = capsys.readouterr().out
-    first = said.splitlines()[0]
-    assert "width" in first and "climbs 3 deg with" in first and "margin" in first
-    assert "removes_%" in said and "lugs are taken to be close enough" in said
-    assert png.read_bytes().startswith(b"\x89PNG")
-    page = (folder / "report.html").read_text()
-    assert first.split(":")[0] in page and "<img" in page
-    content = json.loads((folder / "report.json").read_text())
-    assert content["report"]["kind"] == "design"
-    assert content["best"] == json.loads(out.read_text())["best"]
-
-
-@pytest.mark.slow
-def test_options_change_slope_gravity_and_soils(study, capsys):
-    options = ["--slope", "20", "--gravity", "moon", "--soil", "moore1999/drift"]
-    assert main(["design", str(study), *FEW, *options]) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert content["gravity_m_s2"] == 1.62 and content["soils"] == ["moore1999/drift"]
-    codes = {one["code"] for one in content["warnings"]}
-    assert {"other-gravity", "assumed-soil", "goal-not-met"} <= codes
-    assert not content["met"]
-
-
-@pytest.mark.slow
 def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
     runs = "run,slip,load_N,torque_Nm\na,0.1,20,0.6\na,0.2,30,1.4\na,0.4,30,2.0\n"
     (tmp_path / "runs.csv").write_text(runs)

@@ -6,12 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MODEL, RECIPE
+from conftest import MODEL
 
 from soilml import Operating, read_case
 from soilml.cli import main
-from soilml.identification import model_error_inputs
-from soilml.io.read_table import read_table
 
 DISCREPANCY = '[discrepancy]\ntorque_Nm = "3 %"\ndrawbar_pull_N = 1.5\n'
 ANY_WHEEL = str(Path(__file__).parents[2] / "exported" / "any_wheel.onnx")
@@ -41,27 +39,6 @@ def table(captured):
     return list(csv.DictReader(io.StringIO(captured.out)))
 
 
-def test_estimates_of_a_model_file_for_many_wheels_are_wider(folder, capsys):
-    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
-    plain = spoken(capsys, *command, "plain.toml", "--exact-model")
-    wide = spoken(capsys, *command, "model.toml")
-    assert "[discrepancy] of torque_Nm, drawbar_pull_N is included" in wide.err
-    assert "discrepancy" not in plain.err
-    for key in ("cohesion_Pa_std", "friction_angle_rad_std", "shear_modulus_m_std"):
-        assert float(table(wide)[0][key]) > 1.1 * float(table(plain)[0][key])
-
-
-def test_simulated_rows_have_no_error_of_the_model_and_it_is_said(folder, capsys):
-    said = spoken(capsys, "simulate", "model.toml", "--slip", "0.1,0.3", "--load", "60").err
-    assert "simulate ignores the [discrepancy] of torque_Nm, drawbar_pull_N" in said
-
-
-def test_generated_rows_have_no_error_of_the_model_and_it_is_said(folder, capsys):
-    (folder / "recipe.toml").write_text(RECIPE.format(rows=8, seed=1) + DISCREPANCY)
-    said = spoken(capsys, "generate", "recipe.toml", "rows.parquet").err
-    assert "generate ignores the [discrepancy] of torque_Nm, drawbar_pull_N" in said
-
-
 @pytest.mark.slow
 def test_bands_of_pull_are_wider_and_say_what_they_include(folder, capsys):
     command = ("--load", "60", "--slip-limit", "0.4")
@@ -76,16 +53,6 @@ def test_bands_of_pull_are_wider_and_say_what_they_include(folder, capsys):
         )
         # the error alone is a band of 2 * 1.645 * 1.5 N = 4.9 N; 400 draws tell it within 15 %
         assert wider > max(width, 0.85 * 4.9)
-
-
-@pytest.mark.slow
-def test_advice_says_how_the_error_of_a_next_row_is_counted(folder, capsys):
-    said = spoken(capsys, "advise", "model.toml", "runs.csv", "--slips", "0.1,0.5", "--loads", "60")
-    assert "the [discrepancy] of a next row counts as independent" in said.err
-    (folder / "learned.toml").write_text(MODEL + REMAINDER)
-    asked = ("runs.csv", "--slips", "0.1,0.5", "--loads", "60")
-    said = spoken(capsys, "advise", "learned.toml", *asked)
-    assert "the error of the [remainder] of a next row counts as independent" in said.err
 
 
 REMAINDER = """
@@ -130,29 +97,3 @@ def test_an_estimate_has_the_mean_and_the_error_of_a_remainder(folder, capsys):
         size = float(after[f"{key}_std"])
         assert size > 1.05 * float(before[f"{key}_std"])
         assert abs(float(after[key]) - float(before[key])) < size
-
-
-def test_an_estimate_leaves_out_a_remainder_that_its_own_rows_taught(folder, capsys, monkeypatch):
-    (folder / "learned.toml").write_text(MODEL + REMAINDER)
-    own = read_case("learned.toml").remainder.of_rows(read_table("runs.csv")).rows
-    marked = REMAINDER.replace("format = 1\n", f"format = 1\nrows = {list(own)}\n")
-    (folder / "own.toml").write_text(MODEL + marked)
-    command = ("estimate", ANY_WHEEL, "runs.csv", "--by", "run", "--case")
-    plain, left_out = (spoken(capsys, *command, name) for name in ("plain.toml", "own.toml"))
-    assert "would count twice" in left_out.err and "its mean is taken" not in left_out.err
-    assert table(left_out) == table(plain)
-    others = Path("runs.csv").read_text().replace("a,0.1", "a,0.12").replace("a,0.3", "a,0.32")
-    Path("others.csv").write_text(others.replace("a,0.5", "a,0.52"))
-    said = spoken(capsys, *command[:1], ANY_WHEEL, "others.csv", *command[3:], "own.toml").err
-    assert "its mean is taken" in said and "would count twice" not in said
-    # a file that was trained with it contains it, whatever the rows
-    learned = read_case("own.toml").remainder
-    monkeypatch.setattr(model_error_inputs, "trained_remainder", lambda _: learned)
-    said = spoken(capsys, *command, "own.toml").err
-    assert "the file was trained with the [remainder]" in said and "count twice" not in said
-
-
-def test_generate_says_what_of_a_remainder_is_in_the_rows(folder, capsys):
-    (folder / "recipe.toml").write_text(RECIPE.format(rows=8, seed=1) + REMAINDER)
-    said = spoken(capsys, "generate", "recipe.toml", "rows.parquet").err
-    assert "[remainder] of torque_Nm is in the rows: its mean, and one draw of its error" in said

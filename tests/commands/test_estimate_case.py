@@ -43,62 +43,9 @@ def test_a_file_alone_is_described_in_one_line(folder, capsys):
     assert "radius 0.04 to 0.5 m" in said and "0 to 1 cohesion_max" in said
 
 
-def test_the_description_precedes_the_other_notes(folder, capsys):
-    assert main(["estimate", WHEEL, "runs.csv"]) == 0
-    first = capsys.readouterr().err.splitlines()[0]
-    assert first.startswith(f"{WHEEL}: for a wheel of radius 0.15 m")
-    assert main(["estimate", ANY_WHEEL, "runs.csv", "--case", "small.toml"]) == 0
-    first = capsys.readouterr().err.splitlines()[0]
-    assert "radius 0.12 m" in first and "cohesion 0 to 3 kPa" in first
-
-
 @pytest.mark.parametrize("file", [WHEEL, ANY_WHEEL])
 def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
     assert main(["estimate", file, "runs.csv", "--by", "run", "--case", "model.toml"]) == 0
     assert "gear" not in capsys.readouterr().err
     assert main(["estimate", file, "--case", "model.toml"]) == 0
     assert "radius 0.15 m" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("file", "case", "said"),
-    [
-        (WHEEL, "small.toml", "gear.radius 0.15, small.toml has 0.12"),
-        (KLS1, "model.toml", "gear.radius 0.085, model.toml has 0.15"),
-        (WHEEL, "effect.toml", "effects none, effect.toml has slip-sinkage"),
-        (ANY_WHEEL, "effect.toml", "has no effects, the model has slip-sinkage"),
-    ],
-)
-def test_another_wheel_is_refused_in_one_line(folder, capsys, file, case, said):
-    for rest in (["runs.csv"], []):
-        assert main(["estimate", file, *rest, "--case", case]) == 2
-        captured = capsys.readouterr()
-        assert said in one_line(captured.err) and not captured.out
-
-
-def test_what_a_file_of_one_wheel_ignores_of_the_case_is_said(folder, capsys):
-    other = MODEL.replace('torque_Nm = "2 %"', 'torque_Nm = "7 %"').replace("3000.0", "2000.0")
-    other += "[[soil.test]]\nnormal_stress = 8000\nstrength = 5000\nscatter = 0.1\n"
-    (folder / "other.toml").write_text(other + '[discrepancy]\ntorque_Nm = "2 %"\n')
-    assert main(["estimate", WHEEL, "runs.csv", "--case", "other.toml"]) == 0
-    said = capsys.readouterr().err
-    assert "prior [0.0, 3000.0] of cohesion, other.toml has [0.0, 2000.0], which is ignored" in said
-    assert "noise of torque_Nm as in its recipe, other.toml has another one" in said
-    assert "ignores the [discrepancy] of torque_Nm" in said
-    assert "[[soil.test]] is ignored" in said
-
-
-@pytest.mark.parametrize(("file", "case"), [(WHEEL, None), (ANY_WHEEL, "model.toml")])
-def test_a_table_of_another_wheel_is_refused(folder, capsys, file, case):
-    text = RUNS.replace("torque_Nm", "torque_Nm,wheel_radius_m")
-    (folder / "other.csv").write_text(text.replace("1.5", "1.5,0.15").replace("3.0", "3.0,0.12"))
-    command = ["estimate", file, "other.csv", *(["--case", case] if case else [])]
-    assert main(command) == 2
-    said = one_line(capsys.readouterr().err)
-    assert "other.csv line 3, column wheel_radius_m: 0.12 given" in said and "0.15" in said
-
-
-def test_options_of_rows_need_rows(folder, capsys):
-    assert main(["estimate", WHEEL, "--by", "run"]) == 2
-    assert "RUNS.csv is missing" in one_line(capsys.readouterr().err)

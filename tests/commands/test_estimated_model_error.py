@@ -2,11 +2,10 @@
 
 import csv
 import io
-from pathlib import Path
 
 import numpy as np
 import pytest
-from conftest import MODEL, simulated_run
+from conftest import simulated_run
 
 from soilml.cli import main
 from soilml.onboard.estimator import Estimator
@@ -43,19 +42,6 @@ def test_a_run_has_one_answer_with_errors_of_the_model(runs, capsys, whole_file)
     assert float(rows["sound"]["shear_modulus_m_p95"]) == pytest.approx(own.high[2], rel=1e-3)
     assert not [key for key in rows["sound"] if "usual" in key]
     assert "errors of the model are included, of a size that follows from the residuals" in said
-
-
-def test_an_exact_model_is_an_option(runs, capsys, whole_file):
-    rows, said = answers(capsys, str(whole_file), "runs.csv", "--exact-model")
-    right = Estimator.load(whole_file).on(model_error=0.0).run(**runs["sound"])
-    assert float(rows["sound"]["cohesion_Pa_std"]) == pytest.approx(right["cohesion"][1], rel=1e-3)
-    assert "the model is taken as exact" in said
-
-
-def test_a_declared_discrepancy_takes_the_place_of_other_errors(runs, capsys, whole_file):
-    Path("own.toml").write_text(MODEL + '[discrepancy]\ntorque_Nm = "2 %"\n')
-    _, said = answers(capsys, str(whole_file), "runs.csv", "--case", "own.toml")
-    assert "the model is taken as exact" in said
 
 
 def test_rows_out_of_range_are_set_aside_and_said(runs, capsys, whole_file):

@@ -32,21 +32,6 @@ def chosen(model, where=None, gear=None, rows=ROWS):
     return len(table), read_case_of_rows(args, model, table)
 
 
-@pytest.mark.parametrize(
-    ("model", "where", "gear", "count"),
-    [
-        ("two.toml", None, "narrow", 2),  # the option selects the rows, too
-        ("two.toml", "gear=narrow", None, 2),  # the rows say the gear
-        ("two.toml", "run=b", None, 1),
-        ("two.toml", "gear=narrow", "narrow", 2),  # both, as was needed once
-        ("one.toml", None, "wide", 1),  # the option only selects rows
-    ],
-)
-def test_either_option_suffices(files, model, where, gear, count):
-    found, case = chosen(model, where, gear)
-    assert found == count and not case.gears
-
-
 def test_what_is_not_chosen_is_asked_for(files):
     with pytest.raises(InputError, match="choose one with --gear, which also selects its rows"):
         chosen("two.toml")
@@ -56,13 +41,6 @@ def test_what_is_not_chosen_is_asked_for(files):
                                     .replace("wide,", ""))  # fmt: skip
     with pytest.raises(InputError, match=r"one\.toml has one gear, in \[gear\]; omit --gear"):
         chosen("one.toml", gear="wide")
-
-
-@pytest.mark.parametrize("command", ["identify", "estimate", "pull", "advise", "gap"])
-def test_commands_that_read_rows_take_both_options(command, capsys):
-    assert main([command, "--help"]) == 0
-    shown = capsys.readouterr().out
-    assert "--where COLUMN=VALUE" in shown and "--gear NAME" in shown
 
 
 @pytest.mark.slow

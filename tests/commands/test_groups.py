@@ -48,33 +48,6 @@ def test_a_run_that_cannot_be_identified_is_named_and_the_others_are_not_lost(fo
 
 
 @pytest.mark.slow
-def test_estimate_has_a_line_for_a_run_without_readings(folder, capsys, small_model):
-    assert main(["estimate", str(small_model), "runs.csv", "--by", "run"]) == 0
-    captured = capsys.readouterr()
-    a, b, c = rows_of(captured.out)
-    assert [a["run"], b["run"], c["run"]] == ["a", "b", "c"]
-    assert [a["rows"], b["rows"], c["rows"]] == ["3", "0", "1"]
-    assert b["cohesion_Pa"] == b["cohesion_Pa_p95"] == "" and b["in_range"] == "0"
-    assert (
-        "1 rows have a status that is not ok and get no estimate: runs.csv line 7" in captured.err
-    )
-    assert main(["estimate", str(small_model), "runs.csv"]) == 0
-    rows = rows_of(capsys.readouterr().out)
-    assert [bool(r["cohesion_Pa"]) for r in rows] == [True, True, True, False, True, False]
-
-
-def test_a_blank_cell_is_no_group(folder, capsys, small_model):
-    (folder / "timed.csv").write_text(
-        "run,slip,load_N,torque_Nm,time_s\na,0.1,60,1.2,1\na,0.3,80,3.5,\n"
-    )
-    for command in (["identify", "model.toml"], ["estimate", str(small_model)]):
-        assert main([*command, "timed.csv", "--by", "time_s"]) == 2
-        captured = capsys.readouterr()
-        assert captured.err.count("\n") == 1 and captured.out == ""
-        assert "timed.csv line 3, column time_s: the cell is blank" in captured.err
-
-
-@pytest.mark.slow
 def test_all_runs_of_one_soil_are_one_set_of_readings(folder, capsys):
     """`--by all` gives what the same rows give as one run."""
     header, *rows = [line for line in RUNS.splitlines() if not line.startswith("b")]

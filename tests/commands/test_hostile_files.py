@@ -3,7 +3,6 @@
 import resource
 import subprocess
 import sys
-from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
@@ -15,7 +14,7 @@ from soilml.cli import main
 from soilml.errors import InputError, TableError
 from soilml.io.bounds import ROWS
 from soilml.io.parquet import read_parquet
-from soilml.io.toml_settings import MOST_DEPTH, read_settings
+from soilml.io.toml_settings import read_settings
 
 MARK = 'from pathlib import Path\n\nPath("it_ran").touch()\n'
 
@@ -45,14 +44,6 @@ def test_a_key_of_many_parts_is_refused_before_it_is_parsed(form, part, tmp_path
         read_settings(file)
 
 
-def test_dots_in_texts_numbers_and_comments_are_no_key(tmp_path):
-    file = tmp_path / "model.toml"
-    dots = ".".join(["a"] * 50)
-    lines = [f'text = "{dots} = 1"', f"# {dots}", f"list = [{', '.join(['0.5'] * 50)}]"]
-    file.write_text("\n".join([*lines, ".".join(["k"] * (MOST_DEPTH - 1)) + " = 1"]))
-    assert read_settings(file).text("text") == f"{dots} = 1"
-
-
 @pytest.mark.slow
 def test_a_parquet_file_of_more_rows_than_a_csv_file_may_have_is_refused(tmp_path):
     """Before it is read: a column that repeats one value takes some kB."""
@@ -61,15 +52,6 @@ def test_a_parquet_file_of_more_rows_than_a_csv_file_may_have_is_refused(tmp_pat
     assert file.stat().st_size < 200_000
     with pytest.raises(TableError, match="more than 10000000 rows"):
         read_parquet(file)
-
-
-def test_the_rows_of_a_folder_of_parquet_files_are_counted_together(tmp_path, monkeypatch):
-    for name in ("a", "b"):
-        pq.write_table(pa.table({"slip": [0.1] * 6}), tmp_path / f"{name}.parquet")
-    assert len(read_parquet(tmp_path)[0]["slip"]) == 12
-    monkeypatch.setattr("soilml.io.parquet.ROWS", replace(ROWS, most=11))
-    with pytest.raises(TableError, match="more than 11 rows"):
-        read_parquet(tmp_path)
 
 
 @pytest.mark.parametrize("command", ["identify", "gap", "advise", "pull", "audit"])
@@ -82,31 +64,6 @@ def test_a_file_of_effects_does_not_run_for_a_table_that_is_refused(command, fol
     (folder / "model.toml").write_text("[gear\n")
     refusal([command, *words], capsys)
     assert not (folder / "it_ran").exists()
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ["simulate", "model.toml", "--slip", "fast", "--load", "60"],
-        ["simulate", "model.toml", "--slip", "0.2", "--load", "60", "--run", "\x1b"],
-        ["advise", "model.toml", "--slips", "fast"],
-        ["gap", "model.toml", "runs.csv", "--cost", "reverse"],
-        ["audit", "model.toml", "runs.csv", "--cost", "reverse"],
-        ["pull", "model.toml", "runs.csv", "--load", "heavy"],
-        ["slip", "model.toml", "none.csv"],
-    ],
-    ids=lambda words: " ".join(words[:1] + words[-2:]),
-)
-def test_a_file_of_effects_does_not_run_for_a_value_that_is_refused(words, folder, capsys):
-    (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.2,60,2.5\na,0.3,60,2.9\n")
-    refusal([*words, "--effects", "own.py"], capsys)
-    assert not (folder / "it_ran").exists()
-
-
-def test_a_file_of_effects_runs_for_a_command_that_goes_on(folder, capsys):
-    words = ["model.toml", "--slip", "0.2", "--load", "60", "--effects", "own.py"]
-    assert "no effect in it" in refusal(["simulate", *words], capsys)
-    assert (folder / "it_ran").exists()
 
 
 def test_names_of_outputs_are_printed_without_terminal_commands(folder, capsys):

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from conftest import THREE_CHANNEL_MODEL, solved
+from conftest import THREE_CHANNEL_MODEL
 
 from soilml import Model, Operating, Wheel, soil
 from soilml.cli import main
@@ -89,28 +89,6 @@ def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
     assert "the noise of torque_Nm is 1e-09 or less" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-def test_repeated_rows_without_any_difference_tell_no_noise(folder, capsys):
-    text = THREE_CHANNEL_MODEL.replace('sinkage_m = "2 %"', "")
-    (folder / "less.toml").write_text(text)
-    levels = ["--slip", "0.1:0.6:6", "--load", "40:80:5"]
-    lines = []
-    for run in "ab":
-        assert main(["simulate", "model.toml", *levels, "--run", run, "--out", "one.csv"]) == 0
-        lines += (folder / "one.csv").read_text().splitlines()[bool(lines) :]
-    (folder / "twice.csv").write_text("\n".join(lines) + "\n")
-    assert main(["gap", "less.toml", "twice.csv", "--out", "found"]) == 0
-    assert "sinkage_m is excluded" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_a_wheel_that_spins_on_the_spot_has_a_status(folder, capsys):
-    table(folder / "spin.csv", rows(slip=0.999999))
-    assert main(["gap", "model.toml", "spin.csv", "--out", "found"]) == 0
-    status = json.loads((folder / "found" / "gap.json").read_text())["status"]
-    assert capsys.readouterr().out.startswith(f"{status}: ")
-
-
 def test_an_audit_without_a_usable_row(folder, capsys):
     table(folder / "bad.csv", [[*line, "too heavy"] for line in rows()], f"{HEADER},status")
     refused(["audit", "model.toml", "bad.csv"], capsys, "bad.csv: no row has the status ok")
@@ -154,11 +132,3 @@ def test_the_report_shows_names_as_text(folder):
     table(folder / "odd.csv", lines + rows()[15:])
     assert main(["gap", "model.toml", "odd.csv", "--out", "found"]) == 0
     assert "<script>alert" not in (folder / "found" / "report.html").read_text()
-
-
-def test_solved_rows_are_what_the_model_says():
-    """The rows above are of the model; a table of another wheel would test nothing."""
-    box = {"cohesion": 1040.0, "friction_angle": 0.4887, "shear_modulus": 0.025, "n": 1.1,
-           "kc": 990.0, "kphi": 1528430.0, "a0": 0.4, "a1": 0.15, "radius": 0.15, "width": 0.12,
-           "slip": float(rows()[0][1]), "load": float(rows()[0][2])}  # fmt: skip
-    assert solved(box).sinkage == pytest.approx(float(rows()[0][5]), rel=1e-3)

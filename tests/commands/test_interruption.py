@@ -1,6 +1,5 @@
 """Ctrl-C at any moment from the first import on: one line, status 130, no file."""
 
-import importlib
 import os
 import signal
 import subprocess
@@ -53,41 +52,6 @@ def test_ctrl_c_in_an_import(tmp_path, small_model, module, words):
     assert done.stderr == "soilml: interrupted; no output was written\n"
     assert done.returncode == 128 + signal.SIGINT
     assert sorted(path.name for path in tmp_path.iterdir()) == ["model.toml", "runs.csv"]
-
-
-def test_what_was_written_before_is_said(tmp_path):
-    """A signal after the exchange of the outputs does not say that there are none."""
-    (tmp_path / "model.toml").write_text(MODEL)
-    code = """
-import os, signal, sys
-import soilml.io.atomic_files as swap
-signal.signal(signal.SIGINT, signal.default_int_handler)
-class Written(list):
-    def append(self, names):
-        super().append(names)
-        os.kill(os.getpid(), signal.SIGINT)
-swap.replaced = Written()
-from soilml.cli import main
-sys.exit(main())
-"""
-    words = "simulate model.toml --slip 0.1 --load 60 --out out.csv"
-    done = subprocess.run(
-        [sys.executable, "-c", code, *words.split()],
-        cwd=tmp_path, capture_output=True, text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)},
-    )  # fmt: skip
-    assert done.stderr == "soilml: interrupted; complete before that: out.csv\n"
-    assert done.returncode == 130 and (tmp_path / "out.csv").is_file()
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_after_the_command_is_answered(monkeypatch, capsys, number):
-    """Large tables take a while to be freed; a signal meanwhile comes when the command is over."""
-    module = importlib.import_module("soilml.cli.main")
-    monkeypatch.setattr(module, "_run", lambda *_: signal.raise_signal(number))
-    monkeypatch.setattr(module, "replaced", ["d.parquet"])
-    assert module.main(["generate"]) == 128 + number
-    assert capsys.readouterr().err == "soilml: interrupted; complete before that: d.parquet\n"
 
 
 @pytest.mark.parametrize("where", ["__enter__", "__exit__"])

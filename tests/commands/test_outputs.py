@@ -1,8 +1,6 @@
 """Where commands write: not over what they read, all files or none, nothing left when stopped."""
 
-import io
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -105,11 +103,6 @@ def test_a_signal_to_stop_leaves_nothing_half_written(folder, name, status):
     assert not any("o.parquet" in p.name for p in folder.iterdir())
 
 
-def test_a_command_leaves_the_handling_of_signals_as_it_was(folder, capsys):
-    assert main(SIMULATE) == 0
-    assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-
-
 @pytest.mark.slow
 def test_a_closed_standard_output_is_one_line(folder):
     def close():
@@ -119,50 +112,6 @@ def test_a_closed_standard_output_is_one_line(folder):
     process = run_soilml(folder, *SIMULATE, "--out", "o.csv", preexec_fn=close)
     one_line(process, 0, "1 row written")
     assert (folder / "o.csv").read_text().startswith("slip,")
-
-
-def test_what_is_said_to_a_closed_standard_error_does_not_get_into_the_answer(folder):
-    process = run_soilml(
-        folder, *SIMULATE[:-1], "60,1e6", stdout=subprocess.PIPE, preexec_fn=lambda: os.close(2)
-    )
-    assert process.communicate(timeout=120)[0].splitlines()[-1].startswith("0.1,1000000,,")
-    assert process.returncode == 0
-
-
-def test_a_full_standard_output_is_one_line(folder):
-    def full():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
-
-    with (folder / "full").open("w") as out:
-        process = run_soilml(folder, *SIMULATE, stdout=out, preexec_fn=full)
-        one_line(process, 2, "standard output cannot be read or written: File too large")
-
-
-def test_a_name_that_the_output_cannot_hold_is_one_line(folder, monkeypatch, capsys):
-    narrow = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    with monkeypatch.context() as patched:
-        patched.setattr(sys, "stdout", narrow)
-        assert main([*SIMULATE, "--run", "ä"]) == 2
-    assert "PYTHONIOENCODING" in capsys.readouterr().err
-    assert narrow.buffer.getvalue() == b""
-
-
-def test_a_folder_that_may_not_be_searched_is_one_line(folder, monkeypatch, capsys):
-    from pathlib import Path
-
-    def locked(path, *args, **kwargs):
-        raise PermissionError(13, "Permission denied", str(path))
-
-    monkeypatch.setattr(Path, "stat", locked)
-    refused([*SIMULATE, "--out", "o.csv"], capsys, "o.csv cannot be written: Permission denied")
-
-
-@pytest.mark.parametrize("slip", ["0:0.6:1000000000", "0:0.6:20000", "0:0.6:" + "9" * 5000])
-def test_more_rows_than_memory_holds_are_refused(folder, capsys, slip):
-    command = ["simulate", "model.toml", "--slip", slip, "--load", "1:100:20000"]
-    assert main(command) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1 and len(error) < 400
 
 
 @pytest.mark.slow
@@ -180,16 +129,6 @@ def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(t
     assert main(command) == 0
     one = capsys.readouterr().out.splitlines()[1].split(",")
     assert float(fused[5]) == pytest.approx(float(one[5]), rel=1e-4)
-
-
-def test_only_arguments_that_are_files_count_as_inputs(folder, capsys):
-    assert main([*SIMULATE, "--run", "o.csv", "--out", "o.csv"]) == 0
-    assert main([*SIMULATE, "--run", "o.csv", "--out", "o.csv"]) == 0  # overwrites it, as asked
-    assert (folder / "o.csv").read_text().splitlines()[1].startswith("o.csv,0.1,60")
-    capsys.readouterr()
-    (folder / "effects.csv").write_text("")
-    command = [*SIMULATE, "--effects", "effects.csv", "--out", "effects.csv"]
-    refused(command, capsys, "is an input and would be overwritten")
 
 
 def test_every_argument_that_names_an_input_file_is_declared_as_one():
@@ -232,18 +171,6 @@ def test_full_streams_end_with_status_2_where_something_had_to_be_said(folder, c
     assert done.returncode == (2 if stream == "stdout" or "no.toml" in command else 0)
     other = done.stderr if stream == "stdout" else done.stdout
     assert "Traceback" not in other and "Exception" not in other
-
-
-def test_a_link_into_a_missing_folder_names_that_folder(folder, capsys):
-    (folder / "link.csv").symlink_to(folder / "nowhere" / "q.csv")
-    assert (
-        main(["simulate", "model.toml", "--slip", "0.3", "--load", "60", "--out", "link.csv"]) == 2
-    )
-    assert f"the folder {folder / 'nowhere'} does not exist" in capsys.readouterr().err
-
-
-def test_a_column_without_a_name_is_shown_as_such(folder, capsys):
-    refused(["identify", "model.toml", "runs.csv", "--by", ""], capsys, "column '' is missing")
 
 
 def test_a_name_that_is_not_utf_8_is_to_be_renamed(folder, capsys):

@@ -2,8 +2,6 @@
 
 import csv
 import io
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from soilml.physics.pull_efficiency import CLASSES
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
 ROWS = "run,slip,load_N,torque_Nm\na,0.2,60,{}\na,0.4,60,{}\n"
 COMMAND = ["pull", "model.toml", "runs.csv", "--load", "60", "--slip-limit", "0.4"]
 
@@ -74,16 +71,6 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     assert "no load transfer" in said and "torque alone hardly reveals" in said
 
 
-def test_each_run_has_its_own_answer_and_one_that_cannot_be_had_is_said(folder, capsys):
-    with (folder / "runs.csv").open("a") as file:
-        file.write("b,0.2,60,\n")
-    assert main([*COMMAND, "--by", "run"]) == 0
-    captured = capsys.readouterr()
-    assert {r["run"] for r in rows_of(captured.out)} == {"a"}
-    assert "run b has no result" in captured.err
-    assert "run a: 60 N: the pull still increases" in captured.err
-
-
 def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):
     assert main([*COMMAND, "--from", str(small_model), "--out", "pull.csv"]) == 0
     rows = rows_of((folder / "pull.csv").read_text())
@@ -134,24 +121,3 @@ def test_bad_input_is_one_line(folder, capsys, fault):
     told = [line for line in captured.err.splitlines() if not line.endswith(" ...")]  # progress
     assert len(told) == 1 and said in told[0], captured.err
     assert captured.out == "" and sorted(folder.iterdir()) == before
-
-
-def test_the_page_shows_what_the_command_prints_and_its_lines_run(tmp_path, monkeypatch, capsys):
-    page = (ROOT / "docs/how-to/pull.md").read_text()
-    rows, shown, lines = (
-        re.findall(rf"```{kind}\n(.*?)```", page, flags=re.DOTALL)[0]
-        for kind in ("csv", "text", "python")
-    )
-    command = re.search(r"```\nsoilml (.*?)\n```", page)[1]
-    (tmp_path / "examples").symlink_to(ROOT / "examples")
-    (tmp_path / "runs.csv").write_text(rows)
-    monkeypatch.chdir(tmp_path)
-    assert main(command.split()) == 0
-    printed = capsys.readouterr().out
-    number = r"-?\d+\.?\d*"
-    assert re.sub(number, "", printed).split() == re.sub(number, "", shown).split()
-    for ours, theirs in zip(*(re.findall(number, t) for t in (printed, shown)), strict=True):
-        assert float(ours) == pytest.approx(float(theirs), rel=0.05, abs=0.2)
-    exec(lines, {})
-    low, middle, high = (float(x) for x in re.findall(number, capsys.readouterr().out))
-    assert 0.0 < low < middle < high < 0.7

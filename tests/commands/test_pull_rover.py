@@ -41,16 +41,6 @@ def test_a_rover_is_answered_for_as_a_whole(files, tmp_path, capsys):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_load_asks_for_one_wheel(files, tmp_path, capsys):
-    assert main(["pull", *files, "--load", "60", "--out", str(tmp_path / "wheel.csv")]) == 0
-    assert "load 60 N" in capsys.readouterr().out
-
-
-def test_a_slope_needs_a_rover(files, capsys):
-    assert main(["pull", *files, "--load", "60", "--slope", "5"]) == 2
-    assert "--slope needs a model file with [rover]" in capsys.readouterr().err
-
-
 def test_a_slope_that_no_rover_stands_on_is_refused(files, capsys):
     assert main(["pull", *files, "--slope", "58"]) == 2
     assert "leaves the ground on a slope of 58 deg" in capsys.readouterr().err

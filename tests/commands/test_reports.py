@@ -2,13 +2,7 @@
 
 import csv
 import hashlib
-import html
 import json
-import os
-import re
-import subprocess
-import sys
-from base64 import b64decode
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -111,103 +105,3 @@ def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
     found = json.loads((folder / "found/report.json").read_text())
     del found["report"]
     assert found == json.loads((folder / "all.json").read_text())
-
-
-@pytest.mark.slow
-def test_no_file_is_written_where_the_page_fails(folder, monkeypatch, capsys):
-    def fails(*args):
-        raise KeyboardInterrupt
-
-    before = sorted(folder.rglob("*"))
-    monkeypatch.setattr("soilml.report.page.page", fails)
-    command = [*COMMANDS["identify"], "--method", "nonlinear", "--report", "found"]
-    assert main([*command, "--out", "all.json"]) == 130
-    assert "no output was written" in capsys.readouterr().err
-    assert sorted(folder.rglob("*")) == before
-
-
-def test_bad_folders_are_one_line(folder, capsys):
-    for path, said in (
-        ("runs.csv", "is a file; needed is a folder"),
-        ("x.html", "is the name of a file; needed is a folder, for report.html and report.json"),
-        ("", "--report is empty"),
-    ):
-        assert main([*COMMANDS["identify"], "--report", path]) == 2
-        error = capsys.readouterr().err
-        assert error.count("\n") == 1 and said in error
-    assert main([*COMMANDS["estimate"][:2], "--report", "found"]) == 2
-    assert "RUNS.csv is missing" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_what_rows_do_not_determine_is_said_and_not_given_as_a_result(folder, capsys):
-    (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.3,80,3.2\n")
-    command = ["identify", "model.toml", "runs.csv", "--method", "posterior", "--report", "found"]
-    assert main(command) == 0
-    text = Seen((folder / "found/report.html").read_text()).text
-    assert "one load only: cohesion is not identified" in text.lower()
-    assert "Cohesion c is not determined by these rows" in text and "Cohesion c =" not in text
-    assert "not determined (" not in text and "partly identified" in text
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", ["pull", "advise"])
-def test_hints_at_wrong_units_come_with_every_command(folder, command, capsys):
-    wrong = RUNS.replace("0.75", "75").replace("3.2", "320").replace("1.95", "195")
-    wrong = wrong.replace("1.8", "180").replace("1.4", "140").replace("4.1", "410")
-    (folder / "runs.csv").write_text(wrong)
-    main([command, "model.toml", "runs.csv"])
-    assert "! runs.csv: torque is" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("error")
-def test_runs_of_any_name_are_drawn_without_a_warning(folder, capsys):
-    names = ["\u6f22\u5b57\u7802", "x" * 256, "W" * 256, "$\\frac$", "_a"]
-    header, _, *rows = RUNS.splitlines()
-    rows = [row.replace(EVIL, name) for name in names for row in rows if row.startswith(EVIL)]
-    (folder / "runs.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8")
-    assert main([*COMMANDS["identify"], "--report", "page"]) == 0
-    assert "warning" not in capsys.readouterr().err.lower()
-    (page,) = (folder / "page").glob("*.html")
-    images = re.findall(r"svg\+xml;base64,([\w+/=]+)", page.read_text(encoding="utf-8"))
-    shown = html.unescape(b64decode(images[0]).decode())
-    for name in names:
-        assert f"run {name}, exact" in shown or f"run {name[:16]}…" in shown
-
-
-def drawn_apart(folder, settings):
-    """A picture by a process of its own."""
-    words = "simulate model.toml --slip 0.1,0.3 --load 60 --picture a.png"
-    return subprocess.run(
-        [sys.executable, "-m", "soilml", *words.split()],
-        cwd=folder, capture_output=True, text=True,
-        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])} | settings,
-    )  # fmt: skip
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("settings", "file"),
-    [
-        ({"MPLBACKEND": "foo"}, b""),
-        ({"HOME": os.devnull, "MPLCONFIGDIR": ""}, b""),
-        ({}, b"junk : 3\nbackend: foo\n"),
-    ],
-    ids=["backend", "home", "matplotlibrc"],
-)
-def test_pictures_do_not_depend_on_settings_of_matplotlib(folder, settings, file):
-    (folder / "matplotlibrc").write_bytes(file)
-    done = drawn_apart(folder, settings)
-    assert done.returncode == 0, done.stderr
-    assert (folder / "a.png").read_bytes().startswith(b"\x89PNG")
-    assert not re.search("matplotlib|mkdir|Bad key", done.stderr)
-
-
-@pytest.mark.slow
-def test_a_broken_settings_file_of_matplotlib_is_one_line(folder):
-    (folder / "matplotlibrc").write_bytes(b"\xff")
-    done = drawn_apart(folder, {})
-    assert done.returncode == 2 and done.stderr.count("\n") == 1
-    assert "look for a file matplotlibrc" in done.stderr
-    assert not (folder / "a.png").exists()

@@ -1,15 +1,10 @@
 """`soilml init`, `soilml models` and `soilml doctor`, and released files by their short names."""
 
-import shutil
-
 import pytest
 
-from soilml import Estimator, read_case
+from soilml import read_case
 from soilml.cli import main
-from soilml.errors import ModelFileError
-from soilml.onboard.model_file import find_model, released_models
-
-SIZE = ["--radius", "0.1", "--width", "0.1"]
+from soilml.onboard.model_file import released_models
 
 
 @pytest.mark.parametrize("soil", [[], ["--soil", "wong1989/dry_sand"]])
@@ -49,47 +44,6 @@ def test_the_first_model_file_is_one(tmp_path, capsys, soil, rover):
     assert "Next: soilml identify" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--width", "0.1"], "--radius is missing; needed is the wheel radius in m"),
-        (["--radius", "15", "--width", "0.1"], "radius"),
-        (
-            ["--radius", "0.1", "--width", "0.1", "--soil", "wong1989/dry-sand"],
-            "did you mean 'wong1989/dry_sand'?",
-        ),
-        (["--radius", "0.1", "--width", "0.1", "--torque-noise", "2 per cent"], "torque_Nm"),
-        (["--radius", "0.1", "--width", "0.1", "--mass", "5", "--wheels", "3"], "an even number"),
-        (["--radius", "0.1", "--width", "0.1", "--mass", "5"], "--wheelbase is missing; needed is"),
-    ],
-)
-def test_what_is_wrong_is_told_and_nothing_is_written(tmp_path, capsys, words, said):
-    file = tmp_path / "model.toml"
-    assert main(["init", str(file), *words]) == 2
-    error = capsys.readouterr().err
-    assert said in error and error.count("\n") == 1 and "/tmp" not in error
-    assert not file.exists()
-
-
-def test_an_existing_file_is_kept(tmp_path, capsys):
-    file = tmp_path / "model.toml"
-    file.write_text("mine")
-    assert main(["init", str(file), "--radius", "0.1", "--width", "0.08"]) == 2
-    assert "exists" in capsys.readouterr().err
-    assert file.read_text() == "mine"
-
-
-def test_released_files_have_short_names(tmp_path, monkeypatch):
-    assert {"wheel", "any_wheel", "kls1_wheel"} <= set(released_models())
-    monkeypatch.chdir(tmp_path)
-    assert Estimator.load("wheel").path == str(released_models()["wheel"])
-    shutil.copy(released_models()["wheel_linear"], tmp_path / "wheel")  # a file comes first
-    assert Estimator.load("wheel").path == "wheel"
-    with pytest.raises(ModelFileError, match="no released model of this name"):
-        Estimator.load("whell")
-    assert str(find_model("whell.onnx")) == "whell.onnx"
-
-
 @pytest.mark.slow
 def test_models_lists_them(capsys):
     assert main(["models"]) == 0
@@ -97,13 +51,6 @@ def test_models_lists_them(capsys):
     assert len(lines) == 3 + len(released_models())
     assert any(line.startswith("wheel ") and "r 0.15, w 0.12" in line for line in lines)
     assert max(map(len, lines)) <= 110
-
-
-def test_a_short_name_serves_estimate(tmp_path, capsys):
-    runs = tmp_path / "runs.csv"
-    runs.write_text("run,slip,load_N,torque_Nm\na,0.2,60,3.0\na,0.4,60,4.2\n")
-    assert main(["estimate", "wheel", str(runs)]) == 0
-    assert "cohesion" in capsys.readouterr().out
 
 
 @pytest.mark.slow
@@ -116,35 +63,6 @@ def test_doctor_finds_nothing_wrong_here_and_says_what_is_missing(capsys, monkey
     assert main(["doctor"]) == 1
     said = capsys.readouterr().out
     assert "! scipy is 1.2.3; needed is 1.15 or newer: pip install -U scipy" in said
-
-
-def test_doctor_names_a_damaged_file(capsys, monkeypatch, tmp_path):
-    damaged = tmp_path / "wheel.onnx"
-    damaged.write_bytes(released_models()["wheel"].read_bytes()[:-100])
-    monkeypatch.setattr("soilml.onboard.model_file.released_models", lambda: {"wheel": damaged})
-    assert main(["doctor"]) == 1
-    assert "! " in capsys.readouterr().out
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["identfy"], "no command 'identfy'; did you mean 'identify'? there are: init"),
-        (["effects", "slip_sinkage"], "did you mean 'slip-sinkage'? there are:"),
-        (["soils", "wong1989/drysand"], "did you mean 'wong1989/dry_sand'? `soilml soils` lists"),
-        (["estimate", "weel"], "did you mean 'wheel'? there are:"),
-        (
-            ["import", "log.csv", "--inti"],
-            "soilml import: unrecognized arguments: --inti; did you mean '--init'? "
-            "(see soilml import --help)",
-        ),
-        (["identify", "a", "b", "c", "--metod=newton"], "did you mean '--method'?"),
-        (["effects", "--zzz"], "unrecognized arguments: --zzz (see soilml effects --help)"),
-    ],
-)
-def test_a_misspelt_name_is_answered_with_the_nearest(capsys, words, said):
-    assert main(words) == 2
-    assert said in capsys.readouterr().err
 
 
 def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
@@ -163,9 +81,3 @@ def test_init_takes_sizes_with_their_units(tmp_path, capsys, monkeypatch):
         "--radius is '15 inch'; needed is a number in m, or a text with one of the units m" in said
     )
     assert not (tmp_path / "c.toml").exists()
-
-
-def test_a_soil_shows_the_ranges_that_its_paper_prints(capsys):
-    assert main(["soils", "scott1970/apollo12"]) == 0
-    said = capsys.readouterr().out
-    assert "published, 35 to 39" in said and "published, 0.35 to 0.7" in said

@@ -7,7 +7,6 @@ import sys
 import pytest
 
 from soilml.cli.main import COMMANDS
-from soilml.onboard.multi_sensor import ACROSS_FILES
 
 #: Runs the command line with the arguments of the process, then lists the modules on the last line.
 LISTING = """\
@@ -34,13 +33,21 @@ def commands_among(modules):
     return {name for name in COMMANDS if COMMANDS[name] in modules}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS)
-def test_an_error_of_usage_loads_no_library_and_no_other_command(command):
-    loaded, printed = modules_after(command, "--nonsense")
-    assert printed[-1] == "status 2"
-    assert {name.split(".")[0] for name in loaded} <= set(OWN)
-    assert commands_among(loaded) == {command}
+def test_an_error_of_usage_loads_no_library_and_no_other_command():
+    """All commands in one process, one after the other."""
+    code = LISTING.replace(
+        'print("status", main())',
+        "for name in sys.argv[1:]:\n    print('status', main([name, '--nonsense']), *sys.modules)",
+    )
+    done = subprocess.run([sys.executable, "-c", code, *COMMANDS], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    *printed, loaded = done.stdout.splitlines()
+    libraries = {name.split(".")[0] for name in loaded.split()} - set(sys.stdlib_module_names)
+    assert libraries <= set(OWN)
+    lines = [line.split() for line in printed if line.startswith("status ")]
+    assert [words[1] for words in lines] == ["2"] * len(COMMANDS)
+    for i, words in enumerate(lines):
+        assert commands_among(words) == set(list(COMMANDS)[: i + 1])
 
 
 @pytest.mark.parametrize(
@@ -51,11 +58,6 @@ def test_help_version_and_unknown_commands_load_no_library(words, commands):
     loaded, _ = modules_after(*words)
     assert {name.split(".")[0] for name in loaded} <= set(OWN)
     assert commands_among(loaded) == commands
-
-
-def test_an_output_of_the_wrong_kind_is_refused_before_any_library_is_loaded():
-    loaded, _ = modules_after("identify", "model.toml", "runs.csv", "--out", "result.csv")
-    assert {name.split(".")[0] for name in loaded} <= set(OWN)
 
 
 @pytest.mark.slow
@@ -76,12 +78,6 @@ def test_identify_loads_neither_distributions_nor_the_runtime_for_trained_models
         "matplotlib",
         "rich",
     }
-
-
-def test_the_help_names_the_rules_of_fusion():
-    from soilml.cli.commands.estimate import FUSION_RULES
-
-    assert FUSION_RULES == ACROSS_FILES
 
 
 @pytest.mark.parametrize("chosen", [None, "0"])

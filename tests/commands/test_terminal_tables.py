@@ -108,14 +108,3 @@ def test_tables_are_narrow_rounded_and_in_usual_units(command, tmp_path, monkeyp
         assert len(line) <= 100, line
         assert not RAW.search(line), line
         assert not SI_UNIT.search(line), line
-
-
-def test_columns_that_do_not_fit_are_named(tmp_path, monkeypatch, capsys):
-    (tmp_path / "m.toml").write_text(THREE_CHANNEL_MODEL)
-    (tmp_path / "runs.csv").write_text(RUNS)
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    assert main(["estimate", LINEAR, "runs.csv"]) == 0
-    said = capsys.readouterr().out
-    assert "not shown here, but with --out: cohesion_kPa_p05" in said
-    assert re.search(r"\d\.\d+ \+- \d\.\d+", said)  # a value beside its standard deviation

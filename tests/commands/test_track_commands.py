@@ -62,14 +62,6 @@ def test_the_shares_carry_the_load_and_moments_sink_the_tail(folder, capsys):
     assert (folder / "t.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_table_with_the_balance_can_be_identified(folder, capsys):
-    assert main([*SIMULATE, "--efficiency", "--run", "a", "--out", "rows.csv"]) == 0
-    command = ["identify", "m.toml", "rows.csv", "--method", "nonlinear"]
-    assert main(command) == 0
-    found = json.loads(capsys.readouterr().out)["parameters"]
-    assert found["friction_angle"]["value"] == pytest.approx(0.4363, rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
@@ -84,12 +76,6 @@ def test_bad_requests_are_refused_in_one_line(options, expected, folder, capsys)
     assert main(command) == 2
     assert expected in capsys.readouterr().err.strip().splitlines()[-1]
     assert not (folder / "o.csv").exists()
-
-
-def test_only_a_track_has_a_balance(folder, capsys):
-    (folder / "m.toml").write_text(MODEL.replace('"track"', '"wheel"').replace("base = 0.6\n", ""))
-    assert main(SIMULATE) == 2
-    assert "this needs a track" in capsys.readouterr().err
 
 
 @pytest.fixture
@@ -121,18 +107,3 @@ def test_the_mean_of_groups_and_the_regression_of_fresh_rows(groups, folder, cap
     assert f"r2 {line['r2']:.3f}" in said and "run mean of 4" in said
     page = (folder / "found" / "report.html").read_text()
     assert "against predictions by the mean" in page and "run mean of 4" in page
-
-
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        (["--mean"], "name their column, such as --by run"),
-        (["--fresh", "more.csv"], "add --mean"),
-        (["--by", "run", "--mean", "--where", "run=g1"], "an average needs two or more"),
-        (["--by", "run", "--mean", "--fresh", "none.csv"], "there is no such file"),
-    ],
-)
-def test_a_mean_without_groups_is_refused_in_one_line(options, expected, groups, capsys):
-    command = ["identify", "m.toml", "runs.csv", "--method", "nonlinear", *options]
-    assert main([*command, "--out", "o.json"]) == 2
-    assert expected in capsys.readouterr().err.strip().splitlines()[-1]

@@ -32,32 +32,6 @@ def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, cap
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_motion_of_a_turn_has_the_commanded_slip(tmp_path, capsys):
-    over_time, picture = tmp_path / "turn.csv", tmp_path / "turn.png"
-    command = ["walk", "--ground", "ssc-2", "--slip", "0,0.25", "--over-time", str(over_time)]
-    assert main([*command, "--picture", str(picture), "--out", str(tmp_path / "walks.csv")]) == 0
-    walks = rows_of((tmp_path / "walks.csv").read_text())
-    assert [float(row["slip_mean"]) for row in walks] == pytest.approx([0.0, 0.25], abs=1e-9)
-    rows = rows_of(over_time.read_text())
-    for commanded in ("0", "0.25"):
-        turn = [row for row in rows if row["slip_commanded"] == commanded]
-        column = {name: np.asarray([float(row[name]) for row in turn]) for name in (
-            "turned_rad", "time_s", "hub_x_m", "hub_height_m", "sinkage_m")}  # fmt: skip
-        assert column["turned_rad"][-1] == pytest.approx(2.0 * np.pi)
-        assert column["time_s"][-1] == pytest.approx(2.0 * np.pi / 0.3)
-        # five legs of 18 cm roll 10 l sin(36 deg) in a turn, less the slip
-        whole = 10.0 * 0.18 * np.sin(np.pi / 5.0)
-        assert column["hub_x_m"][-1] == pytest.approx((1.0 - float(commanded)) * whole, rel=2e-3)
-    assert picture.read_bytes().startswith(b"\x89PNG")
-
-
-def test_ground_that_carries_nothing_is_said(capsys):
-    assert main(["walk", "--stiffness", "1e3"]) == 0
-    said = capsys.readouterr()
-    assert "too soft" in rows_of(said.out)[0]["status"]
-    assert "1 of 1 walks: stopped: the ground is too soft" in said.err
-
-
 @pytest.mark.parametrize(
     ("options", "expected"),
     [

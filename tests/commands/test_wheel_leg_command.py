@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP, VIBRATION_SLIP, sinkage_fit
-from soilml.systems.wheel_legs.sinkage_fit import fit_simulated_sinkage, simulate_sinkage
+from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP, VIBRATION_SLIP
 from soilml.systems.wheel_legs.slip_models import soil_spring
 
 HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
@@ -45,16 +44,6 @@ def test_each_sensor_and_the_fused_soil(strides, capsys):
     )
 
 
-def test_a_sensor_that_tells_nothing_is_named_and_the_others_answer(tmp_path, capsys):
-    file = tmp_path / "strides.csv"
-    file.write_text(HEAD + "a,0.2,1.1,,0.05\n")
-    assert main(["wheel-leg", str(file), "--torque-model", "empirical"]) == 0
-    said = capsys.readouterr()
-    assert [row["sensor"] for row in rows_of(said.out)] == ["sinkage"]
-    assert "no estimate from torque: 1 pair is given" in said.err
-    assert "outside of the 2 to 36 mm" in said.err
-
-
 def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     angle, stiffness = np.deg2rad(42.77), 13100.0 + 10500.0  # SSC-2 of table I
     a, b = TORQUE_SLIP["empirical"].line(angle, stiffness)
@@ -76,21 +65,6 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     assert main([*command, "--known", "42.77,23600"]) == 0
     again = rows_of(capsys.readouterr().out)
     assert float(again[1]["slip"]) == pytest.approx(float(found[1]["slip"]), abs=1e-3)
-
-
-def test_relations_fitted_to_walks_answer_in_place_of_the_printed_ones(
-    tmp_path, capsys, monkeypatch
-):
-    walked = simulate_sinkage()
-    monkeypatch.setattr(sinkage_fit, "simulate_sinkage", lambda: walked)
-    file, picture = tmp_path / "strides.csv", tmp_path / "soil.png"
-    file.write_text("run,slip,sinkage_m\na,0.2,0.05\n")
-    command = ["wheel-leg", str(file), "--sinkage-model", "walks", "--picture", str(picture)]
-    assert main(command) == 0
-    (row,) = rows_of(capsys.readouterr().out)
-    expected = fit_simulated_sinkage(walked)(0.05)
-    assert float(row["normal_stiffness_Pa"]) == pytest.approx(float(expected.normal_stiffness))
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(

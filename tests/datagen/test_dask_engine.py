@@ -4,13 +4,11 @@ import functools
 import hashlib
 import os
 import signal
-import socket
 
 import pytest
 from conftest import RECIPE
 
-from datagen import dask_cluster
-from datagen.dask_cluster import dask_map, run_task
+from datagen.dask_cluster import dask_map
 from datagen.generate import generate, generate_folder
 from datagen.recipe import read_recipe
 from datagen.simulation import pieces
@@ -39,36 +37,12 @@ def die_once(marker, number):
     return number, os.getpid()
 
 
-def always_die(number):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def refuse(number):
-    raise InputError(f"{number} is refused")
-
-
 def test_a_killed_worker_changes_no_result(scheduler, tmp_path):
     task = functools.partial(die_once, tmp_path / "died")
     with dask_map(task, range(40), scheduler=scheduler) as results:
         numbers, processes = zip(*results, strict=True)
     assert numbers == tuple(range(40)) and (tmp_path / "died").exists()
     assert os.getpid() not in processes
-
-
-def test_errors_of_a_task_are_those_of_the_function(scheduler):
-    with (
-        pytest.raises(InputError, match="0 is refused"),
-        dask_map(refuse, range(9), scheduler=scheduler) as results,
-    ):
-        list(results)
-
-
-def test_rows_that_kill_every_worker_are_named(scheduler):
-    with (
-        pytest.raises(InputError, match="several workers died of the same rows"),
-        dask_map(always_die, range(1), scheduler=scheduler) as results,
-    ):
-        list(results)
 
 
 def test_the_bytes_are_those_of_the_other_engine(scheduler, tmp_path, monkeypatch):
@@ -109,49 +83,6 @@ def test_effects_of_a_file_reach_the_workers(scheduler, tmp_path):
         recipe, tmp_path / "b.parquet", engine=functools.partial(dask_map, scheduler=scheduler)
     )
     assert (tmp_path / "a.parquet").read_bytes() == (tmp_path / "b.parquet").read_bytes()
-
-
-def test_a_scheduler_that_is_not_there_is_named():
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
-    for wrong in (address, "tcp://127.0.0.1", "nonsense"):
-        with (
-            pytest.raises(InputError, match=f"--scheduler {wrong}: no dask scheduler answers"),
-            dask_map(abs, range(3), scheduler=wrong),
-        ):
-            pass
-
-
-def test_what_answers_may_be_something_else(monkeypatch):
-    monkeypatch.setattr(dask_cluster, "PATIENCE", 0.5)
-    with socket.create_server(("127.0.0.1", 0)) as silent:
-        address = f"127.0.0.1:{silent.getsockname()[1]}"
-        with (
-            pytest.raises(InputError, match="no dask scheduler answers there"),
-            dask_map(abs, range(3), scheduler=address),
-        ):
-            pass
-
-
-def test_a_scheduler_without_workers_is_not_waited_for_in_vain(monkeypatch):
-    monkeypatch.setattr(dask_cluster, "WORKERLESS", 0.5)
-    with (
-        distributed.LocalCluster(
-            n_workers=0, dashboard_address="127.0.0.1:0", silence_logs=50
-        ) as cluster,
-        pytest.raises(InputError, match="no worker for"),
-        dask_map(abs, range(3), scheduler=cluster.scheduler_address) as results,
-    ):
-        list(results)
-
-
-def test_workers_with_other_versions_are_refused():
-    needed = dask_cluster.own_versions()
-    content = dask_cluster._Content.of(abs)
-    assert run_task(content, -3, needed) == 3
-    with pytest.raises(InputError, match=r"a worker has numpy .*, this process 1\.0"):
-        run_task(content, -3, needed | {"numpy": "1.0"})
 
 
 MINE = """\

@@ -2,12 +2,10 @@
 
 import functools
 import hashlib
-import multiprocessing
 import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -17,57 +15,7 @@ from conftest import RECIPE
 from datagen.generate import generate
 from datagen.recipe import read_recipe
 from datagen.simulation import pieces
-from soilml.errors import InputError
 from soilml.processes import process_map
-
-
-def wait_for_another(folder, number):
-    """Where this item is done, once two processes have begun one."""
-    (folder / str(os.getpid())).touch()
-    deadline = time.monotonic() + 60
-    while len(list(folder.iterdir())) < 2 and time.monotonic() < deadline:
-        time.sleep(0.01)
-    return number, os.getpid()
-
-
-def fail_at_five(number):
-    if number == 5:
-        raise InputError("five is too many")
-    return number
-
-
-def die_at_five(number):
-    if number == 5:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return number
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["fork", pytest.param("spawn", marks=pytest.mark.long)])
-def test_results_come_in_order_from_several_processes(method, tmp_path):
-    task = functools.partial(wait_for_another, tmp_path)
-    with process_map(task, range(20), 2, start_method=method) as results:
-        numbers, processes = zip(*results, strict=True)
-    assert numbers == tuple(range(20))
-    assert len(set(processes)) == 2 and os.getpid() not in processes
-    assert not multiprocessing.active_children()
-
-
-def test_an_error_in_a_worker_is_that_of_the_function():
-    with (
-        pytest.raises(InputError, match="five is too many"),
-        process_map(fail_at_five, range(9), 2) as results,
-    ):
-        list(results)
-    assert not multiprocessing.active_children()
-
-
-def test_a_worker_that_is_killed_is_named():
-    with (
-        pytest.raises(InputError, match="one of 2 worker processes was killed"),
-        process_map(die_at_five, range(9), 2) as results,
-    ):
-        list(results)
 
 
 def is_alive(process):
@@ -153,34 +101,3 @@ def test_interruption_ends_all_processes_with_one_line(tmp_path, out, engine):
     else:
         assert "no output was written" in said
         assert [file.name for file in tmp_path.iterdir()] == ["recipe.toml"]
-
-
-@pytest.fixture
-def no_endless_wait():
-    """Ends a test that waits for ever."""
-
-    def end(number, frame):
-        raise AssertionError("the pool waits for ever")
-
-    before = signal.signal(signal.SIGALRM, end)
-    signal.alarm(60)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
-
-
-def killed_while_writing(delay):
-    threading.Timer(delay, os.kill, (os.getpid(), signal.SIGKILL)).start()
-    return bytes(200_000_000)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.03, 0.06, 0.09, 0.12])
-def test_a_worker_that_dies_while_it_writes_is_told(no_endless_wait, delay):
-    with (
-        pytest.raises(InputError, match="worker processes was killed"),
-        process_map(killed_while_writing, [delay] * 8, 2) as results,
-    ):
-        for _ in results:
-            pass
-    assert not multiprocessing.active_children()

@@ -1,17 +1,11 @@
 """Synthetic vibration of wheel-legs: what it depends on, reproducible, and mistakes named."""
 
-import json
-
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
-from datagen.generate import generate
 from datagen.recipe import read_recipe
 from datagen.simulation import simulate_rows
-from soilml import read_table
 from soilml.errors import InputError
-from soilml.systems.wheel_legs.slip_models import spring_soil
 from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
 
 RECIPE = """\
@@ -69,48 +63,6 @@ def test_vibration_is_that_of_the_spring(tmp_path):
     assert np.corrcoef(made["vibration_m_s2"], made["slip"])[0, 1] > 0.4
 
 
-def test_the_line_of_the_tests_gives_its_slip_back(tmp_path):
-    """Comin and Saaj 2017, eq. 24 with the linear parameters of table V; degrees and g."""
-    made = simulate_rows(recipe(tmp_path, LINE), 0, 0, 200)
-    a, drop = made["vibration_m_s2"] / GRAVITY, np.rad2deg(made["stick-slip.increment"])
-    slip = -0.882 + 0.022 * drop + (6.609 - 0.156 * drop) * a
-    np.testing.assert_allclose(slip, made["slip"], atol=1e-9)
-
-
-def test_with_the_line_leg_and_drop_of_friction_follow_the_soil(tmp_path):
-    """Comin and Saaj 2017, eq. 28 with table VII."""
-    made = simulate_rows(recipe(tmp_path, LINE), 0, 0, 200)
-    found = spring_soil(made["stick-slip.increment"], made["stick-slip.stiffness"])
-    np.testing.assert_allclose(found[0], made["friction_angle_rad"], rtol=1e-9)
-    np.testing.assert_allclose(found[1], made["normal_stiffness_Pa"], rtol=1e-9)
-
-
-def test_a_line_without_slope_is_refused(tmp_path):
-    steep = LINE.replace("[0.5, 0.7]", "[0.5, 0.9]").replace("600e3", "900e3")
-    with pytest.raises(InputError, match="slip no longer follows vibration"):
-        generate(recipe(tmp_path, steep), tmp_path / "d.parquet")
-    assert not (tmp_path / "d.parquet").exists()
-
-
-def test_what_is_unknown_of_a_leg_fills_its_range_and_does_not_follow_the_soil(tmp_path):
-    made = simulate_rows(recipe(tmp_path, rows=2000), 0, 0, 2000)
-    drop = made["stick-slip.increment"] / made["friction_angle_rad"]
-    for values, low, high in ((made["stick-slip.stiffness"], 3500, 4500), (drop, 0.2, 0.3)):
-        assert low <= values.min() < low + 0.01 * (high - low) and values.max() <= high
-        for other in ("friction_angle_rad", "kphi_SI", "slip", "load_N"):
-            assert abs(np.corrcoef(values, made[other])[0, 1]) < 0.05
-
-
-def test_the_file_names_units_and_can_be_read(tmp_path):
-    noisy = RECIPE.replace("[stick_slip]", "[noise]\nvibration_m_s2 = 0.2\n[stick_slip]")
-    clean = simulate_rows(recipe(tmp_path), 0, 0, 400)["vibration_m_s2"]
-    generate(recipe(tmp_path, noisy), tmp_path / "d.parquet")
-    units = json.loads(pq.read_schema(tmp_path / "d.parquet").metadata[b"soilml_units"])
-    assert units["vibration_m_s2"] == "m/s^2" and units["stick-slip.stiffness"] == "N/m"
-    table = read_table(tmp_path / "d.parquet")
-    assert (table["vibration_m_s2"] - clean).std() == pytest.approx(0.2, rel=0.1)
-
-
 def test_the_recipe_of_the_paper_has_the_printed_lines(tmp_path):
     """Comin and Saaj 2017: eq. 24 with table V on soils within table I, turning at 0.3 rad/s."""
     made = simulate_rows(read_recipe("wheel_leg_paper"), 0, 0, 300)
@@ -143,12 +95,3 @@ def test_mistakes_in_a_recipe_are_named(tmp_path, old, new, said):
     with pytest.raises(InputError) as caught:
         recipe(tmp_path, RECIPE.replace(old, new))
     assert said in str(caught.value) and "\n" not in str(caught.value)
-
-
-def test_a_wheel_has_no_legs_to_stick_and_slip(tmp_path):
-    gear = RECIPE[RECIPE.index("[gear]") : RECIPE.index("[soil]")]
-    wheel = '[gear]\ntype = "wheel"\nradius = 0.15\nwidth = 0.1\n'
-    with pytest.raises(
-        InputError, match=r"\[stick_slip\]: the table is for wheel-legs only; .* 'wheel'"
-    ):
-        recipe(tmp_path, RECIPE.replace(gear, wheel))

@@ -1,7 +1,6 @@
 """Synthetic data: reproducible, whole, calibrated, and honest about failures."""
 
 import hashlib
-import json
 import os
 import signal
 import subprocess
@@ -9,13 +8,12 @@ import sys
 import time
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 from conftest import RECIPE
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
-from datagen.simulation import block_sizes, simulate_pieces, simulate_rows
+from datagen.simulation import simulate_pieces, simulate_rows
 from soilml import Model, Operating, Wheel, read_table, soil
 from soilml.errors import InputError
 
@@ -49,19 +47,6 @@ def test_rows_do_not_depend_on_the_pieces_they_are_made_in(tmp_path):
                 assert (values == whole[name][first:last]).all()
             else:  # vector units round the last digit by place
                 np.testing.assert_allclose(values, whole[name][first:last], rtol=1e-12)
-
-
-def test_metadata_holds_recipe_units_versions_and_seed(tmp_path):
-    made = recipe(tmp_path)
-    generate(made, tmp_path / "d.parquet")
-    schema = pq.read_schema(tmp_path / "d.parquet")
-    metadata = {k.decode(): v.decode() for k, v in schema.metadata.items()}
-    assert metadata["soilml_seed"] == "1" and metadata["soilml_rows"] == "600"
-    assert json.loads(metadata["soilml_recipe"])["gear"]["radius"] == 0.15
-    assert metadata["soilml_recipe_sha256"] == made.sha256
-    assert set(json.loads(metadata["soilml_versions"])) >= {"soilml", "numpy", "pyarrow"}
-    assert json.loads(metadata["soilml_units"])["torque_Nm"] == "N m"
-    assert schema.field("cohesion_Pa").metadata[b"unit"] == b"Pa"
 
 
 def test_readings_are_the_model_s_with_the_noise_declared(tmp_path):
@@ -106,27 +91,6 @@ def test_runs_share_soil_and_bias(tmp_path):
     assert np.std(bias[:, 0]) == pytest.approx(0.5, rel=0.2)
 
 
-def test_what_is_steady_keeps_one_value_in_a_run_and_differs_between_runs(tmp_path):
-    blocks = "".join(
-        f"[[runs]]\nrows = 8\nshare = 0.5\nsteady = {steady}\n"
-        for steady in ('["load_N"]', '["slip", "load_N"]')
-    )
-    made = recipe(tmp_path, blocks, rows=1600)
-    one_load, one_point = simulate_pieces(made)
-    assert not set(one_load["run"]) & set(one_point["run"])
-    spread = {
-        (block, name): np.ptp(columns[name].reshape(-1, 8), axis=1)
-        for block, columns in enumerate((one_load, one_point))
-        for name in ("slip", "load_N")
-    }
-    assert (spread[0, "slip"] > 0.05).all()
-    for steady in ((0, "load_N"), (1, "slip"), (1, "load_N")):
-        assert (spread[steady] == 0.0).all()
-    assert np.std(one_load["load_N"]) == pytest.approx(90.0 / np.sqrt(12.0), rel=0.05)
-    part = simulate_rows(made, 1, 13, 30)
-    assert (part["load_N"] == one_point["load_N"][13:30]).all()
-
-
 def test_columns_at_levels_take_them_evenly_in_turn_and_in_every_combination(tmp_path):
     levels = ("{ load_N = 3 }", "{ slip = 2, load_N = 3 }")
     blocks = "".join(f"[[runs]]\nrows = 8\nshare = 0.5\nlevels = {one}\n" for one in levels)
@@ -137,13 +101,6 @@ def test_columns_at_levels_take_them_evenly_in_turn_and_in_every_combination(tmp
     assert grid["slip"][:8].tolist() == [0.05, 0.6] * 4
     assert grid["load_N"][:8].tolist() == [30.0] * 2 + [75.0] * 2 + [120.0] * 2 + [30.0] * 2
     assert len(np.unique(grid["cohesion_Pa"])) == 100
-
-
-def test_rows_requested_are_rows_made(tmp_path):
-    blocks = "[[runs]]\nrows = 1\nshare = 0.7\n[[runs]]\nrows = 32\nshare = 0.3\n"
-    for rows in (1, 64, 1000):
-        assert sum(block_sizes(recipe(tmp_path, blocks, rows=rows))) == rows
-    assert recipe(tmp_path).sized(77, 3).rows == 77
 
 
 def test_rows_without_equilibrium_stay_with_their_reason(tmp_path):

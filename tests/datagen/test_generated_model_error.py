@@ -7,10 +7,8 @@ import pytest
 from conftest import RECIPE
 
 from datagen.recipe import read_recipe
-from datagen.simulation import SampledRows, model_error, sample_rows, simulate_rows
+from datagen.simulation import model_error, sample_rows, simulate_rows
 from soilml.config.remainder import Remainder, RemainderPart
-
-RUNS = 4000
 
 
 @pytest.fixture
@@ -37,12 +35,6 @@ def recipe(tmp_path):
     return replace(plain, case=replace(plain.case, remainder=Remainder((part,))))
 
 
-def at(slip, load=60.0):
-    """One row of each of many runs."""
-    run = np.arange(RUNS)
-    return SampledRows(run, {}, np.full(RUNS, slip), np.full(RUNS, load), {})
-
-
 def test_generated_rows_are_the_model_its_mean_and_the_error(recipe):
     exact = replace(recipe, bias={}, case=replace(recipe.case, noise={}))
     rows, sampled = simulate_rows(exact, 0, 0, 64), sample_rows(exact, 0, 0, 64)
@@ -53,19 +45,3 @@ def test_generated_rows_are_the_model_its_mean_and_the_error(recipe):
     np.testing.assert_allclose(added, mean + error, rtol=1e-9, atol=1e-12)
     assert np.std(error) > 0.05
     np.testing.assert_array_equal(rows["sinkage_m"], bare["sinkage_m"])
-
-
-def test_the_error_does_not_depend_on_how_the_rows_are_divided(recipe):
-    whole = simulate_rows(recipe, 0, 0, 64)["torque_Nm"]
-    parts = [simulate_rows(recipe, 0, a, b)["torque_Nm"] for a, b in ((0, 5), (5, 37), (37, 64))]
-    np.testing.assert_allclose(np.concatenate(parts), whole, rtol=1e-12)
-
-
-def test_far_from_the_learned_range_the_error_of_rows_is_a_usual_one(recipe):
-    (own,) = recipe.case.remainder.parts
-    light = replace(own, usual=0.4, load=(2.0, 3.0), points=((0.2, 2.5), (0.5, 2.5)))
-    case = replace(recipe.case, remainder=Remainder((light,)))
-    error = model_error(replace(recipe, case=case), 0, at(0.3))["torque_Nm"]
-    assert np.std(error) == pytest.approx(0.4, rel=0.06)
-    mean, _ = case.remainder.mean_and_std("torque", 0.3, 60.0)
-    assert abs(mean) < 1e-3

@@ -1,7 +1,6 @@
 """Data in a folder of files: the rows of one file, completed after an interruption."""
 
 import functools
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,8 +12,7 @@ from conftest import RECIPE
 from datagen.generate import WRITER, generate, generate_folder
 from datagen.recipe import read_recipe
 from datagen.simulation import pieces
-from soilml.cli import main
-from soilml.errors import InputError, TableError
+from soilml.errors import InputError
 from soilml.io.read_table import read_table
 from soilml.processes import process_map
 
@@ -81,42 +79,6 @@ def test_files_that_are_right_are_kept_and_others_are_written_again(make, tmp_pa
     assert files[0].stat().st_mtime_ns == times[0]
 
 
-def test_data_of_another_recipe_are_not_mixed_in(recipe, make, tmp_path):
-    make()
-    other = tmp_path / "data" / "mine.parquet"
-    with pytest.raises(InputError, match="of another recipe, seed, number of rows or version"):
-        make(recipe.sized(seed=2))
-    with pytest.raises(InputError, match="of another recipe"):
-        make(recipe.sized(rows=1992))
-    other.write_bytes(b"")
-    with pytest.raises(InputError, match=r"mine\.parquet is of another recipe"):
-        make()
-
-
-def test_remains_of_killed_workers_are_removed(make, tmp_path):
-    (tmp_path / "data").mkdir()
-    left = tmp_path / "data" / ".part-000001.parquet.0badcafe.part"
-    left.write_bytes(b"half")
-    make()
-    assert not left.exists()
-
-
-def test_an_incomplete_folder_is_no_table(make, tmp_path):
-    make()
-    first, second, *_ = sorted((tmp_path / "data").iterdir())
-    first.unlink()
-    with pytest.raises(TableError, match=r"has 1744 of 2000 rows: .* the same command completes"):
-        read_table(tmp_path / "data")
-    table = pq.ParquetFile(second).read()
-    pq.write_table(table.replace_schema_metadata({"soilml_rows": "2000"}), second)
-    with pytest.raises(TableError, match="not of one table"):
-        read_table(tmp_path / "data")
-    for file in (tmp_path / "data").iterdir():
-        file.unlink()
-    with pytest.raises(TableError, match="without a Parquet file"):
-        read_table(tmp_path / "data")
-
-
 def test_a_disk_that_is_too_small_is_refused_before_anything_is_written(
     recipe, tmp_path, monkeypatch
 ):
@@ -128,42 +90,3 @@ def test_a_disk_that_is_too_small_is_refused_before_anything_is_written(
         with pytest.raises(InputError, match=said):
             write(many, tmp_path / name)
     assert [file.name for file in tmp_path.iterdir()] == ["recipe.toml"]
-
-
-def test_a_recipe_that_mostly_fails_leaves_no_folder(recipe, tmp_path):
-    heavy = replace(recipe, load=replace(recipe.load, lower=3e4, upper=1.2e5))
-    with pytest.raises(InputError, match="no equilibrium"):
-        generate_folder(heavy, tmp_path / "data")
-    assert not (tmp_path / "data").exists()
-
-
-@pytest.mark.slow
-def test_commands_write_and_train_from_a_folder(recipe, tmp_path, capsys):
-    data, model = f"{tmp_path}/data/", str(tmp_path / "model.onnx")
-    (tmp_path / "spec.toml").write_text('[[regressor]]\ntype = "linear"\n')
-    command = ["generate", str(tmp_path / "recipe.toml"), data]
-    assert main(command) == 0
-    assert main(command) == 0
-    assert "2000 of them there before" in capsys.readouterr().err
-    assert main(["train", str(tmp_path / "spec.toml"), data, model]) == 0
-    assert (tmp_path / "model.onnx").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["data/", "--workers", "0"], "whole number, 1 or more"),
-        (["data/", "--scheduler", "tcp://127.0.0.1:1"], "--scheduler is for --engine dask"),
-        (["d.parquet", "--engine", "cluster"], "invalid choice"),
-        (
-            ["data/", "--engine", "dask", "--scheduler", "tcp://127.0.0.1:1", "--workers", "2"],
-            "omit --workers",
-        ),
-        (["missing/data/"], "does not exist; create it first"),
-    ],
-)
-def test_mistakes_in_the_options_are_named(recipe, tmp_path, monkeypatch, capsys, words, said):
-    monkeypatch.chdir(tmp_path)
-    assert main(["generate", "recipe.toml", *words]) == 2
-    error = capsys.readouterr().err
-    assert said in error and len(error.splitlines()) == 1

@@ -7,19 +7,14 @@ import pytest
 from conftest import WHEEL_ON_SAND
 
 from datagen.generate import generate
-from datagen.recipe import parse_recipe, read_recipe
+from datagen.recipe import read_recipe
 from datagen.simulation import simulate_rows
-from soilml import Estimator, Model, Operating, Wheel, read_table, soil
-from soilml.cli import main
+from soilml import Estimator, Model, Operating, Wheel, soil
 from soilml.config.case import read_case
-from soilml.config.write_case import case_as_toml
-from soilml.errors import InputError
 from soilml.experiment_design.simulator_runs import space_filling_runs
 from soilml.io.text_tables import csv_text
-from training.adaptation.campaign import DrivenRange, recipe_text
 from training.dataset import read_dataset
 from training.export.model_file import export_model
-from training.set_posterior.families.recipe_family import RecipeFamily
 from training.spec import read_spec
 from training.train import train
 
@@ -88,72 +83,6 @@ def test_rows_are_those_of_the_simulator_with_a_draw_of_its_emulator_s_error(rec
         assert np.std(drawn) == pytest.approx(error[name], rel=0.15)  # one draw for each soil
         apart = without[name] - truth[name]
         assert np.sqrt(np.mean(apart**2)) < 1.3 * error[name]  # as stated of new runs
-
-
-def test_the_text_of_the_recipe_needs_no_file(recipe, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    again = parse_recipe(recipe.text, "metadata")
-    assert again.text == recipe.text and "simulated.csv" not in recipe.text
-    own, copied = (simulate_rows(r, 0, 0, 50) for r in (recipe, again))
-    for name in CHANNELS:
-        np.testing.assert_array_equal(own[name], copied[name])
-    (tmp_path / "case.toml").write_text(case_as_toml(again.case))
-    assert read_case(tmp_path / "case.toml").simulator.error == recipe.case.simulator.error
-
-
-def test_ranges_beyond_the_runs_are_refused_or_cut(folder, tmp_path, recipe, capsys):
-    (tmp_path / "simulated.csv").write_bytes((folder / "simulated.csv").read_bytes())
-    far = (folder / "recipe.toml").read_text().replace("110.0]\n[noise]", "160.0]\n[noise]")
-    (tmp_path / "recipe.toml").write_text(far)
-    assert main(["generate", str(tmp_path / "recipe.toml"), str(tmp_path / "out.parquet")]) == 2
-    said = capsys.readouterr().err
-    assert (
-        "load_N is [30, 160]; the runs of the simulator have 30" in said and said.count("\n") == 1
-    )
-    rows = {
-        "run": ["a"] * 2,
-        "slip": [0.06, 0.58],
-        "load_N": [31.0, 109.0],
-        "torque_Nm": [1.0, 2.0],
-    }
-    (tmp_path / "rows.csv").write_text(csv_text(rows))
-    driven = DrivenRange.of(read_table(tmp_path / "rows.csv"), recipe.case)
-    gear = recipe.case.model.gear
-    assert driven.slip[1] <= gear.upper[0] and driven.load[1] <= gear.upper[1]
-    (tmp_path / "adapted.toml").write_text(recipe_text(recipe.case, driven, 100, 1))
-    assert read_recipe(tmp_path / "adapted.toml").case.simulator is not None
-    one = str(folder / "recipe.toml"), str(tmp_path / "out.parquet")
-    assert main(["generate", *one, "--device", "cpu"]) == 2
-    assert "--device solves equations" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("runs", "said"),
-    [
-        ("{ slip = [0.1, 0.2], load_N = [1.0] }", "columns of different lengths"),
-        ('{ slip = ["a"], load_N = [1.0] }', "a value that is no number"),
-        ("{}", "columns of different lengths"),
-        ("3", "runs is 3; needed is lists"),
-    ],
-)
-def test_runs_within_a_file_that_cannot_be_read_are_one_line(tmp_path, runs, said):
-    text = SIMULATOR.replace('table = "simulated.csv"', f"runs = {runs}")
-    (tmp_path / "model.toml").write_text(MODEL + text)
-    with pytest.raises(InputError, match=said):
-        read_case(tmp_path / "model.toml")
-
-
-def test_the_set_posterior_sees_the_simulator_s_response(folder, recipe):
-    """Logarithms of torque and sinkage, and pull over load, of the black box and of the wheel."""
-    targets = ("cohesion", "friction_angle", "shear_modulus")
-    box, front = (RecipeFamily.of(r, targets) for r in (recipe, read_recipe(folder / "front.toml")))
-    designs = box.designs(128, 1)
-    x = np.random.default_rng(0).uniform(-0.5, 0.5, (8, 3))
-    ours, theirs = (family.responses(designs, x) for family in (box, front))
-    torque = designs[:, None, 1] * (np.exp(ours[..., 0]) - np.exp(theirs[..., 0]))
-    assert np.sqrt(np.mean(torque**2)) < 1.3 * recipe.case.simulator.error["torque_Nm"]
-    assert np.std(ours[..., 1] - theirs[..., 1]) < 0.01
-    assert box.model_errors()["contact"] == 0.0  # a black box has no contact to err in
 
 
 @pytest.mark.long

@@ -5,7 +5,7 @@ import pytest
 from conftest import RECIPE
 
 from datagen.recipe import read_recipe
-from datagen.simulation import simulate_pieces, simulate_rows
+from datagen.simulation import simulate_pieces
 from soilml.errors import InputError
 
 RUNS = "\n[[runs]]\nrows = 16\nshare = 1.0\n"
@@ -19,12 +19,6 @@ def recipe(tmp_path, worlds="", runs=RUNS, rows=3200):
 
 def torque(of):
     return np.concatenate([piece["torque_Nm"] for piece in simulate_pieces(of)])
-
-
-def test_without_effects_and_errors_the_rows_are_those_of_the_model(tmp_path):
-    plain = torque(recipe(tmp_path))
-    none = torque(recipe(tmp_path, "[worlds]\neffect = 0.0\nerror = 0.0\n"))
-    np.testing.assert_allclose(none, plain, rtol=1e-9)
 
 
 def test_an_effect_acts_in_its_share_of_the_runs_and_in_all_rows_of_a_run(tmp_path):
@@ -45,18 +39,6 @@ def test_a_smooth_error_has_the_usual_size_and_is_shared_by_a_run(tmp_path):
     amplitude = of.worlds.amplitudes["torque_Nm"][0]
     assert np.std(error) == pytest.approx(amplitude, rel=0.15)
     assert np.mean(error, axis=1).std() > 0.6 * amplitude  # noise would leave a quarter
-
-
-def test_rows_do_not_depend_on_the_pieces(tmp_path):
-    of = recipe(tmp_path, "[worlds]\n")
-    whole, part = (simulate_rows(of, 0, *ends)["sinkage_m"] for ends in ((0, 640), (160, 320)))
-    np.testing.assert_allclose(whole[160:320], part, rtol=1e-8)
-
-
-def test_the_declared_discrepancy_is_the_size_of_the_error(tmp_path):
-    worlds = '[discrepancy]\ntorque_Nm = "10 %"\n[worlds]\n'
-    sizes = [recipe(tmp_path, w).worlds.amplitudes["torque_Nm"][0] for w in (worlds, "[worlds]\n")]
-    assert sizes[0] == pytest.approx(5.0 * sizes[1])
 
 
 @pytest.mark.parametrize(

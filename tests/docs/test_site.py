@@ -20,7 +20,6 @@ sys.path.insert(0, str(ROOT / "docs/site"))
 
 import command_listing  # noqa: E402
 import error_listing  # noqa: E402
-import foreign_addresses  # noqa: E402
 import page_tree  # noqa: E402
 
 PAGES = [
@@ -119,22 +118,6 @@ def test_every_message_belongs_to_one_group_of_the_page():
     assert error_listing.faults(error_listing.PAGE.read_text(), found) == []
 
 
-def test_a_module_without_a_group_and_a_group_without_a_module_are_told():
-    found = [error_listing.Message("soilml/new.py", "InputError", "a new message")]
-    page = "<!-- messages: soilml/old.py -->"
-    no_group, no_module = error_listing.faults(page, found)
-    assert "soilml/new.py raises messages and is in no group" in no_group
-    assert "soilml/old.py" in no_module
-    twice = "<!-- messages: soilml/new.py -->\n<!-- messages: soilml/** -->"
-    assert "2 groups" in error_listing.faults(twice, found)[0]
-
-
-def test_messages_are_read_with_their_gaps():
-    source = 'raise InputError(f"{name} is {value!r}; needed is " + hint)'
-    (message,) = error_listing._of(source, "soilml/new.py")
-    assert message.text == "… is …; needed is …"
-
-
 def test_every_quantity_is_on_the_page_of_symbols():
     page = (ROOT / "docs/reference/symbols.md").read_text()
     for quantity in QUANTITIES.values():
@@ -154,17 +137,3 @@ def test_every_public_name_is_in_the_reference():
         named |= set(getattr(imported, "__all__", vars(imported)))
     values = {"__version__", "EFFECTS", "GEARS", "METHODS"}
     assert set(soilml.__all__) - values <= named
-
-
-@pytest.mark.parametrize(
-    ("page", "loads"),
-    [
-        ('<script src="https://cdn.example/a.js"></script>', True),
-        ('<link rel="stylesheet" href="//fonts.example/a.css">', True),
-        ('<a href="https://example.org">a link that is followed</a>', False),
-        ('<img src="_images/a.png"><script src="_static/a.js"></script>', False),
-    ],
-)
-def test_addresses_that_a_page_would_load_are_found(tmp_path, page, loads):
-    (tmp_path / "page.html").write_text(page)
-    assert bool(foreign_addresses.loaded_addresses(tmp_path)) == loads

@@ -7,25 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from datagen.recipe import read_recipe
 from soilml import Estimator, read_case
 from soilml.cli import main
 from soilml.quantities import SHEAR
-from training.spec import read_spec
 
 HERE = Path(__file__).parents[2] / "examples" / "papers"
 sys.path.insert(0, str(HERE))
 
-from lunar.bearing import write_known  # noqa: E402
 from lunar.exact import posterior  # noqa: E402
 from lunar.predictions import (  # noqa: E402
     predict_from_estimate,
-    predict_from_posterior,
     predict_from_prior,
     predict_from_torque,
     simulate_readings,
 )
-from lunar.pull import pull_interval, repeat_over_slips, sample_soils  # noqa: E402
 from lunar.sweep import (  # noqa: E402
     add_torque_noise,
     bounds,
@@ -68,53 +63,11 @@ def remaining_fraction(truth, slip, load, case=CASE):
     return posterior(case, slip, torque, load, rng, 4000)[:, :3].std(axis=0) / SPREAD
 
 
-def test_the_recipe_is_of_the_same_wheel_soil_prior_and_noise_as_the_model():
-    assert read_recipe(HERE / "lunar" / "recipe.toml").case == CASE
-
-
-def test_one_reading_hardly_narrows_any_parameter_alone(truth):
-    assert (remaining_fraction(truth, np.asarray([0.4]), np.asarray([50.0])) > 0.6).all()
-
-
-def test_slips_at_one_load_identify_the_shear_modulus_only_if_the_bearing_is_known(truth):
-    slips, load = np.linspace(0.2, 0.6, 8), np.full(8, 50.0)
-    cohesion, _, modulus = remaining_fraction(truth, slips, load, KNOWN)
-    assert modulus < 0.3
-    assert cohesion > 0.8
-    assert remaining_fraction(truth, slips, load)[2] > 0.7
-
-
 def test_slips_at_three_loads_identify_the_strength_and_with_the_bearing_all(truth):
     assert (remaining_fraction(truth, *three_loads(), KNOWN) < 0.3).all()
     cohesion, angle, modulus = remaining_fraction(truth, *three_loads())
     assert max(cohesion, angle) < 0.35
     assert modulus > 0.5
-
-
-def test_soil_samples_follow_the_gaussian_inside_the_prior(truth):
-    rng = np.random.default_rng(5)
-    covariance = np.diag((0.02 * SPREAD) ** 2)
-    draws = sample_soils(CASE, truth, covariance, rng, 4000)
-    assert draws[:, :3].mean(axis=0) == pytest.approx(truth, rel=0.01)
-    assert draws[:, :3].std(axis=0) == pytest.approx(0.02 * SPREAD, rel=0.05)
-    cornered = sample_soils(CASE, UPPER, np.diag(SPREAD**2), rng, 500)[:, :3]
-    assert ((cornered >= LOWER) & (cornered <= UPPER)).all()
-
-
-def test_bearing_that_an_estimate_lacks_is_drawn_from_its_prior(truth):
-    rng = np.random.default_rng(5)
-    kphi = sample_soils(CASE, truth, np.diag((0.02 * SPREAD) ** 2), rng, 4000)[:, 3]
-    prior = CASE.prior["kphi"]
-    assert np.quantile(kphi, [0.1, 0.9]) == pytest.approx(prior.at(np.array([0.1, 0.9])), rel=0.15)
-
-
-def test_a_known_soil_gives_its_own_pull(truth):
-    rng = np.random.default_rng(6)
-    soil = np.append(truth, CASE.soil.kphi)
-    known = repeat_over_slips(soil, np.diag(np.append(1e-6 * SPREAD, 1.0) ** 2), 5)
-    pull, low, high = pull_interval(CASE, *known, SLIPS, 50.0, rng, 50)
-    assert pull == pytest.approx(wheel_forces(CASE, truth, SLIPS, 50.0).drawbar_pull, rel=1e-4)
-    assert (high - low < 1e-3).all()
 
 
 def test_the_pull_from_an_estimate_is_worse_than_from_the_torque_and_better_than_the_prior(
@@ -132,20 +85,6 @@ def test_the_pull_from_an_estimate_is_worse_than_from_the_torque_and_better_than
     assert error["torque"] < error["own"] < 0.7 * error["prior"]
 
 
-def test_the_machine_is_near_the_best_that_one_reading_allows(estimator):
-    rng = np.random.default_rng(8)
-    seen = simulate_readings(CASE, SLIPS, 50.0, 150, rng)
-    best, mean = predict_from_posterior(CASE, seen, SLIPS, rng, 4096)
-    values = seen.soils[:, None, :3]
-    found = estimator(slip=SLIPS, torque=seen.torque, load=50.0)
-    assert found.in_range.mean() > 0.95
-    least = np.sqrt(np.mean((mean - values) ** 2, axis=(0, 1)))
-    own = np.sqrt(np.mean((found.mean - values) ** 2, axis=(0, 1)))
-    assert (own < 1.06 * least).all()
-    pull = predict_from_estimate(CASE, estimator, seen, SLIPS, rng)
-    assert best.error(seen.pull) < pull.error(seen.pull)
-
-
 def test_intervals_hold_at_half_the_bearing_of_the_table(estimator):
     rng = np.random.default_rng(9)
     values = soils(CASE, 150, rng)
@@ -154,11 +93,3 @@ def test_intervals_hold_at_half_the_bearing_of_the_table(estimator):
     found = estimator(slip=SLIPS, torque=add_torque_noise(CASE, force.torque, rng), load=50.0)
     inside = (found.low <= values[:, None, :3]) & (values[:, None, :3] <= found.high)
     assert (inside.mean(axis=(0, 1)) > 0.85).all()
-
-
-def test_the_files_of_known_bearing_are_the_example_without_it(tmp_path):
-    folder = HERE / "lunar"
-    recipe, spec = write_known(folder / "recipe.toml", folder / "spec.toml", tmp_path)
-    assert read_recipe(recipe).case == KNOWN
-    assert read_spec(spec).set_posterior is None
-    assert read_spec(folder / "spec.toml").set_posterior is not None

@@ -1,8 +1,5 @@
 """The page on wheel-legs and slip, and the gap that its authors found."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -13,13 +10,11 @@ from soilml.identification import identify
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from soilml.onboard.fusion_rules import pairwise
-from soilml.physics.pull_efficiency import CLASSES
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.stances import FOOT
 from soilml.systems.wheel_legs.walk import walk
 
-ROOT = Path(__file__).parents[2]
 SAND = soil("comin2017/ssc-2", shear_modulus=0.017 * FOOT.area**0.5)
 CASE = Case(
     Model(FOOT), SAND,
@@ -54,11 +49,3 @@ def test_the_middle_line_of_the_fusion_rule_as_printed_does_not_sum_to_one():
     assert abs(sum(printed) / 3 - 1) > 0.05
     weights = pairwise(np.zeros(3), np.sqrt([T, V, S])).weights
     np.testing.assert_allclose(3 * weights[1], T / (V + T) + S / (V + S))
-
-
-def test_the_example_on_the_page_runs():
-    page = (ROOT / "docs/papers/comin2017.md").read_text()
-    names: dict = {}
-    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[1], names)
-    assert names["found"].std[0] > 0 and names["vibration"] > 0 and names["torque"] > 0
-    assert names["traffic_class"](names["eta"]) == CLASSES[2]

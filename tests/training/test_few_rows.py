@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -69,13 +67,6 @@ def features_of(name):
     return spec.features, spec.targets
 
 
-def test_rows_of_one_soil_count_for_less_where_they_share_their_error(tmp_path):
-    alike = trained_on(strides(tmp_path / "a.csv", 5, 12, 1, soil_std=0.1)).left_out
-    free = trained_on(strides(tmp_path / "b.csv", 5, 12, 1, soil_std=0.0)).left_out
-    assert 1.0 <= alike.freedom[0] < 15.0 < 40.0 < free.freedom[0] <= 60.0
-    assert alike.factor[0] * alike.std[0, 0] > 1.5 * free.factor[0] * free.std[0, 0]
-
-
 def test_files_of_few_rows_are_exported_and_fused_by_their_correlation(tmp_path):
     path = strides(tmp_path / "a.csv", 4, 15, 7)
     files = []
@@ -90,22 +81,3 @@ def test_files_of_few_rows_are_exported_and_fused_by_their_correlation(tmp_path)
     fused = fuse_estimates(readings)
     assert fused.rule == "correlated" and fused.used.all()
     assert fused.estimate.std[0] < min(e.std[0] for e in readings)
-
-
-def test_a_campaign_on_one_soil_is_named_on_the_card(tmp_path):
-    path = strides(tmp_path / "a.csv", 1, 20, 3)
-    trained = trained_on(path)
-    metadata = export_model(trained, tmp_path / "m.onnx", path)
-    assert "All rows are of one run" in model_card(trained, metadata, "m")
-    many = replace(trained, left_out=replace(trained.left_out, runs=4))
-    assert "All rows are of one run" not in model_card(many, metadata, "m")
-
-
-def test_soil_from_few_runs_keeps_its_own_targets(small_data):
-    """Targets with one value for a run: whole runs are left out, and rows are not pooled."""
-    spec = read_spec("linear")
-    data = read_dataset(small_data, spec.features, spec.targets)
-    some = data.rows(np.flatnonzero(np.isin(data.run, np.unique(data.run)[:30])))
-    trained = train(spec, some)
-    assert trained.left_out is not None and trained.left_out.runs == 30
-    assert (trained.left_out.freedom >= 1.0).all() and not trained.pooled_scores

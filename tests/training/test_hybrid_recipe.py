@@ -9,10 +9,8 @@ from conftest import RECIPE
 from datagen.recipe import read_recipe
 from datagen.simulation import simulate_rows
 from soilml.config.remainder import Remainder, RemainderPart
-from soilml.errors import InputError
 from training.calibration.recalibration import compute_metrics
 from training.regressors.lssvm import LSSVM
-from training.set_posterior.families.recipe_family import RecipeFamily
 
 ROWS, TESTED = 900, 2000
 
@@ -54,8 +52,3 @@ def test_intervals_allow_for_the_error_of_the_model(recipe):
         covered.append(float(figures.cover90[0]))
     assert covered[0] > 0.86
     assert covered[1] < 0.6  # trained on rows of the model alone
-
-
-def test_a_set_posterior_refuses_such_a_recipe(recipe):
-    with pytest.raises(InputError, match=r"the recipe has \[remainder\]"):
-        RecipeFamily.of(recipe, ("friction_angle",))

@@ -3,7 +3,6 @@
 import pytest
 
 from soilml.cli import main
-from training import available_memory as memory
 
 
 @pytest.mark.slow
@@ -18,38 +17,3 @@ def test_a_fit_that_does_not_fit_is_refused_before_anything_is_done(
     assert "lssvm: " in said and "exact, " in said and " and 0.001 GB are free" in said
     assert 'solution = "fixed-size"' in said and "fitting" not in said
     assert not list(tmp_path.glob("m.*"))
-
-
-@pytest.mark.slow
-def test_rows_prototypes_and_memory_are_said_before_the_fit(tmp_path, small_data, capsys):
-    spec, out = tmp_path / "s.toml", tmp_path / "m.onnx"
-    spec.write_text('[[regressor]]\ntype = "lssvm"\nsolution = "fixed-size"\ncentres = 20\n')
-    assert main(["train", str(spec), str(small_data), str(out)]) == 0
-    said = capsys.readouterr().err
-    assert "fitting lssvm (" in said and " rows, fixed-size, 20 prototypes, 0.0" in said
-    assert "fixed-size, 20 centres" in out.with_suffix(".md").read_text()
-
-
-def test_free_memory_is_the_least_of_what_machine_group_and_process_allow(monkeypatch, tmp_path):
-    free = memory.available_memory()
-    assert free is None or 0 <= free < 1 << 50
-    limit, used = tmp_path / "max", tmp_path / "current"
-    monkeypatch.setattr(memory, "LIMIT", limit)
-    monkeypatch.setattr(memory, "USED", used)
-    limit.write_text("5000000\n")
-    used.write_text("4000000\n")
-    assert memory.available_memory() == 1_000_000
-    limit.write_text("max\n")
-    assert memory.available_memory() != 1_000_000
-    for name in ("_free_of_machine", "_free_of_group", "_free_of_process"):
-        monkeypatch.setattr(memory, name, lambda: None)
-    assert memory.available_memory() is None
-
-
-def test_an_unknown_solution_is_named(tmp_path):
-    from soilml.errors import InputError
-    from training.spec import read_spec
-
-    (tmp_path / "s.toml").write_text('[[regressor]]\ntype = "lssvm"\nsolution = "sparse"\n')
-    with pytest.raises(InputError, match="'sparse'; there are: by-rows, exact, fixed-size"):
-        read_spec(tmp_path / "s.toml")

@@ -58,14 +58,6 @@ def test_on_known_soil_torque_and_vibration_joined_say_more_of_slip_than_one(leg
 
 
 @pytest.mark.slow
-def test_on_unknown_soil_only_what_reads_both_at_once_says_more(leg_scores):
-    (apart,) = leg_scores("unknown", ["slip"], "torque/load load", "vibration load")
-    (at_once,) = leg_scores("unknown", ["slip"], "torque/load load vibration")
-    assert at_once[-1] < 0.95 * apart.min()
-    assert apart[0] > 0.7  # torque: mostly the prior
-
-
-@pytest.mark.slow
 def test_sinkage_tells_stiffness_and_torque_and_vibration_tell_friction(leg_scores):
     """Comin and Saaj 2017, section IV-B: sinkage for load bearing, slip models for shear."""
     friction, stiffness = leg_scores(
@@ -78,21 +70,3 @@ def test_sinkage_tells_stiffness_and_torque_and_vibration_tell_friction(leg_scor
     assert friction[:2].max() < 0.85 < 0.95 < friction[2]
     assert stiffness[2] < 0.4 < 0.8 < stiffness[:2].min()
     assert friction[3] < friction[:3].min() and stiffness[3] < stiffness[:2].min()
-
-
-SLIP_SPECS = [
-    f"slip_{sensor}{kind}" for sensor in ("torque", "vibration") for kind in ("", "_lssvm")
-]
-
-
-@pytest.mark.parametrize("name", ["slip", *SLIP_SPECS, "leg_soil"])
-def test_packaged_specs_are_found_by_name(name):
-    spec = read_spec(name)
-    assert spec.per_row == name.startswith("slip") and spec.regressors
-
-
-@pytest.mark.parametrize("name", SLIP_SPECS)
-def test_slip_models_of_one_sensor_are_linear_unless_their_name_says_otherwise(name):
-    """Comin and Saaj 2017, eqs. 18 and 24."""
-    (regressor,) = read_spec(name).regressors
-    assert regressor.model.type_name == ("fixed-size-lssvm" if "lssvm" in name else "linear")

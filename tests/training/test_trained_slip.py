@@ -1,18 +1,14 @@
 """Slip as what is learned: from torque, from other channels, and from both in one file or two."""
 
-import json
-
 import numpy as np
 import pytest
 from conftest import WHEEL_ON_SAND
 
 from datagen.generate import generate
 from datagen.recipe import read_recipe
-from soilml import Estimator, read_table
+from soilml import Estimator
 from soilml.cli import main
-from soilml.errors import InputError, TableError
-from soilml.onboard.features import compute_features
-from soilml.onboard.multi_sensor import fuse_estimates
+from soilml.errors import InputError
 from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
@@ -84,56 +80,6 @@ def test_slip_follows_from_torque_on_known_soil_and_hardly_on_unknown(trained):
         assert abs(original.scores["estimator"].cover90[0] - 0.9) < 0.06
 
 
-def test_the_prior_of_slip_is_the_range_that_was_driven(trained):
-    estimator = Estimator.load(trained(TORQUE + MACHINE)[1])
-    assert estimator.inputs == ("torque", "load") and estimator.per_row == ("slip",)
-    assert (estimator.prior.lower[0], estimator.prior.upper[0]) == (0.05, 0.6)
-    assert estimator.prior.std[0] == pytest.approx(0.55 / np.sqrt(12), rel=0.02)
-
-
-def test_each_regressor_reads_its_own_features_and_two_say_more_than_one(trained):
-    one, other = trained(TORQUE + MACHINE)[0], trained(PULL + MACHINE)[0]
-    both, path = trained(BOTH + OF_TORQUE + OF_PULL)
-    assert [m.regressor.columns for m in both.members] == [(0, 1), (2, 1)]
-    assert share(both) < share(one) < share(other)
-    alone = [both.scores[m.regressor.name].relative[0] for m in both.members]
-    np.testing.assert_allclose(alone, [share(one), share(other)], atol=0.1)
-    card = json.loads(Estimator.load(path).metadata["metrics"])
-    assert "fixed-size-lssvm of torque/load, load" in card
-
-
-@pytest.mark.parametrize("rule", ["best-linear", "inverse-variance", "pairwise"])
-def test_the_fused_file_answers_as_the_original(trained, rule):
-    original, path = trained(f'rule = "{rule}"\n{BOTH}{OF_TORQUE}{OF_PULL}')
-    estimator = Estimator.load(path)
-    rng = np.random.default_rng(0)
-    readings = {
-        entry["name"]: rng.uniform(entry["lower"], entry["upper"], 2000)
-        for entry in json.loads(estimator.metadata["inputs"])
-    }
-    found = estimator(**readings)
-    mean, std, inside = original.predict(compute_features(original.spec.features, readings))
-    same = found.in_range == inside
-    assert same.mean() > 0.999 and 0.1 < inside.mean() < 1.0
-    off = np.maximum(np.abs(found.mean - mean), np.abs(found.std - std)) / original.prior.std
-    assert off[same].max() < 1e-4
-
-
-def test_a_channel_far_off_takes_the_whole_file_out_of_range(trained):
-    estimator = Estimator.load(trained(BOTH + OF_TORQUE + OF_PULL)[1])
-    assert bool(estimator(torque=3.2, load=60.0, drawbar_pull=8.0).in_range)
-    assert not bool(estimator(torque=3.2, load=60.0, drawbar_pull=80.0).in_range)
-    assert not bool(estimator(torque=30.0, load=60.0, drawbar_pull=8.0).in_range)
-
-
-def test_rows_of_a_run_have_no_one_slip(trained):
-    estimator = Estimator.load(trained(TORQUE + MACHINE)[1])
-    with pytest.raises(InputError, match="estimates slip, which differs from row to row"):
-        estimator.run(torque=[3.0, 3.2], load=60.0)
-    card = trained(TORQUE + MACHINE)[1]
-    assert json.loads(Estimator.load(card).metadata["together"])["kinds"] == []
-
-
 def test_a_channel_that_was_not_measured_is_named(trained):
     estimator = Estimator.load(trained(BOTH + OF_TORQUE + OF_PULL)[1])
     with pytest.raises(InputError, match="drawbar_pull is nan"):
@@ -143,22 +89,6 @@ def test_a_channel_that_was_not_measured_is_named(trained):
     nothing = estimator.prior_estimate(4)
     assert nothing.mean.shape == (4, 1) and not nothing.in_range.any()
     np.testing.assert_array_equal(nothing.std[2], estimator.prior.std)
-
-
-def test_two_files_on_board_say_what_one_file_of_both_says(trained, folder):
-    one, other = (Estimator.load(trained(text + MACHINE)[1]) for text in (TORQUE, PULL))
-    both = trained(BOTH + OF_TORQUE + OF_PULL)[0]
-    (folder / "r.toml").write_text(RECIPE.format(rows=2000, seed=9, soil=KNOWN))
-    generate(read_recipe(folder / "r.toml"), folder / "other.parquet")
-    table = read_table(folder / "other.parquet")
-    torque, load, drawbar_pull = (table[k] for k in ("torque_Nm", "load_N", "drawbar_pull_N"))
-    parts = one(torque=torque, load=load), other(drawbar_pull=drawbar_pull, load=load)
-    found = fuse_estimates(parts).estimate
-    error = [np.sqrt(np.mean((e.mean[:, 0] - table["slip"]) ** 2)) for e in (found, *parts)]
-    assert error[0] < min(error[1:])
-    assert error[0] / one.prior.std[0] == pytest.approx(share(both), abs=0.06)
-    inside = (found.low[:, 0] <= table["slip"]) & (table["slip"] <= found.high[:, 0])
-    assert abs(inside.mean() - 0.9) < 0.05
 
 
 def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path, capsys):
@@ -196,33 +126,6 @@ def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path
     assert "column drawbar_pull_N is missing" in capsys.readouterr().err
 
 
-def test_slip_is_not_compared_with_methods_that_find_soil(trained, folder, tmp_path, capsys):
-    model = RECIPE.format(rows=1, seed=1, soil=KNOWN).partition("[operating]")[0]
-    (tmp_path / "m.toml").write_text(model.replace("rows = 1\nseed = 1\n", ""))
-    command = ["compare", str(tmp_path / "m.toml"), str(folder / "known.parquet")]
-    command += [str(trained(TORQUE + MACHINE)[1]), "--out", str(tmp_path / "o")]
-    assert main(command) == 2
-    assert "estimates slip, which no analytic method identifies" in capsys.readouterr().err
-    assert not (tmp_path / "o").exists()
-
-
-def test_soil_can_be_learned_without_slip_and_is_joined_over_the_load_alone(folder, tmp_path):
-    blocks = "[[runs]]\nrows = 1\nshare = 0.6\n[[runs]]\nrows = 8\nshare = 0.4\n"
-    (tmp_path / "r.toml").write_text(RECIPE.format(rows=3000, seed=4, soil=UNKNOWN) + blocks)
-    (tmp_path / "s.toml").write_text(
-        'features = ["torque/load", "load"]\ntargets = ["friction_angle"]\n' + MACHINE
-    )
-    generate(read_recipe(tmp_path / "r.toml"), tmp_path / "d.parquet")
-    command = ["train", str(tmp_path / "s.toml"), str(tmp_path / "d.parquet")]
-    assert main([*command, str(tmp_path / "m.onnx")]) == 0
-    estimator = Estimator.load(tmp_path / "m.onnx")
-    assert estimator.pooling.conditions.names == ("load",)
-    assert [pattern.varies for pattern in estimator.pooling.patterns] == [(False,), (True,)]
-    loads = np.linspace(40.0, 110.0, 8)
-    one, many = estimator(torque=3.0, load=60.0), estimator.run(torque=0.05 * loads, load=loads)
-    assert bool(many.in_range) and many.std[0] < one.std[0]
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -239,19 +142,3 @@ def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
     with pytest.raises(InputError, match=said) as caught:
         read_spec(tmp_path / "s.toml")
     assert "\n" not in str(caught.value)
-
-
-def test_regressors_of_one_kind_keep_their_own_figures(tmp_path):
-    (tmp_path / "s.toml").write_text(TORQUE + 2 * MACHINE)
-    names = [regressor.name for regressor in read_spec(tmp_path / "s.toml").regressors]
-    assert names == ["fixed-size-lssvm", "fixed-size-lssvm #2"]
-
-
-def test_data_that_lack_a_channel_or_measure_slip_badly_are_refused(folder, tmp_path):
-    with pytest.raises(TableError, match="vibration_m_s2 is missing"):
-        read_dataset(folder / "known.parquet", ("vibration", "load"), ("slip",))
-    text = RECIPE.format(rows=300, seed=1, soil=KNOWN)
-    (tmp_path / "r.toml").write_text(text + "slip = 0.02\n")
-    generate(read_recipe(tmp_path / "r.toml"), tmp_path / "d.parquet")
-    with pytest.raises(InputError, match=r"slip is a target, but its column has noise"):
-        read_dataset(tmp_path / "d.parquet", ("torque", "load"), ("slip",))

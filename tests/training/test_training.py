@@ -5,10 +5,9 @@ import pytest
 
 from soilml.errors import InputError, TableError
 from soilml.onboard.estimate import PriorSummary
-from training.calibration.recalibration import compute_metrics, covariance_matrices, recalibrate
+from training.calibration.recalibration import covariance_matrices, recalibrate
 from training.calibration.row_pooling import calibrate_pooling, run_conditions
 from training.dataset import read_dataset, split_by_run
-from training.ensemble import fuse_members
 from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec
 
@@ -19,62 +18,6 @@ TARGETS = ("cohesion", "friction_angle", "shear_modulus")
 @pytest.fixture(scope="module")
 def data(small_data):
     return read_dataset(small_data, FEATURES, TARGETS)
-
-
-def test_the_split_is_by_run_and_complete(data):
-    parts = split_by_run(data, seed=3)
-    runs = [set(p.run) for p in (parts.train, parts.validation, parts.calibration)]
-    assert not (runs[0] & runs[1] or runs[0] & runs[2] or runs[1] & runs[2])
-    assert sum(map(len, (parts.train, parts.validation, parts.calibration))) == len(data)
-    assert parts.train.run_length.max() == 1  # runs of many rows serve calibration
-    assert (parts.calibration.run_length > 1).any()
-    assert len(parts.calibration.limit_rows_per_run(2)) < len(parts.calibration)
-
-
-def test_metrics_of_a_known_case():
-    rng = np.random.default_rng(0)
-    mean, std = rng.normal(size=(20000, 1)), np.full((20000, 1), 0.5)
-    s = compute_metrics(mean + 0.5 * rng.normal(size=mean.shape), mean, std, np.asarray([2.0]))
-    assert s.rmse[0] == pytest.approx(0.5, rel=0.02)
-    assert s.relative[0] == pytest.approx(0.25, rel=0.02)
-    assert s.cover50[0] == pytest.approx(0.5, abs=0.012)
-    assert s.cover90[0] == pytest.approx(0.9, abs=0.008)
-    assert s.nll[0] == pytest.approx(0.5 * np.log(2 * np.pi * np.e) + np.log(0.25), abs=0.02)
-
-
-def test_recalibration_matches_std_to_the_errors(data):
-    parts = split_by_run(data, seed=0)
-    regressor = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    shrunken = recalibrate(_Overconfident(regressor), parts.validation)
-    s = compute_metrics(
-        parts.calibration.limit_rows_per_run().targets,
-        *shrunken.predict(parts.calibration.limit_rows_per_run().features),
-        np.ones(3),
-    )
-    assert (np.abs(s.cover90 - 0.9) < 0.04).all()
-    np.testing.assert_allclose(shrunken.std_scale, 5.0, rtol=0.15)
-
-
-class _Overconfident:
-    def __init__(self, regressor):
-        self.regressor = regressor
-
-    def predict(self, x, return_std=False):
-        mean, std = self.regressor.predict(x, return_std=True)
-        return mean, std / 5.0
-
-
-def test_fusing_a_regressor_with_itself_does_not_reduce_std(data):
-    parts = split_by_run(data, seed=0)
-    regressor = LinearGaussian().fit(parts.train.features, parts.train.targets)
-    member = recalibrate(regressor, parts.validation)
-    single = member.predict(parts.calibration.features)[1]
-    twice = fuse_members([member, member], "best-linear", parts.validation)
-    np.testing.assert_allclose(twice.predict(parts.calibration.features)[1], single, rtol=0.02)
-    naive = fuse_members([member, member], "inverse-variance", parts.validation)
-    np.testing.assert_allclose(
-        naive.predict(parts.calibration.features)[1], single / np.sqrt(2), rtol=1e-9
-    )
 
 
 @pytest.mark.slow
@@ -107,15 +50,6 @@ def test_pooling_is_calibrated_on_held_out_runs(data):
         mean, covariance_matrices(std, member.correlation), alone, prior, conditions
     )
     assert all(np.exp(p.interpolate(32)[0]) == pytest.approx(1 / 32) for p in unknown.patterns)
-
-
-def test_runs_are_shuffled(data):
-    many = data.rows(data.run_length == 32)
-    for start in (0, 1):
-        first = np.asarray([run[start] for run in many.runs()])
-        share = (many.measured["slip"][first] - 0.05) / 0.55
-        assert np.ptp(share) > 0.7 and abs(share.mean() - 0.5) < 0.15
-    assert sorted(np.concatenate(many.runs())) == list(range(len(many)))
 
 
 def test_train_writes_model_card_and_picture(small_model):
@@ -180,8 +114,3 @@ def test_data_without_targets_or_with_too_few_rows_is_refused(tmp_path, small_da
     pq.write_table(few, tmp_path / "few.parquet")
     with pytest.raises(TableError, match="11 usable rows; needed are 12"):
         read_dataset(tmp_path / "few.parquet", FEATURES, TARGETS)
-
-
-@pytest.mark.parametrize("name", ["fused", "lssvm", "mlp", "linear"])
-def test_packaged_specs_are_found_by_name(name):
-    assert read_spec(name).regressors

@@ -57,29 +57,6 @@ def test_one_parameter_is_left_as_wide_as_quadrature_says(std):
     assert found == pytest.approx(integrated(bent, std), rel=0.04)
 
 
-def test_a_wheel_that_is_stuck_tells_on_which_outcomes_it_is():
-    samples = line(1000)
-    u = samples.u[:, 0]
-    blind = np.where(u < 0.3, np.nan, 0.0)  # it reads nothing else
-    expected = np.sqrt(0.3 * 0.3**2 + 0.7 * 0.7**2)  # two uniform parts
-    assert remaining_fraction(samples, blind, 1.0) == pytest.approx(expected, rel=0.05)
-    lone = np.where(u == u.min(), np.nan, 0.0)
-    assert remaining_fraction(samples, lone, 1.0, count=1000) == pytest.approx(1.0, rel=0.01)
-
-
-def test_less_noise_never_leaves_more_and_endless_noise_leaves_all():
-    samples = line(800)
-    found = [
-        remaining_fraction(samples, samples.u[:, 0], std)
-        for std in (1e3, 1.0, 0.3, 0.1, 0.03, 0.01)
-    ]
-    assert (
-        found[0] == pytest.approx(samples.remaining_fraction[0], rel=0.02)
-        and found[0] <= samples.remaining_fraction[0]
-    )
-    assert (np.diff(found) < 0).all()
-
-
 @pytest.mark.slow
 def test_rows_of_the_wheel_are_left_as_by_brute_force(model_file):
     """Against importance sampling with twenty times the samples, simulated readings apart."""

@@ -7,7 +7,6 @@ import pytest
 
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Noise
-from soilml.errors import FitError
 from soilml.experiment_design import samples_of_prior
 from soilml.experiment_design.transfer_tests import advise_transfer
 from soilml.fitting.coordinates import select_free
@@ -64,11 +63,3 @@ def test_each_school_finds_its_own_test_where_no_model_is_used(model_file):
         # without cohesion all forces are in proportion to gravity, and so is the pull
         assert found.best_scaled.load == pytest.approx(load)
         assert max(found.best_scaled.scaled_error, found.least_std) < 1e-6 * LOAD
-
-
-def test_tests_that_are_not_carried_are_counted_or_refused(model_file):
-    (case, samples), moon = toy(model_file), GravityChange(EARTH, MOON)
-    found = advise_transfer(case, samples, moon, LOAD, loads=[LOAD, 5e4])
-    assert found.excluded == 1 and all(test.load < 5e4 for test in found.tests)
-    with pytest.raises(FitError, match="do not carry"):
-        advise_transfer(case, samples, moon, 5000.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
+from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.surface_sampling import normal_sample, surface_sample
 from soilml.numerics.surrogate_density import LogarithmicDensity
 
@@ -58,12 +58,3 @@ def test_samples_are_those_of_the_density_over_the_variables():
     ends = np.asarray([0.03, 0.5, 0.97])
     off = (quick.quantiles(quick.u, ends) - whole.quantiles(whole.u, ends)) / std
     assert np.abs(off).max() < 0.2
-
-
-def test_samples_move_there_and_back():
-    logs = LogarithmicDensity(Valley(), RATIO)
-    sample = ImportanceSample(np.random.default_rng(1).random((8, 3)), np.full(8, 0.125), -1.0)
-    there = logs.forth(sample)
-    assert (there.u[:, 0] > sample.u[:, 0]).all()  # logarithms are larger fractions
-    np.testing.assert_allclose(logs.back(there).u, sample.u, atol=1e-12)
-    assert there.evidence == sample.evidence and there.weights is sample.weights

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import truncnorm
 
-from soilml.numerics.prior import UNIFORM_PRECISION, Prior
+from soilml.numerics.prior import Prior
 
 U = np.linspace(0.001, 0.999, 41)
 
@@ -28,16 +28,3 @@ def test_the_rate_is_the_derivative_of_the_quantile(prior, expected):
     h = 1e-6
     numerical = (prior.at(U + h) - prior.at(U - h)) / (2.0 * h)
     assert prior.rate(U) == pytest.approx(numerical, rel=1e-5)
-
-
-def test_the_ends_are_the_bounds():
-    prior = Prior.normal(0.2)
-    assert prior.at(np.asarray([0.0, 1.0])) == pytest.approx([-0.8, 0.8])
-    assert prior.fraction(-9.0) == 0.0 and prior.fraction(9.0) == 1.0
-
-
-def test_a_fraction_precision_gives_the_standard_deviation_back():
-    for prior in (Prior.normal(0.2), Prior.half_normal(0.2)):
-        rate = prior.rate(np.asarray([0.5]))[0]
-        assert rate / np.sqrt(prior.fraction_precision) == pytest.approx(prior.std)
-    assert Prior(0.1, 0.9).fraction_precision == UNIFORM_PRECISION

@@ -23,15 +23,6 @@ def test_finds_every_root_of_a_batch_of_steep_and_flat_functions():
         assert abs(root.x[i] - exact) < 1e-9
 
 
-def test_without_a_root_the_search_ends_at_the_upper_bound_unconverged():
-    top = np.asarray([0.5, -0.5])
-    root = rising_root(
-        lambda x: np.minimum(x, top), np.full(2, -9.0), np.full(2, 3.0), np.zeros(2) - 1, np.ones(2)
-    )
-    assert root.converged.tolist() == [True, False]
-    assert root.x[1] == 3.0
-
-
 def test_the_bracket_is_that_of_the_first_of_several_crossings():
     grid = np.linspace(0.1, 9.0, 200)[:, None]
     low, high, exists, _ = first_bracket(lambda x: np.sin(x) - 0.5, grid)
@@ -40,10 +31,3 @@ def test_the_bracket_is_that_of_the_first_of_several_crossings():
     _, _, exists, peak = first_bracket(lambda x: np.sin(x) - 1.5, grid)
     assert not exists.any()
     assert abs(np.sin(grid[peak[0], 0]) - 1.0) < 1e-3
-
-
-def test_the_peak_is_that_before_the_crossing():
-    grid = np.linspace(0.1, 9.0, 200)[:, None]
-    low, _, exists, peak = first_bracket(lambda x: np.sin(x) + 0.1 * x - 1.2, grid)
-    assert exists.all() and low[0] > 6.0
-    assert abs(grid[peak[0], 0] - np.pi / 2) < 0.2

@@ -26,24 +26,12 @@ def test_products_of_the_columns_are_the_covariance():
     assert columns @ columns.T == pytest.approx(covariance(points, amplitude), abs=1e-4)
 
 
-def test_a_load_twice_as_large_is_as_far_wherever_it_begins():
-    slip, load = np.zeros(4), np.asarray([10.0, 20.0, 100.0, 200.0])
-    products = process_columns(slip_load_points(slip, load, 0.3, 0.6))
-    correlation = products @ products.T
-    assert correlation[0, 1] == pytest.approx(np.exp(-0.5 * (np.log(2.0) / 0.6) ** 2))
-    assert correlation[2, 3] == pytest.approx(correlation[0, 1])
-
-
 def test_many_points_are_represented_by_few():
     rng = np.random.default_rng(2)
     points = slip_load_points(rng.uniform(0, 0.8, 400), rng.uniform(20, 80, 400), 0.3, 0.6)
     columns = process_columns(points)
     assert columns.shape[1] <= MOST_CENTRES
     assert np.abs(columns @ columns.T - covariance(points, np.ones(400))).max() < 1e-3
-
-
-def test_no_points_have_no_columns():
-    assert process_columns(np.zeros((0, 2))).shape == (0, 0)
 
 
 def test_independent_errors_are_no_smaller_than_the_process_in_any_combination():

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.surface_sampling import surface_sample
 
 pytestmark = pytest.mark.slow
@@ -67,36 +66,3 @@ def test_a_kink_in_the_posterior_is_left_to_sampling_of_the_model():
     assert surface_sample(Bent(1e-3, kink=2.0), 2) is None
     smooth_elsewhere = Bent(1e-3, truth=(0.2, 0.3), kink=2.0)  # the posterior is far from the kink
     assert surface_sample(smooth_elsewhere, 2) is not None
-
-
-def test_an_edge_in_the_posterior_is_left_to_sampling_of_the_model():
-    assert surface_sample(Bent(0.05, missing=0.605), 2) is None
-    assert surface_sample(Bent(0.01, missing=0.9), 2) is not None
-    nowhere = Bent(0.05)
-    nowhere.missing = -1.0
-    assert surface_sample(nowhere, 2) is None
-
-
-class ExponentialTails:
-    """Two independent exponential distributions of the mean 0.02."""
-
-    def predict(self, u):
-        return u
-
-    def of_predictions(self, y):
-        return -(y / 0.02).sum(axis=1)
-
-
-def test_a_long_tail_widens_the_region():
-    sample = surface_sample(ExponentialTails(), 2)
-    assert sample.mean(sample.u) == pytest.approx([0.02, 0.02], rel=0.1)
-    beyond = sample.weights[sample.u[:, 0] > 0.02 * 5.0].sum()
-    assert beyond == pytest.approx(np.exp(-5.0), rel=0.5)
-
-
-def test_a_start_that_is_off_is_left():
-    density = Bent(1e-3)
-    start = importance_sample(Bent(5e-3, truth=(0.63, 0.33)), 2)
-    sample = surface_sample(density, 2, start)
-    mean, covariance, _ = moments_by_grid(Bent(1e-3), (0.6, 0.3), 0.03)
-    assert np.abs(sample.mean(sample.u) - mean).max() < 0.1 * np.sqrt(np.diag(covariance)).min()

@@ -1,7 +1,5 @@
 """Errors that all rows of a set share, of the sensors and of the model."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from conftest import simulated_run
@@ -10,12 +8,9 @@ from soilml.errors import InputError
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import (
     COMMON_ERROR_INPUTS,
-    ERROR_COLUMNS,
     INFERRED,
     MODEL_ERROR_INPUT,
-    SENSOR_ERROR_COLUMNS,
 )
-from soilml.onboard.set_posterior import error_columns
 from soilml.physics.operating_point import Operating
 
 #: Sensors without errors that all readings share.
@@ -47,31 +42,6 @@ def test_noise_of_slip_and_load_increases_the_covariance(estimator, wheel_poster
     declared = exact.on(noise={name: (0.0, share)}).run(**run)
     assert declared.mean == pytest.approx(noisy.mean, rel=1e-5)
     assert declared.std == pytest.approx(noisy.std, rel=1e-5)
-
-
-def test_a_common_error_must_be_a_standard_deviation(estimator):
-    for value in (-0.1, np.nan, np.inf):
-        with pytest.raises(InputError, match=r"slip_bias is .*; needed is a standard deviation"):
-            estimator.on(slip_bias=value)
-
-
-def test_a_file_that_takes_slip_as_exact_says_so(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 4)
-    old = replace(estimator, sets=replace(estimator.sets, common_errors={}, error_columns=1))
-    with pytest.raises(InputError, match=r"slip_std is 0.02, but this file takes slip"):
-        old.run(**run, slip_std=0.02)
-    with pytest.raises(InputError, match=r"torque_gain is 0.05, but this file"):
-        old.on(torque_gain=0.05)
-    with pytest.raises(InputError, match=r"slip is 0.02, but this file"):
-        old.on(noise={"slip": (0.02, 0.0)})
-    assert old.on(**EXACT).start().system.shape == (0, estimator.sets.terms + 1)
-
-
-def test_a_mean_next_to_an_end_of_the_prior_is_at_the_edge(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 32, x=(0.0, -0.97, 0.0))
-    assert estimator.on(**EXACT).run(**run).at_edge[1]
-    run, _ = simulated_run(wheel_posterior, 32, x=(0.0, 0.0, 0.0))
-    assert not estimator.on(**EXACT).run(**run).at_edge[1]
 
 
 def wrong_runs(posterior, effect=None, bearing: float = 1.0, count: int = 120, channels=False):
@@ -112,16 +82,6 @@ def test_intervals_hold_where_the_bearing_is_another(estimator, wheel_posterior)
     assert usual.min() > 0.7
 
 
-@pytest.mark.slow
-def test_intervals_hold_where_the_soil_sinks_with_slip(estimator, wheel_posterior):
-    from soilml.physics.effects.slip_sinkage import SlipSinkage
-
-    runs = list(wrong_runs(wheel_posterior, SlipSinkage(n1=0.25)))
-    right, usual = (share_held(estimator.on(model_error=size), runs) for size in (0.0, 1.0))
-    assert right[0] < 0.5
-    assert usual.min() > 0.75
-
-
 def test_a_model_with_errors_increases_the_covariance(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 16)
     exact = estimator.on(**EXACT)
@@ -138,18 +98,6 @@ def test_the_size_of_the_errors_of_the_model_is_inferred_unless_told(estimator, 
     assert (estimator.run(**run).std > estimator.on(model_error=0.0).run(**run).std).all()
 
 
-@pytest.mark.slow
-def test_the_answer_widens_with_the_errors_that_the_readings_show(estimator, wheel_posterior):
-    """From all channels, which show how wrong a model is."""
-    widths = []
-    for bearing in (1.0, 0.4):
-        runs = wrong_runs(wheel_posterior, bearing=bearing, channels=True)
-        found = [estimator.run(**run) for run, _ in runs]
-        assert all(one.in_range for one in found)
-        widths.append(np.mean([one.std for one in found], axis=0))
-    assert (widths[1] > 1.1 * widths[0]).all()
-
-
 def test_a_stream_has_the_errors_of_its_model(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 24)
     usual = estimator.on(model_error=1.0)
@@ -162,19 +110,3 @@ def test_a_stream_has_the_errors_of_its_model(estimator, wheel_posterior):
     assert found.std == pytest.approx(together.std, rel=0.25)
     with pytest.raises(InputError, match="this memory is of"):
         estimator.step(memory, **run)
-
-
-def test_a_file_of_an_earlier_version_says_that_its_model_is_right(estimator):
-    sensors = {k: v for k, v in estimator.sets.common_errors.items() if k != MODEL_ERROR_INPUT}
-    old = replace(estimator, sets=replace(estimator.sets, common_errors=sensors))
-    with pytest.raises(
-        InputError, match="model_error is 1, but this file takes its model as right"
-    ):
-        old.on(model_error=1.0)
-    assert MODEL_ERROR_INPUT not in old.on(model_error=0.0).sets.common_errors
-    assert error_columns({"errors": sensors}) == len(SENSOR_ERROR_COLUMNS)
-    assert estimator.sets.error_columns == len(ERROR_COLUMNS)
-    assert error_columns({}) == 1
-    for value in (-0.5, np.nan):
-        with pytest.raises(InputError, match=r"model_error is .*; needed is a standard deviation"):
-            estimator.on(model_error=value)

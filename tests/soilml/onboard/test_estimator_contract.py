@@ -2,10 +2,7 @@
 
 import copy
 import pickle
-import subprocess
-import sys
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -106,18 +103,6 @@ def test_stacked_and_fused_estimates_keep_the_reasons(whole):
         fuse_estimates([one, 3])
 
 
-def test_the_numbers_of_the_reasons_are_fixed():
-    assert [reason.value for reason in Reason] == [0, 1, 2, 3, 4]
-    assert all(reason.words for reason in Reason)
-
-
-def test_every_parameter_abstains_by_itself(whole):
-    found = whole.run(**many(2))
-    assert found.in_range
-    np.testing.assert_array_equal(found.abstains, found.std > 0.8 * whole.prior.std)
-    assert found.abstains.any() and not found.abstains.all()
-
-
 def test_memory_never_has_more_rows_than_columns(whole):
     exact = whole.on(**EXACT)
     columns, memory = exact.sets.columns, exact.start()
@@ -129,17 +114,6 @@ def test_memory_never_has_more_rows_than_columns(whole):
     once = exact.run(**rows)
     assert (np.abs(found.mean - once.mean) < 0.05 * once.std).all()
     assert found.misfit == pytest.approx(once.misfit, rel=0.05)
-
-
-def test_memory_of_thousands_of_steps_keeps_its_precision(whole):
-    rows, whole = many(3000), whole.on(**EXACT)
-    memory = whole.start()
-    for first in range(0, 3000, 10):
-        part = {name: values[first : first + 10] for name, values in rows.items()}
-        _, memory = whole.step(memory, **part)
-    _, full = whole.sets.update(whole.session, whole.sets.rows(rows), whole.start())
-    expected, found = full.system.T @ full.system, memory.system.T @ memory.system
-    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
 
 
 def test_the_memory_of_another_file_or_wheel_is_refused(whole, any_set_file, wheel_set_file):
@@ -173,19 +147,6 @@ def test_a_changed_memory_is_refused(whole, change, said):
     assert said in line_of(error)
 
 
-def test_a_memory_can_be_copied_and_continued(whole):
-    _, memory = whole.step(whole.start(), **ONE)
-    found, _ = whole.step(copy.deepcopy(memory), **ONE)
-    assert found.rows_used == 2
-
-
-def test_a_memory_for_other_errors_of_the_sensors_is_refused(whole):
-    _, memory = whole.step(whole.start(), **ONE)
-    with pytest.raises(InputError, match="prior or error of sensors") as error:
-        whole.on(slip_bias=0.03).step(memory, **ONE)
-    assert line_of(error)
-
-
 def test_copies_work_and_pickles_are_refused_in_one_line(whole):
     for twin in (copy.copy(whole), copy.deepcopy(whole)):
         np.testing.assert_array_equal(twin.run(**ROWS).mean, whole.run(**ROWS).mean)
@@ -207,13 +168,6 @@ def test_a_reading_of_a_wrong_type_is_refused(whole, name, value):
     if name in whole.inputs:
         with pytest.raises(InputError, match=f"{name} is "):
             whole(**ONE | {name: value})
-
-
-@pytest.mark.parametrize("value", [Fraction(3, 10), np.float16(0.3), np.asarray([[0.3]], object)])
-def test_real_numbers_of_any_type_are_read(whole, value):
-    expected = 0.3 if not isinstance(value, np.float16) else float(value)
-    found = whole(**ONE | {"slip": value})
-    np.testing.assert_allclose(found.mean.ravel(), whole(**ONE | {"slip": expected}).mean)
 
 
 WRONG_CALLS = {
@@ -245,31 +199,3 @@ def test_a_wrong_argument_is_refused_in_one_line(any_set_file, whole, what):
         call(estimator)
     assert type(error.value).__module__ == "soilml.errors"
     assert said in line_of(error)
-
-
-def test_a_file_without_set_posterior_takes_no_noise(pooling):
-    with pytest.raises(InputError, match="has no set posterior: it takes no wheel and no noise"):
-        pooling.on(noise={"torque": (0.1, 0.0)})
-
-
-def test_chunks_of_single_readings_are_one_answer(pooling, monkeypatch):
-    rows = many(1000)
-    expected = pooling(**rows)
-    monkeypatch.setattr("soilml.onboard.estimator.ROWS_PER_CALL", 64)
-    found = pooling(**rows)
-    for name in ("mean", "std", "covariance", "in_range"):
-        np.testing.assert_allclose(getattr(found, name), getattr(expected, name), rtol=1e-6)
-    assert pooling(slip=[], torque=[], load=[]).mean.shape == (0, 3)
-
-
-def test_many_single_readings_need_little_memory(small_model):
-    code = (
-        "import resource, sys, numpy as np; from soilml.onboard import Estimator;"
-        "e = Estimator.load(sys.argv[1]); e(slip=np.full(10, 0.3), torque=3.0, load=60.0);"
-        "used = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024; before = used();"
-        "e(slip=np.linspace(0.1, 0.5, 200_000), torque=3.0, load=60.0); print(used() - before)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, small_model], capture_output=True, text=True, check=True
-    )
-    assert float(done.stdout) < 150.0  # MB; 200 000 rows of answers and readings are 50

@@ -109,9 +109,3 @@ def test_the_interval_of_repeated_readings_is_widened_by_their_number():
     mean, std = np.asarray([0.5]), np.asarray([0.4])
     ends = [rule.interval(mean, std, count)[1][0] - 0.5 for count in (1.0, 4.0, 16.0, 99.0)]
     assert np.asarray(ends) / ends[0] == pytest.approx([1.0, 1.25, 1.5, 1.5])
-
-
-def test_the_same_file_is_equal_to_itself_alone():
-    first, second = Sensors().files()
-    assert first == Sensors().files()[0]
-    assert first != second and first != "first" and len({first, second, first}) == 2

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from soilml.errors import InputError
 from soilml.onboard.fusion_rules import (
     RULES,
     best_linear,
-    covariance_intersection,
     inverse_variance,
     pairwise,
     shrink_correlation,
@@ -93,21 +91,9 @@ def test_the_default_is_calibrated_whatever_the_correlation():
         assert covered(best_linear, correlation) == pytest.approx(0.90, abs=0.015)
 
 
-def test_covariance_intersection_never_claims_too_much():
-    for correlation in (0.0, 0.5, 0.95, 0.999):
-        assert covered(covariance_intersection, correlation) >= 0.89
-
-
 def test_shrinking_keeps_a_correlation_matrix():
     R = np.asarray([[1.0, 0.99, 0.5], [0.99, 1.0, 0.6], [0.5, 0.6, 1.0]])
     small = shrink_correlation(R, 0.3)
     np.testing.assert_allclose(np.diag(small), 1.0)
     assert np.linalg.eigvalsh(small).min() > np.linalg.eigvalsh(R).min()
     assert shrink_correlation(np.eye(1)).tolist() == [[1.0]]
-
-
-@pytest.mark.parametrize("rule", RULES.values())
-@pytest.mark.parametrize("std", [0.0, np.nan])
-def test_an_estimate_without_an_uncertainty_is_not_fused(rule, std):
-    with pytest.raises(InputError, match="a standard deviation is"):
-        rule(np.array([[1.0], [2.0]]), np.array([[std], [1.0]]))

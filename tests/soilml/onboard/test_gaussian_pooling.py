@@ -7,7 +7,6 @@ import pytest
 
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import (
-    PoolingCalibration,
     PoolingRule,
     RunConditions,
     RunPattern,
@@ -41,23 +40,6 @@ def test_pooling_is_exact_where_everything_is_gaussian():
     )
     np.testing.assert_allclose(joint.covariance, np.linalg.inv(total), rtol=0.02, atol=1e-3)
     np.testing.assert_allclose(joint.mean, np.linalg.solve(total, right), rtol=0.02, atol=0.02)
-
-
-def test_rows_without_information_leave_the_prior():
-    prior = wide(np.zeros(2), np.ones(2))
-    joint = pool(np.zeros((9, 2)), np.tile(np.eye(2), (9, 1, 1)), prior, np.ones(9))
-    np.testing.assert_allclose(joint.mean, 0.0, atol=1e-12)
-    np.testing.assert_allclose(np.sqrt(np.diag(joint.covariance)), 1.0, rtol=0.01)
-
-
-def test_rows_that_contradict_each_other_are_inconsistent():
-    prior = wide(np.zeros(2), np.ones(2))
-    sure = np.tile(np.diag([0.01, 1.0]), (2, 1, 1))
-    agreeing = pool(np.asarray([[0.5, 0.0], [0.55, 0.0]]), sure, prior, np.ones(2))
-    contradictory = pool(np.asarray([[-0.9, 0.0], [0.9, 0.0]]), sure, prior, np.ones(2))
-    assert agreeing.inconsistency[0] < 1.0 < 50.0 < contradictory.inconsistency[0]
-    outside = pool(np.asarray([[2.9, 0.0], [2.9, 0.0]]), sure, prior, np.ones(2))
-    assert outside.inconsistency[1] > 0.5 > agreeing.inconsistency[1] == 0.0
 
 
 def pattern(*varies):
@@ -100,50 +82,6 @@ def test_rows_of_the_same_conditions_count_once():
     assert BOX.row_weights(again).sum() == pytest.approx(BOX.row_weights(free).sum())
 
 
-def test_variation_runs_from_steady_to_that_of_the_training_rows():
-    rng = np.random.default_rng(0)
-    full = {"slip": rng.uniform(0.0, 0.5, 4000), "load": np.full(4000, 60.0)}
-    slip, load = BOX.variation(full, np.ones(4000))
-    assert slip > 0.99 and load == 0.0
-    half = {"slip": 0.5 * full["slip"], "load": full["load"]}
-    assert BOX.variation(half, np.ones(4000))[0] == pytest.approx(0.5, abs=0.03)
-    assert (BOX.variation({"slip": np.ones(1), "load": np.ones(1)}, np.ones(1)) == 0.0).all()
-
-
-def test_the_rule_of_a_run_is_interpolated_between_patterns():
-    alone = {
-        name: np.asarray(values)
-        for name, values in {
-            "rows": [1.0],
-            "information": [1.0],
-            "std_scale": [[1.0]],
-            "coverage_factor": [[1.6]],
-        }.items()
-    }
-    patterns = (
-        RunPattern((False, False), **alone),
-        *(pattern(*varies) for varies in ((False, True), (True, False), (True, True))),
-    )
-    calibration = PoolingCalibration(BOX, patterns, np.asarray([1.6]), np.asarray([5.0, 0.2]))
-    prior = wide(np.zeros(1), np.ones(1))
-
-    def pooled_run(slip, load):
-        rule = calibration.rule({"slip": np.asarray(slip), "load": np.asarray(load)})
-        m = len(slip)
-        return rule, pool_within_prior(np.full((m, 1), 0.5), np.full((m, 1, 1), 0.5), prior, rule)
-
-    steady, one = pooled_run([0.2] * 30, [60.0] * 30)
-    assert steady.weights.sum() == pytest.approx(1.0)
-    assert (steady.std_scale[0], steady.coverage_factor[0]) == (1.0, 1.6)
-    assert one.covariance[0, 0] == pytest.approx(0.5)  # thirty times the same: once
-    spread, _ = pooled_run([0.0, 0.5, 0.0, 0.5], [20.0, 20.0, 120.0, 120.0])
-    assert spread.weights == pytest.approx(0.5)
-    assert spread.std_scale[0] == 2.0
-    drifting, _ = pooled_run([0.1, 0.15, 0.2, 0.25], [60.0] * 4)
-    assert 1.0 < drifting.weights.sum() < 2.0
-    assert 1.0 < drifting.std_scale[0] < 2.0
-
-
 def test_factors_scale_the_covariance_up_to_the_prior():
     prior = wide(np.zeros(2), np.ones(2))
     row = np.asarray([[0.2, 0.03], [0.03, 0.6]])
@@ -156,10 +94,3 @@ def test_factors_scale_the_covariance_up_to_the_prior():
     narrower = replace(rule, std_scale=np.asarray([0.5, 0.5]))
     found = pool_within_prior(mean[None], row[None], prior, narrower)
     assert found.covariance == pytest.approx(0.25 * row, rel=1e-6)
-
-
-def test_a_pattern_is_named_by_the_conditions_that_vary():
-    calibration = PoolingCalibration(BOX, (), np.asarray([1.6]), np.asarray([5.0, 0.2]))
-    varies = ((False, False), (True, False), (False, True), (True, True))
-    names = [calibration.label(pattern(*each)) for each in varies]
-    assert names == ["steady", "slip free", "load free", "slip and load free"]

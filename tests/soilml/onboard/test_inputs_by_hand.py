@@ -7,14 +7,6 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.gaussian_pooling import (
-    PoolingCalibration,
-    PoolingRule,
-    RunConditions,
-    RunPattern,
-    pool_run,
-    pool_within_prior,
-)
 from soilml.onboard.multi_sensor import (
     SAME_PRIOR,
     fuse_estimates,
@@ -88,26 +80,6 @@ def test_the_weighted_logarithm_of_torques_with_constant_noise_has_no_bias(const
     assert abs(after) < 0.1 * before
 
 
-@pytest.mark.parametrize("name, value, said", [
-    ("torque_std", 0.0, "it must be above zero"),
-    ("sinkage_std", -1.0, "it must be above zero"),
-    ("torque_bias", -1e-9, "it must be zero or more"),
-])  # fmt: skip
-def test_impossible_standard_deviations_are_refused(name, value, said):
-    with pytest.raises(InputError, match=said):
-        SETS.rows(ROWS | {name: value, "sinkage": 0.01})
-    assert SETS.rows(ROWS | {"torque_bias": 0.0})["torque_bias"].tolist() == [0.0, 0.0]
-
-
-def test_a_noise_is_two_numbers_of_zero_or_more():
-    for wrong in ((-0.1, 0.0), (0.0, np.inf), (0.1,), 0.1):
-        with pytest.raises(InputError, match=r"noise of torque is .*; needed are two numbers"):
-            SETS.with_context({}, {"torque": wrong})
-    with pytest.raises(InputError, match="noise of height"):
-        SETS.with_context({}, {"height": (0.0, 0.1)})
-    assert SETS.with_context({}, {"torque": (0.0, 0.0)}).noise["torque"] == (0.0, 0.0)
-
-
 PRIOR = PriorSummary(
     np.asarray([1.0, 10.0]),
     np.asarray([0.5, 4.0]),
@@ -152,91 +124,3 @@ def test_priors_must_agree_to_a_hundredth_of_their_spread():
                 fuse_estimates([one, other])
         else:
             assert fuse_estimates([one, other]).estimate.in_range
-
-
-def test_an_estimate_of_no_rows_is_empty_and_its_errors_are_not_shown():
-    none = Estimate.from_prior(("a", "b"), ("1", "1"), PRIOR, (0,))
-    assert none.mean.shape == (0, 2) and none.covariance.shape == (0, 2, 2)
-    for shape in ((-1,), (1.5,)):
-        with pytest.raises(InputError, match="whole numbers of zero or more"):
-            Estimate.from_prior(("a", "b"), ("1", "1"), PRIOR, shape)
-    assert "errors" not in repr(none)
-
-
-CONDITIONS = RunConditions(("slip",), np.asarray([0.0]), np.asarray([0.5]), np.asarray([0.1]))
-
-
-def calibration(limit=9.0):
-    pattern = RunPattern(
-        varies=(False,),
-        rows=np.asarray([1.0, 4.0]),
-        information=np.asarray([1.0, 1.0]),
-        std_scale=np.full((2, 2), 1.2),
-        coverage_factor=np.full((2, 2), 1.5),
-    )
-    free = replace(pattern, varies=(True,))
-    limits = np.full(2, limit)
-    return PoolingCalibration(CONDITIONS, (pattern, free), np.asarray([1.7, 1.8]), limits)
-
-
-def test_a_run_is_pooled_unless_more_than_half_is_out_of_range():
-    slip = np.linspace(0.05, 0.45, 20)
-    mean, std = np.tile([1.2, 9.0], (20, 1)), np.tile([0.2, 2.0], (20, 1))
-    for out, pooled in ((2, True), (10, True), (11, False)):
-        single = estimates(mean, std, np.arange(20) >= out)
-        found = pool_run(single, {"slip": slip}, calibration())
-        assert (found.rows_used, found.rows_set_aside) == (20 - out, out)
-        assert found.in_range == pooled
-        if not pooled:
-            assert found.mean == pytest.approx(PRIOR.mean) and found.reason == Reason.OUT_OF_RANGE
-    single = estimates(mean, std, np.arange(20) >= 2)
-    rows = {"slip": slip[2:]}
-    rule = calibration().rule(rows)
-    assert rule.std_scale == pytest.approx(np.full(2, 1.2))
-    expected = pool_within_prior(mean[2:], single.covariance[2:], PRIOR, rule)
-    found = pool_run(single, {"slip": slip}, calibration())
-    assert found.mean == pytest.approx(expected.mean)
-    half = 1.5 * np.sqrt(np.diag(expected.covariance))
-    assert found.low == pytest.approx(expected.mean - half)
-
-
-def test_a_run_of_one_row_has_its_own_coverage_and_inconsistent_rows_give_the_prior():
-    single = estimates([[1.0, 9.0]], [[0.1, 1.0]], [True])
-    found = pool_run(single, {"slip": np.asarray([0.2])}, calibration())
-    assert found.low == pytest.approx([1.0 - 1.7 * 0.1, 9.0 - 1.8])
-    apart = estimates([[0.2, 9.0], [1.8, 9.0]], [[0.1, 1.0]] * 2, [True, True])
-    slip = {"slip": np.asarray([0.1, 0.4])}
-    found = pool_run(apart, slip, calibration())
-    assert found.reason == Reason.INCONSISTENT and not found.in_range and found.rows_used == 2
-    assert pool_run(apart, slip, calibration(limit=1e6)).in_range
-
-
-def test_a_scaled_spread_is_at_most_that_of_the_prior():
-    covariance = np.asarray([np.diag([0.4**2, 1.0])])
-    rule = PoolingRule(np.ones(1), np.full(2, 1.5), np.ones(2))
-    found = pool_within_prior(np.asarray([[1.0, 9.0]]), covariance, PRIOR, rule)
-    assert np.sqrt(np.diag(found.covariance)) == pytest.approx([0.5, 1.5], rel=2e-3)
-
-
-def test_spreads_of_several_runs_are_scaled_each_by_its_own():
-    spread = np.asarray([[0.4, 1.0], [0.1, 3.0], [0.2, 2.0]])
-    covariance = (spread[..., None] ** 2 * np.eye(2))[:, None]
-    rule = PoolingRule(np.ones((3, 1)), np.full((3, 2), 1.5), np.ones((3, 2)))
-    found = pool_within_prior(np.tile([1.0, 9.0], (3, 1, 1)), covariance, PRIOR, rule)
-    std = np.sqrt(np.diagonal(found.covariance, axis1=1, axis2=2))
-    assert std == pytest.approx(np.minimum(1.5 * spread, PRIOR.std), rel=5e-3)
-
-
-def test_a_fused_mean_stays_within_the_prior():
-    near = estimates([[1.97, 17.9], [0.03, 2.1]], [[0.1, 1.0]] * 2, [True, True])
-    found = fuse_estimates([near] * 4, "prior-once").estimate
-    assert found.mean == pytest.approx(np.asarray([PRIOR.upper, PRIOR.lower]))
-    assert found.high[0] == pytest.approx(PRIOR.upper)
-    assert found.low[1] == pytest.approx(PRIOR.lower)
-
-
-def test_an_estimate_draws_a_panel_for_each_quantity():
-    axes = estimates([[1.0, 9.0], [1.2, 9.5]], [[0.1, 1.0]] * 2, [True, True]).plot()
-    assert [ax.get_title(loc="left") or ax.get_xlabel() or ax.get_ylabel() for ax in axes]
-    words = [" ".join(t.get_text() for t in ax.findobj() if hasattr(t, "get_text")) for ax in axes]
-    assert len(axes) == 2 and "a" in words[0].split() and "b" in words[1].split()

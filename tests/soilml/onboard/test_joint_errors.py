@@ -1,11 +1,8 @@
 """Fusion by the correlation of the errors that files carry, on simulated errors."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.joint_errors import joint_errors
@@ -127,55 +124,6 @@ def test_repeated_readings_share_the_error_of_the_soil(count):
     assert cover(fuse_estimates(each, "prior-once").estimate, truth) < 0.82
 
 
-def test_repeated_readings_of_both_sensors():
-    sensors = Sensors(common=0.4, soil=0.6)
-    files = sensors.files()
-    truth, mean, std = sensors.draw(20000, 8)
-    once = [estimate(mean[i, 0], std[i, 0], files[i]) for i in range(2)]
-    eight = [estimate(mean[i, k], std[i, k], files[i]) for i in range(2) for k in range(8)]
-    fused = fuse_estimates(eight).estimate
-    assert rmse(fused, truth) < 0.95 * rmse(fuse_estimates(once).estimate, truth)
-    assert cover(fused, truth) == pytest.approx(0.9, abs=0.02)
-    assert z_rms(fused, truth) == pytest.approx(1.0, abs=0.05)
-
-
-def test_a_sensor_that_only_harms_is_not_used():
-    """Its std claims far more than its errors allow: weights by variance would follow it."""
-    sensors = Sensors(common=0.0, sizes=(0.05, 0.4))
-    files = sensors.files()
-    boastful = replace(files[1], std=files[1].std / 10.0, key="boastful")
-    assert joint_errors((files[0], boastful))[0].alone == 0
-    _, mean, std = sensors.draw(5000)
-    each = [
-        estimate(mean[0, 0], std[0, 0], files[0]),
-        estimate(mean[1, 0], std[1, 0] / 10.0, boastful),
-    ]
-    fused = fuse_estimates(each)
-    kept = fused.used.all(axis=0)
-    np.testing.assert_array_equal(fused.estimate.mean[kept], each[0].mean[kept])
-
-
-def test_shrunk_estimates_are_not_shrunk_twice():
-    """Two posterior means, each drawn halfway to the prior, with independent noise."""
-    rng = np.random.default_rng(3)
-
-    def readings(rows):
-        truth = rng.normal(0.3, 0.2, rows)
-        noisy = truth + 0.2 * rng.normal(size=(2, rows))
-        return truth, 0.3 + 0.5 * (noisy - 0.3), np.full((2, rows), 0.2 / np.sqrt(2.0))
-
-    truth, mean, std = readings(ROWS)
-    head = Sensors().files()[0].entry()
-    files = [
-        HeldOutErrors.of(head | {"truth": truth, "mean": mean[i], "std": std[i]}) for i in range(2)
-    ]
-    assert joint_errors(tuple(files))[0].gain == pytest.approx(4.0 / 3.0, abs=0.05)
-    truth, mean, std = readings(20000)
-    each = [estimate(mean[i], std[i], files[i]) for i in range(2)]
-    exact = (0.2**-2 + 2.0 * 0.2**-2) ** -0.5
-    assert rmse(fuse_estimates(each).estimate, truth) == pytest.approx(exact, rel=0.02)
-
-
 def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_deviations():
     files = Sensors().files()
     near, far, contradictory = (
@@ -193,17 +141,6 @@ def test_readings_that_disagree_widen_the_estimate_and_contradict_beyond_four_de
     assert not contradictory.used.any()
 
 
-def test_estimates_of_different_loads_are_refused():
-    files = Sensors().files()
-    at = [
-        replace(estimate([0.3, 0.3], 0.05, f), load=np.asarray([20.0, load]))
-        for f, load in zip(files, (21.0, 40.0), strict=False)
-    ]
-    with pytest.raises(InputError, match=r"loads 21 N and 40 N"):
-        fuse_estimates(at)
-    assert fuse_estimates([at[0], at[0]]).estimate.in_range.all()
-
-
 def test_what_a_file_carries_is_read_back_as_it_was_written():
     file = Sensors().files()[0]
     again = HeldOutErrors.of(file.entry())
@@ -218,13 +155,3 @@ def test_what_a_file_carries_is_read_back_as_it_was_written():
     for damage in ({"std": file.std - 1.0}, {"truth": [0.1]}, {"repeats": [2, 8]}):
         with pytest.raises(ValueError):
             HeldOutErrors.of(file.entry() | damage)
-
-
-def test_repetition_scales_both_ends_of_the_interval():
-    (errors,) = joint_errors(tuple(Sensors().files()))
-    mean, std = np.asarray([0.2, 0.4]), np.asarray([0.05, 0.02])
-    wide = replace(errors, repeats=float(REPEATS), repeat_interval=0.5)
-    single, half = wide.interval(mean, std), wide.interval(mean, std, count=REPEATS)
-    for end, near in zip(single, half, strict=True):
-        np.testing.assert_allclose(near - mean, 0.5 * (end - mean), rtol=1e-12)
-    assert (single[0] < mean).all() and (single[1] > mean).all()

@@ -9,7 +9,6 @@ from compiled_c import ROOT
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.errors import ModelFileError
 from soilml.onboard import model_file
 from soilml.onboard.model_file import metadata_checksum, released_models, serialise_metadata
 
@@ -107,34 +106,7 @@ def test_a_malformed_entry_is_refused_by_every_command(
     assert {path.name for path in tmp_path.iterdir()} == {"m.onnx", "runs.csv"}
 
 
-def test_a_set_of_a_graph_without_one_is_refused(tmp_path):
-    wheel = onnx.load(ROOT / "exported" / "wheel.onnx")
-    entries = {e.key: e.value for e in wheel.metadata_props if e.key in ("set", "probe")}
-    linear = signed(ROOT / "exported" / "wheel_linear.onnx", tmp_path / "m.onnx", **entries)
-    with pytest.raises(ModelFileError) as caught:
-        Estimator.load(linear)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_file_with_a_set_posterior_needs_no_pooling_of_rows(tmp_path):
-    """As it is trained now; `CHANGES` has the same without the set posterior, which is refused."""
-    entries = put("together", "kinds", [])
-    file = signed(ROOT / "exported" / "wheel.onnx", tmp_path / "m.onnx", **entries)
-    found = Estimator.load(file).run(slip=[0.1, 0.3], torque=[1.5, 2.6], load=60.0)
-    whole = Estimator.load(ROOT / "exported" / "wheel.onnx")
-    expected = whole.run(slip=[0.1, 0.3], torque=[1.5, 2.6], load=60.0)
-    assert found.mean.tolist() == expected.mean.tolist()
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", released_models())
 def test_released_files_signed_again_are_read(tmp_path, name):
     assert Estimator.load(signed(released_models()[name], tmp_path / "m.onnx")).names
-
-
-def test_a_file_of_sets_alone_needs_no_calibration_of_single_rows(tmp_path):
-    """Files for any wheel of the first version have none."""
-    source = released_models()["any_wheel"]
-    entry = json.loads(Estimator.load(source).metadata["together"]) | {"alone": []}
-    old = signed(source, tmp_path / "old.onnx", together=json.dumps(entry))
-    assert Estimator.load(old).sets.sets_only

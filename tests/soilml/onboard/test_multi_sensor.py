@@ -5,7 +5,7 @@ import pytest
 
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary
-from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
+from soilml.onboard.multi_sensor import fuse_estimates
 
 PRIOR = PriorSummary(np.asarray([0.3]), np.asarray([0.15]), np.asarray([-0.3]), np.asarray([0.9]))
 
@@ -49,45 +49,6 @@ def test_the_prior_counts_once():
     assert rms(once.mean[:, 0] - truth) == pytest.approx(exact, rel=0.02)
     inside = (once.low[:, 0] <= truth) & (truth <= once.high[:, 0])
     assert inside.mean() == pytest.approx(0.9, abs=0.01)
-
-
-def test_weighing_by_variance_counts_it_twice_and_is_too_sure():
-    truth, found = posteriors()
-    for rule in ("inverse-variance", "pairwise"):
-        twice = fuse_estimates(found, rule).estimate
-        assert rms((twice.mean[:, 0] - truth) / twice.std[:, 0]) > 1.15
-        assert rms(twice.mean[:, 0] - truth) > rms(
-            fuse_estimates(found).estimate.mean[:, 0] - truth
-        )
-
-
-def test_where_readings_say_far_more_than_the_prior_the_rules_agree():
-    found = [estimate(0.30, 0.002), estimate(0.305, 0.004)]
-    once, paper = (fuse_estimates(found, r).estimate for r in ("prior-once", "inverse-variance"))
-    assert paper.mean[0] == pytest.approx(0.301)  # eq. 26: weight 0.8 and 0.2
-    np.testing.assert_allclose(once.mean, paper.mean, atol=1e-5)
-    np.testing.assert_allclose(once.std, paper.std, rtol=1e-3)
-
-
-def test_whatever_errors_have_in_common_covariance_intersection_is_not_too_sure():
-    same = [estimate(0.4, 0.05)] * 2
-    assert fuse_estimates(same, "covariance-intersection").estimate.std[0] == pytest.approx(0.05)
-
-
-@pytest.mark.parametrize("rule", [rule for rule in ACROSS_FILES if rule != "correlated"])
-def test_what_is_out_of_range_takes_no_part(rule):
-    flags = np.asarray([True, True, False, False]), np.asarray([True, False, True, False])
-    slips = np.full(4, 0.30)
-    both = fuse_estimates(
-        [estimate(slips, 0.05, flags[0]), estimate(0.34 + 0 * slips, 0.05, flags[1])], rule
-    )
-    found = both.estimate
-    np.testing.assert_array_equal(both.used, flags)
-    assert found.in_range.tolist() == [True, True, True, False]
-    np.testing.assert_allclose(found.mean[1:, 0], [0.30, 0.34, 0.30])
-    np.testing.assert_allclose(found.std[1:, 0], [0.05, 0.05, 0.15])
-    np.testing.assert_allclose(found.low[1, 0], 0.30 - 1.7 * 0.05)  # its own interval
-    assert 0.30 < found.mean[0, 0] < 0.34
 
 
 def test_sensors_that_contradict_each_other_give_the_prior():

@@ -9,7 +9,6 @@ from scipy.stats import multivariate_normal
 from datagen.recipe import read_recipe
 from soilml import Estimator, Operating, Table, identify
 from soilml.cli import main
-from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.onboard.estimate import Reason
 from soilml.onboard.narrower_prior import truncated_normal
@@ -50,15 +49,6 @@ def test_moments_are_those_of_draws():
     assert found.mass == pytest.approx(whole, abs=0.003)
 
 
-def test_the_file_s_own_prior_changes_nothing(rover):
-    wide = rover.run(**readings(np.random.default_rng(2), [900.0, 0.6, 0.015], 8))
-    prior = zip(wide.names, wide.prior.lower, wide.prior.upper, strict=True)
-    same = wide.within(**{name: (low, high) for name, low, high in prior})
-    for key in ("mean", "std", "low", "high"):
-        assert getattr(same, key) == pytest.approx(getattr(wide, key))
-    assert same.in_range == wide.in_range and same.reason == wide.reason
-
-
 @pytest.mark.slow
 def test_it_is_nearly_the_posterior_with_that_prior(rover):
     """Errors beside those of the exact posterior, over random soils and boxes."""
@@ -96,30 +86,6 @@ def test_readings_that_contradict_it_are_flagged(rover):
     assert not found.in_range and found.reason == Reason.INCONSISTENT
     assert found["friction_angle"][0] == pytest.approx(0.45)
     assert found.abstains.all()
-
-
-def test_the_prior_becomes_the_narrower_one(rover):
-    found = rover.prior_estimate(2).within(cohesion=(200.0, 800.0))
-    assert found.mean[:, 0] == pytest.approx(500.0)
-    assert found.std[:, 0] == pytest.approx(600.0 / np.sqrt(12.0))
-    assert found.prior.std[0] == pytest.approx(600.0 / np.sqrt(12.0))
-    assert (found.reason == Reason.OUT_OF_RANGE).all()
-
-
-@pytest.mark.parametrize(
-    ("box", "said"),
-    [
-        ({"kphi": (0.0, 1.0)}, "not estimated"),
-        ({"cohesion": (500.0, 100.0)}, "in order"),
-        ({"cohesion": (500.0, 500.0)}, "in order"),
-        ({"cohesion": (0.0, 1e6)}, "within the prior"),
-        ({"cohesion": (0.0, np.nan)}, "cohesion"),
-        ({"cohesion": 100.0}, "two values"),
-    ],
-)
-def test_a_bad_box_is_refused(rover, box, said):
-    with pytest.raises(InputError, match=said):
-        rover.prior_estimate().within(**box)
 
 
 def test_the_command_takes_a_narrower_prior_of_the_case(tmp_path, model_file, capsys, monkeypatch):

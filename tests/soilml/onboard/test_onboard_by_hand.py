@@ -3,15 +3,9 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.quantiles import chi_squared_quantile
-from soilml.onboard.estimate import Estimate, PriorSummary, Reason
-from soilml.onboard.gaussian_pooling import RunConditions
+from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.narrower_prior import (
     within_box,
-)
-from soilml.onboard.tracking.misfit import (
-    chi_squared_limit,
-    over_median,
 )
 
 PRIOR = PriorSummary(
@@ -20,17 +14,6 @@ PRIOR = PriorSummary(
     np.asarray([0.0, 2.0]),
     np.asarray([2.0, 18.0]),
 )
-
-
-def test_an_estimate_that_is_the_prior_has_its_moments():
-    found = Estimate.from_prior(("a", "b"), ("1", "1"), PRIOR, (2,))
-    assert found.mean.tolist() == [[1.0, 10.0]] * 2
-    assert found.covariance.tolist() == [[[0.25, 0.0], [0.0, 16.0]]] * 2
-    # the 90 % interval of a Gaussian, cut at the ends of the range
-    assert found.low[0] == pytest.approx([1.0 - 1.6448536 * 0.5, 10.0 - 1.6448536 * 4.0])
-    assert found.high[0] == pytest.approx([1.0 + 1.6448536 * 0.5, 10.0 + 1.6448536 * 4.0])
-    assert (found.reason == Reason.OUT_OF_RANGE).all() and found.abstains.all()
-    assert found.rows_used.tolist() == [0, 0] and found.rows_set_aside.tolist() == [1, 1]
 
 
 def test_a_mean_within_one_and_a_half_standard_deviations_of_an_end_is_at_the_edge():
@@ -42,35 +25,6 @@ def test_a_mean_within_one_and_a_half_standard_deviations_of_an_end_is_at_the_ed
     )
     at_edge = [[False, False], [True, False], [False, False], [False, True], [False, True]]
     assert found.at_edge.tolist() == at_edge
-
-
-def test_weights_of_several_runs_keep_their_dimensions():
-    box = RunConditions(
-        ("slip", "load"), np.asarray([0.0, 20.0]), np.asarray([0.5, 120.0]), np.ones(2)
-    )
-    rng = np.random.default_rng(0)
-    runs = {
-        "slip": rng.uniform(0.0, 0.5, (2, 3, 7)).round(1),
-        "load": rng.uniform(20.0, 120.0, (2, 3, 7)).round(-1),
-    }
-    weights = box.row_weights(runs)
-    assert weights.shape == (2, 3, 7)
-    for i, j in np.ndindex(2, 3):
-        alike = [
-            sum(
-                runs["slip"][i, j, k] == runs["slip"][i, j, m]
-                and runs["load"][i, j, k] == runs["load"][i, j, m]
-                for m in range(7)
-            )
-            for k in range(7)
-        ]
-        assert weights[i, j] == pytest.approx(1.0 / np.asarray(alike))
-
-
-def test_limits_are_those_of_chi_squared():
-    assert chi_squared_limit(2.0) == pytest.approx(chi_squared_quantile(2.0, 3.72))
-    assert 17.0 < chi_squared_limit(2.0) < 19.5  # -2 ln 1e-4 is 18.4
-    assert over_median(2.77, 2.0) == pytest.approx(2.0, rel=0.02)  # the median is 2 ln 2
 
 
 def test_a_box_that_fixes_a_quantity_leaves_the_others():

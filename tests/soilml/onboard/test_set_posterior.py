@@ -1,7 +1,6 @@
 """Estimates from sets of readings of one soil, onboard."""
 
 import json
-import re
 
 import numpy as np
 import onnx
@@ -11,7 +10,6 @@ from simulated_rows import ANY_WHEEL
 
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimator import Estimator
-from soilml.onboard.memory import Memory
 from soilml.onboard.model_file import metadata_checksum, serialise_metadata
 from soilml.onboard.set_contract import COMMON_ERROR_INPUTS
 
@@ -68,61 +66,10 @@ def test_steps_by_row_give_the_estimate_of_the_whole_run(estimator, wheel_poster
     assert_similar(found, exact.run(**run))
 
 
-def test_the_memory_of_hundreds_of_rows_is_bounded(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 700)
-    memory = estimator.start()
-    for first in range(0, 700, 50):
-        piece = {k: v[first : first + 50] for k, v in run.items()}
-        found, memory = estimator.step(memory, **piece)
-        assert len(memory.system) <= memory.system.shape[1]
-    assert memory.rows == 700
-    assert_similar(found, estimator.run(**run), 0.2)
-
-
-def test_a_packed_memory_has_the_same_normal_matrix():
-    rng = np.random.default_rng(0)
-    system = rng.normal(size=(500, 36)).astype(np.float32)
-    packed = Memory(system, np.asarray([500.0, 500.0, 500.0], np.float32)).packed()
-    assert packed.system.shape == (36, 36) and packed.rows == 500
-    assert packed.system.T @ packed.system == pytest.approx(system.T @ system, rel=1e-4, abs=0.02)
-
-
 def test_copies_of_a_row_count_once(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 6)
     copied = {k: np.concatenate([v, v[:3], v]) for k, v in run.items()}
     assert_similar(estimator.run(**copied), estimator.run(**run), 1e-5)
-
-
-def test_more_rows_narrow_the_posterior(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 64)
-    spreads = [
-        np.log(estimator.run(**{k: v[:rows] for k, v in run.items()}).std / estimator.prior.std)
-        for rows in (1, 4, 16, 64)
-    ]
-    assert (np.diff([s.sum() for s in spreads]) < 0.0).all()
-
-
-def test_sinkage_in_addition_to_torque_reduces_the_covariance(estimator, wheel_posterior):
-    run, sinkage = simulated_run(wheel_posterior, 8)
-    exact = estimator.on(**EXACT)
-    torque_only, both = exact.run(**run), exact.run(**run, sinkage=sinkage)
-    assert np.linalg.det(both.covariance) < np.linalg.det(torque_only.covariance)
-
-
-def test_a_missing_sinkage_is_ignored(estimator, wheel_posterior):
-    run, sinkage = simulated_run(wheel_posterior, 8)
-    torque_only = estimator.run(**run)
-    assert_similar(estimator.run(**run, sinkage=np.full(8, np.nan)), torque_only, 1e-5)
-    half = np.where(np.arange(8) < 4, sinkage, np.nan)
-    partial, memory = estimator.step(estimator.start(), **run, sinkage=half)
-    assert partial.in_range and memory.counts.tolist() == [12.0, 8.0, 8.0]
-
-
-def test_less_noise_reduces_the_covariance(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 8)
-    coarse = estimator.run(**run, torque_std=0.10 * run["torque"])
-    assert (estimator.run(**run).std < coarse.std).any()
-    assert np.linalg.det(estimator.run(**run).covariance) < np.linalg.det(coarse.covariance)
 
 
 def test_a_declared_constant_noise_is_fed_as_the_interface_says(estimator, wheel_posterior):
@@ -135,23 +82,6 @@ def test_a_declared_constant_noise_is_fed_as_the_interface_says(estimator, wheel
     assert_similar(declared, estimator.run(**fed), 1e-5)
     by_row = estimator.run(**run, torque_std=std)
     assert (np.abs(declared.mean - by_row.mean) > 1e-3 * by_row.std).any()
-
-
-def test_a_sensor_bias_increases_the_covariance(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 16)
-    biased = estimator.run(**run, torque_bias=0.05 * run["torque"])
-    assert np.linalg.det(estimator.run(**run).covariance) < np.linalg.det(biased.covariance)
-
-
-def test_the_ends_of_the_range_are_in_range(estimator, wheel_posterior):
-    recipe = wheel_posterior.family.recipe
-    for slip in (recipe.slip.lower, recipe.slip.upper):
-        for load in (recipe.load.lower, recipe.load.upper):
-            answers = wheel_posterior.family.responses(
-                np.asarray([[slip, load]]), np.zeros((1, 1, 3))
-            )
-            torque = load * np.exp(answers[0, 0, 0])
-            assert estimator.run(slip=slip, load=load, torque=torque).in_range
 
 
 def test_the_estimate_out_of_range_is_the_prior(estimator, wheel_posterior):
@@ -169,36 +99,6 @@ def test_one_row_in_twenty_out_of_range_is_left_out(estimator, wheel_posterior):
     assert_similar(estimator.run(**run), estimator.run(**kept))
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"slip": [], "torque": [], "load": []}, "no reading given"),
-        ({"slip": [0.3, np.nan], "torque": [2.0, 2.0], "load": [60.0, 60.0]}, "slip is nan"),
-        ({"slip": 1.5}, "slip is 1.5"),
-        ({"load": -3.0}, "load is -3"),
-        ({"speed": 0.1}, "'speed' is not read by this model"),
-        ({"torque_std": -0.1}, "torque_std is -0.1"),
-        ({"torque_std": 0.0}, "torque_std is 0"),
-        ({"torque_std": np.nan}, "torque_std is nan"),
-        ({"sinkage": np.inf}, "sinkage is inf"),
-        ({"sinkage": [0.01, 0.02]}, "sinkage has shape"),
-    ],
-)
-def test_an_impossible_reading_is_named(estimator, change, message):
-    run = {"slip": 0.3, "torque": 2.0, "load": 60.0} | change
-    with pytest.raises(InputError, match=re.escape(message)) as error:
-        estimator.run(**run)
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("missing", ["slip", "torque", "load"])
-def test_a_missing_reading_is_named(estimator, missing):
-    run = {"slip": 0.3, "torque": 2.0, "load": 60.0}
-    del run[missing]
-    with pytest.raises(InputError, match=f"{missing} is missing"):
-        estimator.run(**run)
-
-
 @pytest.mark.slow
 def test_a_file_for_any_wheel_requires_its_context(any_wheel):
     with pytest.raises(InputError, match="wheel_radius"):
@@ -214,34 +114,6 @@ def test_a_context_out_of_range_is_refused(any_wheel, name):
             any_wheel.on(**ANY_WHEEL | {name: value})
 
 
-def test_an_unknown_context_input_is_refused(any_wheel, estimator):
-    with pytest.raises(InputError, match="'mass' is not a context input"):
-        any_wheel.on(**ANY_WHEEL, mass=3.0)
-    with pytest.raises(InputError, match="it was trained for one wheel"):
-        estimator.on(wheel_radius=0.2)
-
-
-def test_a_single_reading_is_a_set_of_one(any_wheel):
-    mine, reading = any_wheel.on(**ANY_WHEEL), {"slip": 0.3, "torque": 2.0, "load": 60.0}
-    alone, two = mine(**reading), mine(**reading | {"slip": [0.3, 0.5]})
-    assert alone.mean.shape == (3,)
-    assert_similar(alone, mine.run(**reading), tolerance=1e-4)
-    np.testing.assert_allclose(two.mean[0], alone.mean, rtol=1e-4)
-
-
-def test_estimates_scale_with_the_prior(any_wheel):
-    small, large = any_wheel.on(**ANY_WHEEL), any_wheel.on(**ANY_WHEEL | {"cohesion_max": 4500.0})
-    assert large.prior.std[0] == pytest.approx(1.5 * small.prior.std[0])
-    far = {"slip": 0.3, "torque": 2.0, "load": 1e6}
-    assert large.run(**far).mean[0] == pytest.approx(1.5 * small.run(**far).mean[0], rel=1e-4)
-
-
-def test_a_file_without_set_posterior_is_refused_by_start(small_model):
-    estimator = Estimator.load(small_model)
-    with pytest.raises(InputError, match=r"no set posterior; train it with \[set_posterior\]"):
-        estimator.start()
-
-
 def changed(source, folder, change):
     """A copy of a model file, its metadata changed and its checksums right again."""
     model = onnx.load(source)
@@ -254,10 +126,6 @@ def changed(source, folder, change):
     path = folder / "changed.onnx"
     path.write_bytes(graph + serialise_metadata(metadata))
     return path
-
-
-def test_an_unchanged_copy_loads(wheel_set_file, tmp_path):
-    Estimator.load(changed(wheel_set_file, tmp_path, lambda _: None))
 
 
 @pytest.mark.parametrize("damage", ["{}", "[]", "null", '{"terms": "many"}', "not json"])

@@ -8,10 +8,7 @@ from conftest import simulated_run
 
 from soilml import Estimator
 from soilml.errors import InputError
-from soilml.onboard.memory import LEAST_SINGULAR_VALUE, PACKED_EVERY, Memory, check_memory
-from soilml.onboard.tracking.filter_state import CHECKSUM, FilterState, checksum_of
-from soilml.onboard.tracking.row_window import RowWindow
-from soilml.onboard.tracking.soil_tracker import Event
+from soilml.onboard.memory import PACKED_EVERY, Memory, check_memory
 
 
 def test_a_memory_must_have_finite_numbers_of_its_file():
@@ -62,68 +59,6 @@ def test_a_memory_in_which_a_bit_has_flipped_is_refused(keep, wheel_set_file, wh
     assert estimator.step(memory, **row)[1].rows == 13
 
 
-@pytest.mark.parametrize("part", ["system", "counts"])
-def test_a_state_of_a_tracker_must_have_finite_numbers(part):
-    start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
-    row = {"slip": np.asarray([0.2])}
-    counts = np.ones(3, np.float32)
-    after = replace(start, system=np.ones((2, 3)), counts=counts)
-    window = RowWindow.empty(start, 48).with_rows(row, after)
-    arrays = FilterState(window).as_arrays("file")
-    again = FilterState.from_arrays(arrays, "file", start)
-    assert again.window.memory.system.tolist() == window.memory.system.tolist()
-    assert (again.rows_since_change, again.rows_since_drift, again.increases) == (0, -1, ())
-    assert [(one.rows, one.known) for one in again.window.recent] == [(row, 1)]
-    arrays[part] = arrays[part].astype(float)
-    arrays[part][0, 1] = np.inf
-    with pytest.raises(InputError, match="its checksum does not match"):
-        FilterState.from_arrays(arrays, "file", start)
-    arrays[CHECKSUM] = checksum_of(arrays)
-    with pytest.raises(InputError, match="numbers that are not finite"):
-        FilterState.from_arrays(arrays, "file", start)
-
-
-def test_increases_of_the_last_sixteen_rows_are_kept():
-    start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
-    memory = FilterState(RowWindow.empty(start, 48), rows_since_change=7, rows_since_drift=3)
-    for i in range(20):
-        memory = memory.with_increase(float(i))
-    assert memory.increases == tuple(float(i) for i in range(4, 20))
-    row = {"slip": np.asarray([0.1])}
-    asked = replace(memory, question=memory.question.with_row(row, True).with_row(row, True))
-    rows = replace(start, counts=np.asarray([0.0, 5.0, 0.0]))
-    other = asked.of_another_soil(replace(asked.window, memory=rows))
-    assert other.increases == memory.increases[:14]
-    assert (other.rows_since_change, other.rows_since_drift) == (5, -1)
-    few = replace(asked, increases=(1.0,))
-    assert few.of_another_soil(asked.window).increases == ()
-
-
-def test_the_numbers_of_events_are_fixed():
-    """They are written into logs of drives."""
-    names = ["ACCEPTED", "SET_ASIDE", "SOIL_CHANGED", "DRIFT", "STUCK", "REPEATED", "UNUSABLE"]
-    assert {event.name: int(event) for event in Event} == {n: i for i, n in enumerate(names)}
-
-
-def test_rows_in_question_are_remembered_with_their_flags():
-    start = Memory(np.zeros((0, 3)), np.zeros(3, np.float32), "file")
-    row = {"slip": np.asarray([0.1]), "load": np.asarray([60.0])}
-    memory = FilterState(RowWindow.empty(start, 48))
-    question = memory.question.with_row(row, True).with_row(row, False)
-    repeated = memory.repeated.with_row(row)
-    arrays = replace(memory, question=question, repeated=repeated).as_arrays("file")
-    assert arrays["disagree"].dtype == np.bool_ and arrays["disagree"].tolist() == [True, False]
-    empty = memory.as_arrays("file")
-    assert empty["disagree"].dtype == np.bool_ and empty["disagree"].size == 0
-    assert empty["lengths"].dtype == empty["numbers"].dtype == np.int64
-    again = FilterState.from_arrays(arrays, "file", start)
-    assert again.question.disagree == (True, False) and len(again.question.rows) == 2
-    question = question.with_row(row, True).with_row(row, True)
-    stray = replace(memory, question=question, repeated=repeated)
-    again = FilterState.from_arrays(stray.as_arrays("file"), "file", start)
-    assert again.question.in_succession == question.in_succession == 2
-
-
 def memory_of(system) -> Memory:
     return Memory(np.asarray(system, np.float64), np.asarray([1.0, 1.0, 1.0], np.float32))
 
@@ -139,20 +74,6 @@ def test_a_packed_memory_has_the_same_sums_of_squares_in_as_few_rows_as_directio
     packed = memory_of(thin).packed()
     assert len(packed.system) == 4
     assert packed.system.T @ packed.system == pytest.approx(thin.T @ thin, abs=1e-9)
-
-
-def test_directions_below_the_least_singular_value_are_left_out():
-    sizes = np.asarray([5.0, 2.0 * LEAST_SINGULAR_VALUE, 0.5 * LEAST_SINGULAR_VALUE])
-    rotated = np.linalg.qr(np.random.default_rng(1).normal(size=(7, 7)))[0][:, :3] * sizes
-    kept = memory_of(rotated).packed().system
-    assert np.linalg.norm(kept, axis=1) == pytest.approx(sizes[:2])
-
-
-def test_a_memory_with_few_rows_stays_as_it_is_until_it_has_grown(thin):
-    short = memory_of(np.random.default_rng(2).normal(size=(PACKED_EVERY + 1, 50)))
-    assert short.packed() is short
-    assert short.packed(PACKED_EVERY) is short
-    assert short.packed(PACKED_EVERY - 1) is not short
 
 
 def test_answers_after_packing_are_those_before(whole_file):
@@ -193,14 +114,3 @@ def test_rows_that_are_kept_give_the_answer_of_one_call(wheel_set_file, wheel_po
     assert far[20] < 1e-5 < min(far[0], far[12]) and far[12] < 1.0
     # all rows have joined after the last step: nothing is kept twice
     assert memory.kept.rows == {} and memory.kept.before.rows == 20
-
-
-def test_what_cannot_be_kept_is_refused(wheel_set_file):
-    estimator = Estimator.load(wheel_set_file)
-    for keep in (-1, 257, 2.0, True):
-        with pytest.raises(InputError, match=r"keep is .*; needed is a whole number from 0 to 256"):
-            estimator.start(keep)
-    memory = estimator.start(keep=4)
-    other = replace(memory.kept, before=replace(memory.kept.before, file="another"))
-    with pytest.raises(InputError, match="this memory is of 'another'"):
-        estimator.step(replace(memory, kept=other).sealed(), slip=0.3, torque=2.0, load=60.0)

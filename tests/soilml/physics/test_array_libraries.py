@@ -7,15 +7,30 @@ import numpy as np
 import pytest
 import torch
 
-from soilml import EFFECTS, LinearWheel, Model, Operating, Wheel, soil
+from soilml import (
+    EFFECTS,
+    LinearWheel,
+    Midstance,
+    Model,
+    Operating,
+    Track,
+    TrackGrousers,
+    Wheel,
+    soil,
+)
 
 pytestmark = pytest.mark.slow
 
 WHEEL = Model(Wheel(radius=0.15, width=0.12))
 OF_WHEELS = {name: cls for name, cls in EFFECTS.items() if cls.applies_to(WHEEL.gear)}
+FOOT = Model(Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18))
+TRACK = Model(Track(radius=0.1, width=0.08, base=0.6))
 CASES = {
     "all": replace(WHEEL, effects=tuple(cls(**cls.about.reference) for cls in OF_WHEELS.values())),
     "none": WHEEL,
+    "track": TRACK,
+    "track with grousers": TRACK + TrackGrousers(spacing=0.7),
+    "foot": FOOT,
 }
 SAND = soil("wong1989/dry_sand")
 SLIP = np.concatenate([np.linspace(-0.5, 0.8, 9), [0.3]])
@@ -76,20 +91,23 @@ def test_gradients_flow_through_the_size_of_every_effect(name, gear):
     assert float(x.grad) == pytest.approx(expected, rel=1e-5)
 
 
-def test_gradients_flow_through_the_equilibrium():
+@pytest.mark.parametrize(
+    ("model", "load"), [(WHEEL, 70.0), (CASES["track with grousers"], 637.0), (FOOT, 5.0)]
+)
+def test_gradients_flow_through_the_equilibrium(model, load):
     names = ("cohesion", "friction_angle", "shear_modulus", "kphi", "n")
     slip = np.asarray([-0.6, -0.05, 0.1, 0.3, 0.6])
-    at = Operating(slip=torch.from_numpy(slip), load=70.0)
+    at = Operating(slip=torch.from_numpy(slip), load=load)
     values = {
         name: torch.tensor(getattr(SAND, name), dtype=torch.float64, requires_grad=True)
         for name in names
     }
-    force = WHEEL(replace(SAND, **values), at)
+    force = model(replace(SAND, **values), at)
     total = force.torque.sum() + 0.1 * force.drawbar_pull.sum() + 50.0 * force.sinkage.sum()
     total.backward()
 
     def value(**changes):
-        f = WHEEL(replace(SAND, **changes), Operating(slip=slip, load=70.0))
+        f = model(replace(SAND, **changes), Operating(slip=slip, load=load))
         return f.torque.sum() + 0.1 * f.drawbar_pull.sum() + 50.0 * f.sinkage.sum()
 
     for name in names:

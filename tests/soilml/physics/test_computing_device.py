@@ -66,12 +66,6 @@ def test_a_device_that_is_not_there_is_refused_in_one_line(device, tmp_path, cap
     assert not out.exists()
 
 
-def test_workers_and_a_device_exclude_each_other(tmp_path, capsys):
-    command = ["generate", "wheel", str(tmp_path / "d.parquet"), "--device", "cpu"]
-    assert main([*command, "--workers", "2"]) == 2
-    assert "omit --workers" in capsys.readouterr().err
-
-
 def test_a_device_without_memory_is_refused_in_one_line(monkeypatch):
     def full(*_):
         raise torch.OutOfMemoryError("CUDA out of memory. Tried to allocate 2.00 GiB")

@@ -12,17 +12,10 @@ from soilml.physics.forces import apply_input_effects, forces_at_sinkage
 from soilml.physics.linear_response import linear_response
 from soilml.physics.load_case import LoadCase
 from soilml.physics.model import flattened
-from soilml.physics.sinkage_estimate import SinkageEstimate
 
 SAND = soil("wong1989/dry_sand")
 WHEEL = Wheel(radius=0.15, width=0.12)
-SLIP = np.asarray([0.05, 0.2, 0.4, 0.7])
 CHANNELS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
-
-
-def batch(slip=SLIP, load=60.0, ground=SAND, effects=()):
-    at = Operating(slip=np.asarray(slip), load=load * np.ones(len(slip)))
-    return flattened(LoadCase(WHEEL, ground, at, effects))[0]
 
 
 def test_rows_without_equilibrium_are_blank_but_for_load_and_status():
@@ -80,25 +73,3 @@ def test_readings_of_slightly_changed_rows_are_right_to_first_order(effects):
     np.testing.assert_allclose(smaller[:, base == np.arange(6)], 0.0, atol=1e-9)
     assert small.max() < 0.02
     assert (smaller < np.maximum(0.02 * small, 3e-8)).all()  # of second order: a hundredth
-
-
-def test_rows_of_a_base_row_without_equilibrium_are_blank():
-    case = batch(slip=[0.2, 0.2, 0.5, 0.5], load=np.asarray([1e6, 60.0, 60.0, 60.0]))
-    found = linear_response(case, np.asarray([0, 0, 2, 2])).force
-    assert found.status[:2].all() and not found.status[2:].any()
-    assert np.isnan(found.torque).tolist() == [True, True, False, False]
-
-
-@pytest.mark.parametrize("off", [0.0, 0.01, -0.1])
-def test_readings_of_first_order_start_from_an_estimate_of_the_base_rows(off):
-    """The search is rough, and what it leaves is corrected to the second order."""
-    case = batch(slip=[0.2, 0.21, 0.5, 0.51])
-    base = np.asarray([0, 0, 2, 2])
-    alone = linear_response(case, base)
-    near = alone.sinkage.log_sinkage[[0, 2]] + off
-    estimate = SinkageEstimate(near, 0.9 * alone.sinkage.slope[[0, 2]])
-    again = linear_response(case, base, estimate)
-    for name in (*CHANNELS, "load"):
-        np.testing.assert_allclose(
-            getattr(again.force, name), getattr(alone.force, name), rtol=1e-8
-        )

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import input_box, solved
+from conftest import input_box
 
-from soilml import EFFECTS, Model, Operating, Soil, Status, Track, Wheel, soil
-from soilml.errors import InputError
+from soilml import EFFECTS, Operating, Soil, Status, Wheel, soil
 from soilml.physics import sinkage_search
 from soilml.physics.contact import Resolution
 from soilml.physics.equilibrium import sensor_readings
@@ -87,56 +86,6 @@ def test_a_row_that_nothing_carries_states_the_largest_load(slip):
     for sinkage, load in zip(below.sinkage, (0.3 * most, 0.99 * most), strict=True):
         first = every[np.argmax(carried >= load)]
         assert sinkage == pytest.approx(first, rel=5e-3)
-
-
-@pytest.mark.parametrize("gear", [WHEEL, Track(radius=0.1, width=0.12, base=0.6)])
-def test_soil_bears_where_both_moduli_over_the_width_are_above_zero(gear):
-    ground = replace(SAND, kphi=1e6, kc=np.asarray([-0.119e6, -0.121e6]))
-    force = Model(gear)(ground, Operating(slip=0.2, load=1.0))
-    assert force.status[1] == Status.NO_BEARING and np.isnan(force.torque[1])
-    assert force.status[0] != Status.NO_BEARING
-
-
-def test_bulldozing_without_friction_has_the_limits_of_its_factors():
-    clay = replace(SAND, friction_angle=0.0, cohesion=5000.0)
-    at = Operating(slip=0.3, load=60.0)
-    plain = Model(WHEEL)(clay, at)
-    pushed = (Model(WHEEL) + EFFECTS["bulldozing"](share=2.0))(clay, at)
-    z = plain.sinkage
-    # Prandtl's N_c, and (2 N_gamma / tan phi + 1) for N_q = 1
-    wall = 0.12 * (0.67 * 5000.0 * z * (np.pi + 2.0) + 0.5 * z**2 * SAND.unit_weight * 9.0)
-    assert plain.drawbar_pull - pushed.drawbar_pull == pytest.approx(2.0 * wall, rel=1e-4)
-
-
-def test_the_catalogue_is_read_again_as_it_was():
-    from soilml.physics.soils.catalogue import soil_catalogue
-
-    again = soil_catalogue.__wrapped__()
-    assert again == soil_catalogue()
-    entry = again["comin2017/es-3"]
-    assert entry.assumed == tuple(sorted(entry.assumed)) and entry.soil.cohesion == 0.0
-    assert not set(entry.assumed) & set(entry.published)
-
-
-def test_operating_points_out_of_their_range_are_refused_when_they_are_used():
-    """Values made without a check, as by `dataclasses.replace` on arrays of a library."""
-    for wrong in ({"slip": np.asarray([0.2, 1.5])}, {"load": np.asarray([60.0, -1.0])}):
-        at = Operating(slip=np.asarray([0.2, 0.3]), load=np.asarray([60.0, 60.0]))
-        for name, value in wrong.items():
-            object.__setattr__(at, name, value)
-        with pytest.raises(InputError, match=next(iter(wrong))):
-            Model(WHEEL)(SAND, at)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name, cls in EFFECTS.items() if cls.load_rises])
-def test_an_effect_under_which_the_load_rises_needs_no_scan(name, monkeypatch):
-    box, cls = input_box(512, seed=21), EFFECTS[name]
-    quick = solved(box, [cls(**cls.about.reference)])
-    monkeypatch.setattr(cls, "load_rises", False)
-    scanned = solved(box, [cls(**cls.about.reference)])
-    np.testing.assert_array_equal(quick.status, scanned.status)
-    np.testing.assert_allclose(quick.sinkage, scanned.sinkage, rtol=1e-9)
 
 
 @pytest.mark.parametrize("effects", [(), ("flat-rim",)], ids=["rigid", "flat"])

@@ -1,8 +1,5 @@
 """Every result draws itself, into axes of the caller or into a figure of its own."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,9 +10,7 @@ from conftest import MODEL
 from soilml import Estimator, Table, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.errors import InputError
-from soilml.experiment_design.design import CandidateRow
 from soilml.gap.report.results import GapReduction, GapReport
-from soilml.numerics.prior import Prior
 from soilml.traction.report import pull_report
 
 matplotlib = pytest.importorskip("matplotlib")
@@ -68,36 +63,6 @@ def imported(case):
     return ImportedLog(table, {}, (), (), radius=0.15)
 
 
-def comparison(case):
-    from training.benchmark.methods import MethodEstimates, MethodKind
-    from training.benchmark.paired_results import MethodResult
-    from training.benchmark.user_comparison import MethodScores
-
-    rng = np.random.default_rng(0)
-    priors = (Prior(0.0, 1e3), Prior(0.4, 0.8))
-    truth = np.stack([p.at(rng.random(9)) for p in priors], axis=1)
-    std = np.asarray([p.std for p in priors])
-    ends = np.stack([truth - std, truth + std], axis=1)
-    estimates = MethodEstimates(
-        mean=truth + 0.5 * std * rng.standard_normal((9, 2)),
-        covariance=np.broadcast_to(np.diag(std**2), (9, 2, 2)),
-        interval50=ends,
-        interval90=ends,
-        flagged=np.zeros(9, bool),
-        seconds=0.1,
-    )
-    score = MethodResult(
-        rows=1,
-        method="m",
-        kind=MethodKind.ANALYTIC,
-        inputs="torque",
-        priors=priors,
-        truth=truth,
-        estimates=estimates,
-    )
-    return MethodScores([score, replace(score, rows=6)], ["cohesion", "friction_angle"])
-
-
 def audited(case):
     from soilml.gap import audit
     from soilml.physics.effects import EFFECTS
@@ -107,18 +72,6 @@ def audited(case):
     names = ("slip-sinkage", "torque-gain")
     design = {"run": np.repeat(["a", "b", "c"], 3), "slip": slip, "load_N": load}
     return audit(noisy, design, effects={name: EFFECTS[name] for name in names})
-
-
-def advised(case):
-    from soilml.experiment_design.design import Advice, RatedRow
-
-    rows = [
-        RatedRow(CandidateRow(slip, load, ("torque",)), np.asarray([0.9, slip, 0.5]))
-        for slip in (0.1, 0.3)
-        for load in (40.0, 60.0)
-    ]
-    names = ("cohesion", "friction_angle", "shear_modulus")
-    return Advice(names, np.ones(3), tuple(rows), (), tuple(rows[:1]), 0)
 
 
 def of_plates_and_shear(case):
@@ -145,9 +98,7 @@ def of_plates_and_shear(case):
         (pull, (3, 1), "60 N on the wheel"),
         (rover, (2, 2), "steepest slope, degrees"),
         (imported, (1,), "torque / (load × radius)"),
-        (comparison, (2, 2), "friction angle"),
         (audited, (), "that separates it from its nearest rival"),
-        (advised, (3,), "shear modulus: now 100%"),
         (of_plates_and_shear, (3,), "shear strength, kPa"),
     ],
 )
@@ -168,29 +119,3 @@ def test_results_draw_themselves(make, shape, said, case):
     assert not pyplot.get_fignums()
     with pytest.raises(InputError, match="this plot needs"):
         result.plot(ax=Figure().subplots(5, 1))
-
-
-def test_shaded_priors_are_those_that_are_given(case):
-    axes = fit(case).plot(prior=case.prior)
-    low, high = axes[1].get_xlim()
-    assert low < 25.0 and high > 45.0  # the prior of the friction angle, in degrees
-    assert len(axes[1].patches) == 1 and not fit(case).plot()[1].patches
-    matplotlib.pyplot.close("all")
-
-
-def test_an_unknown_part_of_a_gap_report_is_refused(case):
-    with pytest.raises(InputError, match=r"this report has train"):
-        gap(case).plot(part="held_out")
-
-
-@pytest.mark.slow
-def test_the_backend_is_left_to_the_user():
-    """Reports need none; what the user draws after them has the one of MPLBACKEND."""
-    code = "from soilml.report.figure_style import report_style\nwith report_style(): pass\n"
-    code += "import os; from matplotlib import pyplot; pyplot.figure()\n"
-    code += "print(pyplot.get_backend().lower(), os.environ['MPLBACKEND'])"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "svg"},
-    )  # fmt: skip
-    assert done.stdout.split() == ["svg", "svg"]

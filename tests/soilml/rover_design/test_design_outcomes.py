@@ -9,12 +9,10 @@ from design_files import STUDY
 
 from soilml import Case, Grousers, Model, Wheel, soil
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
-from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS
-from soilml.identification.averaged import EFFECT, ERRORS, EXACT, LAW, LAWS
-from soilml.rover_design.performance import Outcomes, evaluate, lugs_needed
+from soilml.rover_design.performance import Outcomes, evaluate
 from soilml.rover_design.study import read_study
 from soilml.rover_design.uncertainty import possible_tests, variance_shares
-from soilml.rover_design.worlds import LUG_SHEARING, draw_worlds
+from soilml.rover_design.worlds import draw_worlds
 from soilml.traction.draws import SoilDraws
 from soilml.traction.rover_performance import rover_performance
 
@@ -70,41 +68,6 @@ def test_a_design_does_what_pull_says_of_the_same_rover(study, lug):
     assert found.torque[0][needed] == pytest.approx(torque[needed], rel=1e-6)
 
 
-def test_a_wider_wheel_with_higher_lugs_climbs_better(study):
-    worlds = without_errors(draw_worlds(study.soil, 40, 0.6))
-    wider = evaluate(study, designs([0.05, 0.08, 0.11], 0.0), worlds).margin
-    assert np.all(np.diff(wider, axis=0) > 0.0)
-    higher = evaluate(study, designs(0.08, [0.0, 0.005, 0.012]), worlds).margin
-    assert np.all(np.diff(higher, axis=0) > 0.0)
-
-
-def test_limits_of_torque_and_energy_belong_to_the_goal(study):
-    worlds, own = draw_worlds(study.soil, 60, 0.6), designs(0.12, [0.012])
-    free = evaluate(study, own, worlds)
-    limit = float(np.nanmedian(free.torque))
-    goal = replace(study.goal, torque_limit=limit)
-    bound = evaluate(replace(study, goal=goal), own, worlds)
-    assert np.array_equal(bound.met, free.met & (free.torque <= limit))
-    assert bound.met.sum() < free.met.sum()
-
-
-def test_errors_of_the_model_are_the_typical_ones_before_any_row(study):
-    worlds = draw_worlds(study.soil, 20_000, 0.6)
-    weights = {0.0: EXACT + LAW + EFFECT[0.0], **ERRORS}
-    weights[0.25] += EFFECT[0.25]
-    for scale, weight in weights.items():
-        assert np.mean(worlds.scale == scale) == pytest.approx(
-            weight / sum(weights.values()), abs=0.002
-        )
-    own = worlds.errors["contact"][worlds.scale == 1.0]
-    assert own.std() == pytest.approx(USUAL_MODEL_ERRORS["contact"], rel=0.05)
-    laws = np.isin(worlds.effect, LAWS)
-    assert LAW < laws.mean() < LAW + 0.05
-    assert set(np.unique(worlds.effect)).isdisjoint({"torque-gain", "camber", "grousers", "rate"})
-    low, high = worlds.lug_shearing.min(), worlds.lug_shearing.max()
-    assert LUG_SHEARING[0] <= low < high <= LUG_SHEARING[1]
-
-
 def test_soils_keep_to_their_ranges_and_are_equally_likely(tmp_path):
     text = STUDY.replace(
         'name = "ding2015/hit_lss1"', 'names = ["scott1970/apollo12", "mckay1994/jsc-1"]'
@@ -118,13 +81,6 @@ def test_soils_keep_to_their_ranges_and_are_equally_likely(tmp_path):
     assert np.ptp(angle[~moon]) == 0.0
     assumed = [r.about[0] for r in worlds.remarks if r.code == "assumed-soil"]
     assert assumed == list(worlds.kinds)
-
-
-def test_lugs_needed_by_the_spacing_equation():
-    # r = 0.1, h = 0.01, z = 0.02, s = 0: sqrt(1.1^2 - 0.8^2) - sqrt(1 - 0.8^2) = 0.1550
-    found = lugs_needed(*map(np.asarray, (0.1, 0.01, 0.02, 0.0)))
-    assert found == math.ceil(2.0 * math.pi / (math.sqrt(0.57) - 0.6))
-    assert np.isnan(lugs_needed(*map(np.asarray, (0.1, 0.0, 0.02, 0.0))))
 
 
 def test_shares_of_a_margin_that_is_known(study):

@@ -5,7 +5,6 @@ import math
 import pytest
 from design_files import STUDY
 
-from soilml.config.wheeled_rover import RoverWheel, WheeledRover
 from soilml.errors import InputError
 from soilml.rover_design.study import Dimension, read_study, with_changes
 
@@ -49,25 +48,6 @@ def test_what_is_missing_or_wrong_is_one_line(tmp_path, given, instead, said):
     with pytest.raises(InputError, match=said) as caught:
         study_of(tmp_path, STUDY.replace(given, instead))
     assert "\n" not in str(caught.value)
-
-
-def test_axle_loads_are_those_of_the_rover_of_a_model_file(tmp_path):
-    study = study_of(tmp_path)
-    places = {"a": 0.2, "b": 0.0, "c": -0.2}
-    wheels = {
-        f"{name}{side}": RoverWheel(x, side * 0.3) for name, x in places.items() for side in (-1, 1)
-    }
-    rover = WheeledRover(12.0, (0.02, 0.0, 0.18), wheels)
-    slope = math.radians(12.0)
-    expected = rover.loads(slope).reshape(3, 2)
-    assert 12.0 * study.axle_loads(6, slope) == pytest.approx(expected[:, 0])
-    assert expected[:, 0] == pytest.approx(expected[:, 1])
-
-
-def test_a_wheel_that_leaves_the_ground_is_said(tmp_path):
-    study = study_of(tmp_path, STUDY.replace("0.18]", "0.5]"))
-    with pytest.raises(InputError, match="of axle 1 leaves the ground on a slope of 50 deg"):
-        study.axle_loads(4, math.radians(50.0))
 
 
 def test_options_change_the_question(tmp_path):

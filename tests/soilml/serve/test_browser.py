@@ -2,11 +2,10 @@
 
 import os
 import shutil
-import sys
 
 import pytest
-from served_page import ROOT, runs_file
 from served_page import page as page
+from served_page import runs_file
 
 from soilml import EFFECTS, Model, Operating, Wheel, soil
 
@@ -119,29 +118,6 @@ def test_sliders_keys_and_typed_values_move_the_curves(tab):
     assert now(tab) == first
 
 
-def test_a_wrong_value_is_answered_beside_its_slider(tab):
-    number(tab, "cohesion").fill("-1")
-    error = tab.locator("#s-cohesion-error")
-    assert (
-        error.inner_text()
-        == "\u22121\u00a0kPa given; needed is a value between 0 and 1000\u00a0kPa"
-    )
-    assert number(tab, "cohesion").get_attribute("aria-invalid") == "true"
-    number(tab, "cohesion").fill("2")
-    assert error.is_hidden()
-    number(tab, "load").fill("50000")
-    tab.wait_for_selector("#forward-error:not([hidden])")
-    assert "the soil carries less than this load" in tab.locator("#forward-error").inner_text()
-
-
-def test_another_wheel_and_soil_are_chosen(tab):
-    tab.select_option("#wheel", "wang2018")
-    until(tab, "document.querySelector('#s-gear-base') !== null")
-    until(tab, "document.querySelector('#wheel-picture').hidden")
-    tab.select_option("#soil", "ding2015/lunar_soil")
-    until(tab, "document.querySelector('#soil-note').innerText.includes('Ding')")
-
-
 def test_a_table_leads_to_bands_and_back_to_the_sliders(tab, tmp_path):
     file = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
     tab.set_input_files("#file", file)
@@ -160,75 +136,6 @@ def test_a_table_leads_to_bands_and_back_to_the_sliders(tab, tmp_path):
     tab.get_by_role("button", name="Show this soil in the forward model").click()
     value = float(number(tab, "friction_angle").input_value())
     assert value == pytest.approx(28.0, abs=5.0)
-
-
-def test_a_log_brings_the_radius_of_its_wheel(tab, tmp_path):
-    file = runs_file(tmp_path, Model(Wheel(radius=0.11, width=0.12)))
-    header, *rows = file.read_text().splitlines()
-    file.write_text("\n".join([f"{header},wheel_radius_m", *(f"{row},0.11" for row in rows)]))
-    tab.set_input_files("#file", file)
-    tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
-    assert number(tab, "gear-radius").input_value() == "110"
-    assert "the radius of this log, 110" in tab.locator("#table-panel").inner_text()
-    tab.get_by_label("Width (mm)", exact=True).fill("-3")
-    assert "needed is a value" in tab.locator("#ask-gear-width-error").inner_text()
-    tab.get_by_label("Width (mm)", exact=True).fill("90")
-    tab.keyboard.press("Enter")
-    tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
-    assert tab.locator("#estimate-error").is_hidden()
-    assert number(tab, "gear-width").input_value() == "90"
-
-
-def test_a_model_file_answers_which_wheel_it_was(tab, tmp_path):
-    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
-    tab.wait_for_selector("#ask-wheel:not([hidden])", timeout=LONG)
-    tab.locator("#model-box > summary").click()
-    until(tab, "document.querySelector('#model-text').value.includes('[gear]')")
-    text = tab.locator("#model-text").input_value()
-    (tmp_path / "m.toml").write_text(text)
-    tab.set_input_files("#file", tmp_path / "m.toml")
-    tab.wait_for_selector("#pull-result summary", timeout=LONG)
-    assert tab.locator("#ask-wheel").is_hidden()
-    tab.locator("#model-text").fill(text.replace("friction_angle = ", "friction_angle = -", 1))
-    tab.get_by_role("button", name="Estimate the soil").click()
-    tab.wait_for_selector("#model-error:not([hidden])", timeout=LONG)
-    box = "document.querySelector('#model-text')"
-    line = tab.evaluate(f"{box}.value.slice({box}.selectionStart, {box}.selectionEnd)")
-    assert line.startswith("friction_angle = -")
-
-
-def test_what_rows_do_not_determine_has_no_number(tab, tmp_path):
-    file = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)), (60.0,))
-    file.write_text("\n".join(file.read_text().splitlines()[:2]) + "\n")
-    tab.set_input_files("#file", file)
-    confirm_the_wheel(tab)
-    tab.wait_for_selector("#pull-result", timeout=LONG)
-    said = tab.locator("#estimate-result .sentence").inner_text()
-    assert said.startswith("These rows do not determine")
-    unknown = tab.locator(".band", has_text="not determined")
-    assert unknown.count() > 0
-    for head in unknown.locator("header").all_inner_texts():
-        assert not any(c.isdigit() for c in head)
-
-
-def test_a_faulty_table_is_answered_beside_the_drop_zone(tab, tmp_path):
-    (tmp_path / "bad.csv").write_text("run,slip,load_N,torque_Nm\na,30,60,2\n")
-    tab.set_input_files("#file", tmp_path / "bad.csv")
-    tab.wait_for_selector("#drop-error:not([hidden])", timeout=LONG)
-    said = tab.locator("#drop-error").inner_text()
-    assert said.startswith("bad.csv line 2, column slip") and "not in percent" in said
-
-
-def test_a_model_file_moves_the_sliders_and_its_faults_are_shown(tab, tmp_path):
-    text = '[gear]\ntype = "wheel"\nradius = "10 cm"\nwidth = 0.08\n[soil]\n'
-    (tmp_path / "m.toml").write_text(f'{text}name = "wong1989/dry_sand"\n')
-    tab.set_input_files("#file", tmp_path / "m.toml")
-    until(tab, "document.querySelector('#s-gear-radius').value === '100'")
-    assert "from m.toml" in tab.locator("#wheel option").first.inner_text()
-    (tmp_path / "wrong.toml").write_text(text)
-    tab.set_input_files("#file", tmp_path / "wrong.toml")
-    tab.wait_for_selector("#drop-error:not([hidden])")
-    assert "wrong.toml is not taken: MODEL.toml" in tab.locator("#drop-error").inner_text()
 
 
 def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
@@ -253,91 +160,6 @@ def test_a_gap_is_named_and_can_be_cancelled(tab, tmp_path):
         tab.get_by_role("link", name="Open the full report").click()
     opened.value.wait_for_load_state()
     assert "Gap report" in opened.value.title()
-
-
-def rig_log(tmp_path):
-    sys.path.insert(0, str(ROOT / "examples" / "import"))
-    from rig import write_logs
-
-    return write_logs(tmp_path / "rig")[0]
-
-
-def settled(tab):
-    """Wait for the answer to a change of the map."""
-    tab.wait_for_timeout(50)
-    tab.wait_for_selector("#map-job", state="hidden", timeout=LONG)
-
-
-def test_a_raw_log_goes_through_its_map(tab, tmp_path):
-    tab.set_input_files("#file", rig_log(tmp_path))
-    tab.wait_for_selector("#map-panel:not([hidden])", timeout=LONG)
-    assert tab.locator("#map-columns tr").count() == 6
-    assert tab.locator("#map-curves figure").count() == 3
-    assert "gearbox" in tab.locator("#map-columns .wrong").inner_text()
-    tab.get_by_role("button", name="Import", exact=True).click()
-    tab.wait_for_selector("#map-error:not([hidden])", timeout=LONG)
-    box = "document.querySelector('#map-text')"
-    marked = tab.evaluate(f"{box}.value.slice({box}.selectionStart, {box}.selectionEnd)")
-    assert marked.startswith("gear_ratio = 1 ")  # the error leads to its line
-    tab.get_by_label("[wheel_angle] gear_ratio").fill("99")
-    tab.keyboard.press("Tab")
-    settled(tab)
-    assert tab.locator("#map-panel .wrong").count() == 0
-    with tab.expect_download() as saved:
-        tab.get_by_role("button", name="Save map.toml").click()
-    assert saved.value.suggested_filename == "map.toml"
-    tab.get_by_role("button", name="Import", exact=True).click()
-    tab.wait_for_selector("#table-panel:not([hidden])", timeout=LONG)
-    assert tab.get_by_role("link", name="Open the import report").is_visible()
-
-
-def test_roles_and_units_are_chosen_by_keyboard_on_a_phone(tab, tmp_path):
-    tab.set_viewport_size({"width": 390, "height": 800})
-    tab.emulate_media(color_scheme="dark")
-    tab.set_input_files("#file", rig_log(tmp_path))
-    tab.wait_for_selector("#map-panel:not([hidden])", timeout=LONG)
-    tab.get_by_label("What Fx is").focus()
-    tab.keyboard.type("load")
-    settled(tab)
-    assert tab.get_by_label("What Fz is").input_value() == ""
-    assert tab.evaluate("document.activeElement.getAttribute('aria-label')") == "What Fx is"
-    tab.get_by_label("Unit of Fx").select_option("kN")
-    settled(tab)
-    assert 'unit = "kN"' in tab.locator("#map-text").input_value()
-    assert tab.locator("#map-panel .wrong").count() > 0
-    until(tab, "document.documentElement.scrollWidth <= 390")
-    assert tab.evaluate(CONTRAST) == [] and tab.evaluate(NAMELESS) == []
-
-
-def test_the_sheet_of_a_spreadsheet_is_asked_for(tab, tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    rows = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))).read_text().splitlines()
-    for line in rows:
-        book.active.append([cell if i == 0 or line == rows[0] else float(cell or "nan")
-                            for i, cell in enumerate(line.split(","))])  # fmt: skip
-    book.create_sheet("notes").append(["by hand"])
-    book.save(tmp_path / "tests.xlsx")
-    tab.set_input_files("#file", tmp_path / "tests.xlsx")
-    tab.get_by_role("button", name="Sheet", exact=True).click()
-    confirm_the_wheel(tab)
-    tab.wait_for_selector("#pull-result summary, #estimate-error:not([hidden])", timeout=LONG)
-    assert "rows 12" in tab.locator("#table-panel").inner_text()
-    assert tab.locator("#estimate-error").is_hidden()
-
-
-def test_wheels_are_compared_on_the_soil_of_measured_rows(tab, tmp_path):
-    tab.set_input_files("#file", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))))
-    confirm_the_wheel(tab)
-    tab.wait_for_selector("#pull-result summary", timeout=LONG)
-    tab.get_by_label("Soils, each as likely").select_option("that of RUNS.csv")
-    until(tab, "document.querySelector('#design-text').value.includes('runs = \"RUNS.csv\"')")
-    tab.get_by_label("Slope (deg)").fill("8")
-    tab.keyboard.press("Tab")
-    tab.select_option("#design-effort", "quick")
-    tab.get_by_role("button", name="Compare the wheels").click()
-    tab.wait_for_selector("#design-result .verdict, #design-error:not([hidden])", timeout=LONG)
-    assert tab.locator("#design-error").is_hidden()
 
 
 def test_wheels_are_compared_for_a_slope(tab):

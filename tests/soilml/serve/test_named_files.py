@@ -8,7 +8,6 @@ from served_page import runs_file
 
 from soilml import Model, Wheel
 from soilml.errors import InputError
-from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.serve.answers.chosen_case import model_text
 from soilml.serve.answers.forward import controls, forward
 
@@ -61,13 +60,6 @@ def test_no_answer_reads_a_file_that_a_model_names(ask, key, secret):
         check(str(found.value), secret)
 
 
-@pytest.mark.parametrize("address", ["model", "controls", "forward"])
-def test_no_address_reads_a_file_that_a_model_names(page, address, secret):
-    answer, status = page.ask(f"/api/{address}", {"model": text_of("table", secret)})
-    assert status == 422
-    check(answer, secret)
-
-
 def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
     key = page.put("RUNS.csv", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
                    .read_bytes())  # fmt: skip
@@ -85,23 +77,3 @@ def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
         job = page.job(kind="design", files=[key], question=head + soil + tail, effort="quick")
         assert job["state"] == "failed"
         check(job, secret)
-
-
-@pytest.mark.parametrize("name", ["out", "read", "written", "MODEL.toml"])
-def test_a_dropped_file_may_have_any_name(page, name, tmp_path):
-    """Those of the folders of a job once ended it as out of memory."""
-    runs = runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12))).read_bytes()
-    job = page.job(kind="estimate", files=[page.put(name, runs)], model={"values": {}})
-    if name == "MODEL.toml":
-        assert job["error"] == "a dropped file has the name MODEL.toml; rename it"
-    else:
-        assert job["state"] == "done", job["error"]
-
-
-def test_a_file_of_the_command_line_names_any_file_beside_it(tmp_path):
-    assert NamedFiles(tmp_path).path("r.csv") == tmp_path / "r.csv"
-    assert NamedFiles(tmp_path).path("/a/r.csv").as_posix() == "/a/r.csv"
-    assert NamedFiles(names=["r.csv"]).path("r.csv").as_posix() == "r.csv"
-    for name in ("r.csv", "", ".", "..", "/etc/passwd"):
-        with pytest.raises(InputError, match="may name no file"):
-            NO_FILES.path(name)

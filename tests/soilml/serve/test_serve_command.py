@@ -24,12 +24,6 @@ def test_a_port_in_use_is_one_line(capsys):
     assert f"port {port} of 127.0.0.1 cannot be opened" in said and "--port N" in said
 
 
-@pytest.mark.parametrize("port", ["-1", "70000"])
-def test_a_port_that_does_not_exist_is_one_line(port, capsys):
-    assert main(["serve", "--no-browser", "--port", port]) == 2
-    assert f"{port!r} given; needed is a whole number from 0 to 65535" in capsys.readouterr().err
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM"])
 def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from served_page import ROOT
 from served_page import page as page
 
-from soilml import Model, Operating, Wheel, read_case, soil
+from soilml import Model, Operating, Wheel, soil
 from soilml.io.text_tables import csv_text
 
 pytestmark = pytest.mark.slow
@@ -50,38 +50,6 @@ def test_a_table_of_runs_is_known_and_estimated(page):
     assert values["friction_angle"]["value"] == pytest.approx(angle["si"])
 
 
-def test_one_reading_leaves_a_parameter_unknown_in_words(page):
-    key = page.put("one.csv", (RUNS + "a,0.3,60,2.26\n").encode())
-    job = page.job(kind="estimate", files=[key], model={"values": {}})
-    assert job["state"] == "done", job["error"]
-    by_path = {p["path"]: p for p in job["result"]["parameters"]}
-    assert not by_path["cohesion"]["identified"]
-    assert any(text.startswith("cohesion: not identified") for text in job["result"]["words"])
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("run,slip,load_N,torque_Nm\na,30,60,2\n", "slip: 30 given; needed is a slip ratio"),
-        ("run,slip,load_N\na,0.3,60\n", "column torque_Nm is missing"),
-        ("run,slip,load_N,torque_Nm\na,0.3,x,2\n", "line 2, column load_N"),
-        ("run,slip,load_N,torque_Nm\n", "a header but no row"),
-    ],
-)
-def test_a_table_is_checked_with_the_messages_of_the_commands(page, text, said):
-    job = page.job(kind="look", files=[page.put("bad.csv", text.encode())])
-    assert job["state"] == "failed" and job["error"].startswith("bad.csv")
-    assert said in job["error"] and "\n" not in job["error"]
-
-
-def test_a_fault_of_the_model_file_names_it(page):
-    key = page.put("RUNS.csv", runs_text(3))
-    wrong, status = page.ask(
-        "/api/jobs", {"kind": "estimate", "files": [key], "model": {"model": "[gear]\n"}}
-    )
-    assert status == 422 and "MODEL.toml" in wrong["error"]
-
-
 def test_a_gap_runs_with_progress_and_its_files_are_there(page):
     key = page.put("RUNS.csv", runs_text(7))
     job = page.job(kind="gap", files=[key], model={"values": {}})
@@ -96,12 +64,6 @@ def test_a_gap_runs_with_progress_and_its_files_are_there(page):
     assert "script" not in headers["Content-Security-Policy"]
     assert "attachment" in page.request("GET", path)[1]["Content-Disposition"]
     assert page.request("GET", f"/api/jobs/{job['id']}/MODEL.toml")[0] == 422
-
-
-def test_the_wheel_of_a_job_is_a_text(page):
-    request = {"kind": "gap", "files": [page.put("R.csv", b"x")], "model": {"wheel": {}}}
-    wrong, status = page.ask("/api/jobs", request)
-    assert status == 400 and wrong["error"] == "wheel: needed is a text"
 
 
 def test_a_job_can_be_cancelled_and_the_page_stays_live(page):
@@ -131,37 +93,6 @@ def test_a_raw_log_is_guessed_edited_and_imported(page, tmp_path):
     assert page.request("GET", f"/api/jobs/{job['id']}/import_report.html?show=1")[0] == 200
     again = page.job(kind="look", files=[f"{job['id']}/runs.csv"])
     assert again["result"]["kind"] == "runs" and again["result"]["rows"] == 4
-
-
-def test_one_run_is_estimated_alone_and_the_saved_model_holds_its_soil(page, tmp_path):
-    key = page.put("RUNS.csv", runs_text(3))
-    job = page.job(kind="estimate", files=[key], model={"values": {}}, run="heavy")
-    assert job["result"]["rows"] == 3 and job["result"]["load"] == [90.0, 90.0]
-    text = page.request("GET", f"/api/jobs/{job['id']}/model.toml")[2]
-    (tmp_path / "model.toml").write_bytes(text)
-    case = read_case(tmp_path / "model.toml")
-    for found in job["result"]["parameters"]:
-        assert getattr(case.soil, found["path"]) == pytest.approx(found["si"])
-
-
-@pytest.mark.parametrize(
-    ("request_", "said"),
-    [
-        ({"kind": "look", "files": ["0" * 32]}, "the file is gone"),
-        ({"kind": "look", "files": [7]}, "the file is gone"),
-        ({"kind": "look", "files": ["0" * 32 + "/runs.csv"]}, "this analysis is gone"),
-        ({"kind": "look", "files": []}, "a list of files"),
-        ({"kind": "shell", "files": ["x"]}, "needed is a kind"),
-        ({"files": "x"}, "needed is a kind"),
-        ({"kind": [], "files": [1]}, "needed is a kind"),
-        ({"kind": "estimate", "files": ["x"], "model": "x"}, "model: needed is an object"),
-        ({"kind": "look", "files": ["x"], "run": {}}, "run: needed is a text"),
-    ],
-    ids=str,
-)
-def test_a_wrong_job_is_refused_in_one_line(page, request_, said):
-    wrong, status = page.ask("/api/jobs", request_)
-    assert status in (400, 422) and said in wrong["error"]
 
 
 def test_the_pull_is_that_of_usual_errors_and_of_each_wheel(page):

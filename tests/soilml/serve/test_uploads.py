@@ -39,10 +39,6 @@ def test_the_page_takes_no_more_at_a_time_than_in_all(page):
         time.sleep(0.05)
 
 
-def test_a_long_name_in_any_script_is_taken(page):
-    assert page.put("%E6%BC%A2" * 120 + ".csv", b"run,slip\n")
-
-
 def test_uploads_that_have_stalled_make_room(tmp_path):
     now = [0.0]
     uploads = Uploads(tmp_path, clock=lambda: now[0])

@@ -12,10 +12,9 @@ sys.path.insert(0, str(Path(__file__).parents[3] / "bench"))
 from slip_drives import loads, simulate_drive
 
 from soilml import Operating, read_case
-from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError, TableError
 from soilml.slip_filter.drive import read_drive, slip_of_drive
-from soilml.slip_filter.filter import SlipFilter, slip_of_ratio, travel_ratio
+from soilml.slip_filter.filter import SlipFilter, travel_ratio
 from soilml.slip_filter.force_table import force_table
 from soilml.traction.draws import SoilDraws
 
@@ -29,24 +28,12 @@ def case():
 
 
 @pytest.fixture(scope="module")
-def table(case):
-    return force_table(case, (20.0, 140.0), SOILS)
-
-
-@pytest.fixture(scope="module")
 def drive():
     return simulate_drive(11, soils=1, rows=24)
 
 
 def code_of(found):
     return {remark.code for remark in found.remarks()}
-
-
-def test_slip_and_travel_ratio_follow_the_definition_of_driving_and_braking():
-    slip = np.asarray([-0.5, 0.0, 0.25])
-    ratio = travel_ratio(slip)
-    assert ratio == pytest.approx([2.0, 1.0, 0.75])
-    assert slip_of_ratio(ratio) == pytest.approx(slip)
 
 
 def test_loads_shift_to_the_lower_side_by_the_moments(case):
@@ -76,13 +63,6 @@ def test_with_a_known_soil_the_wheels_pull_what_the_slope_requires(case):
         assert answer.speed[1] == pytest.approx(0.1 * travel_ratio(slip[:1])[0])
 
 
-def test_before_any_torque_the_slip_on_the_flat_is_not_determined(table, case):
-    filter_ = SlipFilter(table, case.rover.weight, case.drive)
-    one = np.asarray([2.0, np.nan, np.nan, np.nan])
-    answer, _ = filter_.step(filter_.start(), np.full(4, 0.1), one, loads(np.asarray(0.0)), 0.0)
-    assert answer.slip[2, 0] - answer.slip[0, 0] > 0.15
-
-
 def test_a_hard_floor_is_refused_and_a_soil_is_not(case, drive):
     floor = simulate_drive(12, soils=1, rows=24, floor=True)
     found = slip_of_drive(case, floor.columns(), soils=SOILS)
@@ -90,18 +70,6 @@ def test_a_hard_floor_is_refused_and_a_soil_is_not(case, drive):
     assert not found.answered[10:].any()
     assert "no-soil" in code_of(found)
     assert "no-soil" not in code_of(slip_of_drive(case, drive.columns(), soils=SOILS))
-
-
-def test_rows_that_the_balance_does_not_describe_are_passed_over(case, drive):
-    columns = drive.columns()
-    rim = columns["rim_speed_m_s"].reshape(-1, 4)
-    rim[3], rim[6, 1], rim[9] = 0.0, -0.1, 0.4
-    found = slip_of_drive(case, columns | {"rim_speed_m_s": rim.ravel()}, soils=SOILS)
-    assert found.flags[3] == ("standing",)
-    assert found.flags[6] == ("wheel-stopped",)
-    assert found.flags[9] == ("not-steady",)
-    assert not found.answered[[3, 6, 9]].any()
-    assert found.answered[[2, 5, 12]].all()
 
 
 def test_in_reverse_the_answer_is_that_of_forward_up_the_same_slope(case, drive):
@@ -149,19 +117,3 @@ def test_a_bad_table_is_answered_in_one_line(case, drive, change, message):
     with pytest.raises(TableError, match=message) as error:
         read_drive(columns, case)
     assert "\n" not in str(error.value)
-
-
-def test_loads_that_the_prior_does_not_carry_are_refused(case):
-    with pytest.raises(InputError, match="do not carry wheels"):
-        force_table(case, (2e5, 3e5), 64)
-
-
-def test_a_case_without_a_rover_is_refused(case, drive):
-    with pytest.raises(InputError, match="mass and wheels"):
-        read_drive(drive.columns(), replace(case, rover=None))
-
-
-def test_a_written_model_file_keeps_the_drives(case, tmp_path):
-    known = replace(case, drive=replace(case.drive, torque_per_ampere=0.5, speed_std=0.01))
-    (tmp_path / "model.toml").write_text(case_as_toml(known))
-    assert read_case(tmp_path / "model.toml").drive == known.drive

@@ -6,7 +6,7 @@ import re
 
 import numpy as np
 import pytest
-from conftest import MODEL, WHEEL_ON_SAND
+from conftest import WHEEL_ON_SAND
 
 from soilml import Model, Operating, Soil, Wheel, export_soil, soil
 from soilml.cli import main
@@ -116,24 +116,6 @@ def test_the_gazebo_plugin_gives_the_forces_of_the_soil(tmp_path, slip, load):
     assert [float(x) for x in mu] == pytest.approx([math.tan(0.55)] * 2)
 
 
-def test_isaac_keeps_friction_alone_and_says_so(tmp_path):
-    source = fit_file(tmp_path)
-    export = export_soil(source, "isaac", tmp_path / "isaac")
-    text = (tmp_path / "isaac/soil_material.usda").read_text()
-    assert re.findall(r"(?:static|dynamic)Friction = (\S+)", text) == [f"{math.tan(0.55):.9g}"] * 2
-    assert 'frictionCombineMode = "multiply"' in text
-    assert {"cohesion", "shear_modulus", "kphi", "n"} <= export.target.ignored.keys()
-    page = (tmp_path / "isaac/README.md").read_text()
-    assert "`cohesion`: PhysX has no soil model" in page and "not-determined" in page
-    # a parameter that the program does not take is no warning of it
-    content = json.loads(source.read_text())
-    content["parameters"]["friction_angle"]["remaining_fraction"] = 0.1
-    content["warnings"] = [{"code": "not-identified", "about": ["cohesion"]}]
-    source.write_text(json.dumps(content))
-    assert codes(export_soil(source, "isaac")) == {("defaulted", "restitution")}
-    assert ("not-determined", "cohesion") in codes(export_soil(source, "chrono"))
-
-
 def test_draws_are_a_file_each_and_keep_the_spread_and_the_correlation(tmp_path):
     source, out = fit_file(tmp_path), tmp_path / "scm"
     export = export_soil(source, "chrono", out, draws=120)
@@ -155,19 +137,6 @@ def test_draws_are_a_file_each_and_keep_the_spread_and_the_correlation(tmp_path)
     assert left == ["mine_001.json", "scm_soil_001.json", "scm_soil_002.json"]
 
 
-def test_a_model_file_has_start_values_and_draws_of_its_priors(tmp_path):
-    path = tmp_path / "model.toml"
-    path.write_text(MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.3\n')
-    export = export_soil(path, "csv", tmp_path / "csv", draws=100)
-    shear = ("cohesion", "friction_angle", "shear_modulus")
-    assert codes(export) == {("not-measured", *shear), ("effects-lost", "slip-sinkage")}
-    drawn = np.asarray([draw["cohesion"] for draw in export.draws])
-    assert 0.0 <= drawn.min() < 200.0 < 2800.0 < drawn.max() <= 3000.0
-    assert export.origin("cohesion") == "prior" and export.origin("n") == "model file"
-    path.write_text(WHEEL_ON_SAND)
-    assert not export_soil(path, "csv").remarks
-
-
 @pytest.mark.parametrize("name", TARGETS)
 def test_every_parameter_of_the_soil_is_mapped_or_said_to_be_ignored(tmp_path, name):
     target = TARGETS[name]
@@ -179,31 +148,6 @@ def test_every_parameter_of_the_soil_is_mapped_or_said_to_be_ignored(tmp_path, n
     for own in (*target.mapped, *target.asked):
         assert f"| `{own.name}` |" in page
     assert all(f"<{source}>" in page for source in target.sources)
-
-
-@pytest.mark.slow
-def test_identify_writes_what_the_export_reads(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "model.toml").write_text(MODEL)
-    rows = ["--slip", "0.1:0.5:5", "--load", "40,90", "--run", "a", "--out", "runs.csv"]
-    assert main(["simulate", "model.toml", *rows]) == 0
-    command = ["identify", "model.toml", "runs.csv", "--method", "posterior"]
-    assert main([*command, "--out", "result.json"]) == 0
-    content = json.loads((tmp_path / "result.json").read_text())
-    own = content["parameters"]["friction_angle"]
-    drawn = np.asarray(content["draws"]["friction_angle"])
-    assert drawn.mean() == pytest.approx(own["value"], abs=0.1 * own["std"])
-    assert drawn.std() == pytest.approx(own["std"], rel=0.1)
-    assert content["model"]["soil"]["kphi"] == 1528430.0
-    export = ["export-soil", "result.json", "--to", "chrono", "--out", "scm", "--draws", "20"]
-    assert main(export) == 0
-    assert "elastic_K      default" in capsys.readouterr().out
-    assert len(list((tmp_path / "scm").glob("scm_soil_*.json"))) == 20
-    # with --by, each run has its soil, and no draws
-    assert main([*command, "--by", "run", "--out", "runs.json"]) == 0
-    by_run = ["export-soil", "runs.json", "--to", "csv", "--out", "csv"]
-    assert main([*by_run, "--run", "a"]) == 0
-    assert main(by_run) == main([*by_run, "--run", "a", "--draws", "3"]) == 2
 
 
 @pytest.mark.parametrize(

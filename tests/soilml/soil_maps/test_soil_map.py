@@ -8,13 +8,11 @@ import pytest
 
 from soilml import Estimator, Model, Operating, Wheel, read_case, soil, soil_map
 from soilml.cli import main
-from soilml.errors import FitError, InputError, TableError
+from soilml.errors import InputError
 from soilml.io.text_tables import csv_text
-from soilml.soil_maps.drive import read_map_drive
 from soilml.soil_maps.field import FieldSetting, SoilField
 from soilml.soil_maps.local_soils import LocalSoils
 from soilml.soil_maps.raster import MapGrid, geotiff, nav2_files, read_elevation
-from soilml.soil_maps.workflow import HEADINGS
 
 tifffile = pytest.importorskip("tifffile")
 
@@ -116,15 +114,6 @@ def test_the_soils_are_within_their_intervals(found):
     assert strong[0] > weak[0] and strong[1] > weak[1]
 
 
-def test_it_is_known_within_reach_of_the_path_alone(found):
-    centres = found.grid.centres
-    used = found.drive.place[found.followed.used]
-    nearest = np.hypot(*(centres[:, None] - used).transpose(2, 0, 1)).min(axis=1)
-    assert np.array_equal(found.known, nearest < 2.0)
-    bands = found.bands()
-    assert np.isnan(bands["cohesion_Pa"]).sum() == np.count_nonzero(~found.known)
-
-
 def test_the_weak_soil_is_climbed_with_less_probability_and_more_slip(found):
     ability, east = found.ability, found.grid.centres[found.known][:, 0]
     weak, strong = east < BORDER - 1.0, east > BORDER + 1.0
@@ -133,26 +122,6 @@ def test_the_weak_soil_is_climbed_with_less_probability_and_more_slip(found):
     # level ground takes less slip and work than a slope
     assert np.all(ability.climbed[:, 0] >= ability.climbed[:, 1])
     assert np.nanmax(ability.energy[:, 0]) < np.nanmin(ability.energy[:, 1])
-
-
-def test_uphill_is_the_worst_heading_and_downhill_counts_as_level(found):
-    pitch, along = found.pitch, found.by_heading
-    names = dict(zip(HEADINGS, np.rad2deg(np.median(pitch, axis=0)), strict=True))
-    assert names["E"] == pytest.approx(10.0, abs=1e-3)
-    assert names["W"] == pytest.approx(-10.0, abs=1e-3)
-    assert names["N"] == pytest.approx(0.0, abs=1e-3)
-    assert names["NE"] == pytest.approx(np.rad2deg(np.arctan(np.tan(np.deg2rad(10)) / 2**0.5)))
-    east, west, north = (HEADINGS.index(name) for name in ("E", "W", "N"))
-    assert np.all(along.slip[:, east] > along.slip[:, north])
-    assert np.allclose(along.slip[:, west], along.slip[:, north])
-    assert np.array_equal(found.occupied, 1.0 - along.climbed.min(axis=1))
-    assert "no-side-slope" in {remark.code for remark in found.remarks()}
-
-
-def test_stretches_held_out_are_predicted_better_than_by_one_soil(found):
-    gain, error = found.held_out.gain("one soil")
-    assert gain > 2.0 * error > 0.0
-    assert set(found.held_out.mean) == {"map", "tracker", "one soil"}
 
 
 @pytest.mark.parametrize("as_read", [False, True])
@@ -185,20 +154,6 @@ def test_the_field_is_the_conditional_normal(monkeypatch, as_read):
     left = joint[:4, :4] - across @ np.linalg.solve(inner, across.T)
     assert covariance[0] == pytest.approx(left[:2, :2], abs=1e-6)
     assert covariance[1] == pytest.approx(left[2:, 2:], abs=1e-6)
-
-
-def test_a_stretch_of_another_patch_says_less(monkeypatch):
-    place = np.asarray([[0.0, 0.0], [1.0, 0.0]])
-    error = np.tile(0.05 * np.eye(1), (2, 1, 1))
-    score, common = np.asarray([[1.0], [1.0]]), np.zeros((1, 1))
-    spread = []
-    for patch in (np.asarray([0, 0]), np.asarray([0, 1])):
-        soils = LocalSoils((), place, place[:, 0], patch, score, error, common, ())
-        monkeypatch.setattr(SoilField, "settings", [FieldSetting(0.2, 0.4, 0.4, 2.0, 1.0)])
-        mean, covariance = SoilField(soils).at(np.asarray([[0.0, 0.0]]))
-        spread.append((float(mean[0, 0]), float(covariance[0, 0, 0])))
-    (near, narrow), (alone, wide) = spread
-    assert wide > narrow and 0.0 < alone < near
 
 
 def test_a_geotiff_lies_where_its_cells_are(tmp_path):
@@ -234,49 +189,6 @@ def test_nav2_reads_the_probability_of_not_climbing():
     lines = dict(line.split(": ") for line in files["costmap.yaml"].decode().splitlines())
     assert lines["mode"] == "raw" and lines["negate"] == "0" and lines["image"] == "costmap.pgm"
     assert lines["origin"] == "[-1.5, 2.0, 0.0]" and lines["resolution"] == "0.5"
-
-
-def test_wheels_stand_where_the_heading_says(rover):
-    case, n = read_case(rover), 40
-    columns = {name: np.repeat(values[:n], 2) for name, values in two_soils().items()}
-    columns |= {
-        "time_s": np.repeat(np.arange(n, dtype=float), 2),
-        "wheel": np.tile(["front-left", "rear-right"], n),
-        "heading_rad": np.zeros(2 * n),
-    }
-    drive = read_map_drive(columns, case)
-    first = drive.place[np.argsort(drive.row)][:2]
-    assert first.tolist() == [[0.4, 0.3], [-0.4, -0.3]]
-    station = drive.station[np.argsort(drive.row)]
-    assert station[0] - station[1] == pytest.approx(0.8)
-    assert np.all(np.diff(drive.station) >= 0.0)
-
-
-def changed(**columns):
-    return {**two_soils(60), **columns}
-
-
-JUMP = np.where(np.arange(60) < 30, 0.25 * np.arange(60), 0.25 * np.arange(60) + 80.0)
-
-
-@pytest.mark.parametrize(
-    ("table", "error", "said"),
-    [
-        (changed(x_m=JUMP), TableError, "the position jumps by 80.2 m, the usual step is 0.25 m"),
-        (changed(y_m=np.where(np.arange(60) == 7, np.nan, 0.0)), TableError, "position is missing"),
-        (changed(x_m=np.zeros(60)), TableError, "there is no path"),
-        ({n: v[:20] for n, v in two_soils().items()}, FitError, "20 rows with position"),
-        ({n: v for n, v in two_soils().items() if n != "x_m"}, TableError, "column x_m is missing"),
-        (changed(wheel=np.tile(["a", "b"], 30)), TableError, "column time_s is missing"),
-        (changed(wheel=np.tile(["a", "b"], 30), time_s=np.arange(60.0), heading_rad=np.zeros(60)),
-         TableError, "'a'; wheels of [rover] are: front-left"),
-        (changed(load_N=np.full(60, 900.0)), FitError, "are outside the range of"),
-    ],
-)  # fmt: skip
-def test_bad_rows_are_refused_in_one_line(rover, estimator, table, error, said):
-    with pytest.raises(error) as raised:
-        soil_map(read_case(rover), table, estimator)
-    assert said in str(raised.value) and "\n" not in str(raised.value)
 
 
 def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):

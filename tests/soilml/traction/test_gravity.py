@@ -7,7 +7,6 @@ import pytest
 from remarked import remarked
 
 from soilml import Operating, read_case
-from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import GravityChange
@@ -60,14 +59,3 @@ def test_the_open_band_holds_the_medians_of_both_schools_and_says_what_the_law_c
     width, *narrow = (quantile_band(found[law].largest_pull).width for law in ("open", *SCHOOLS))
     share = f"makes {1.0 - np.mean(narrow) / width:.0%} of the band of largest_pull_N"
     assert remarked(reports["open"].by_load[0].warnings, share)
-
-
-def test_what_has_no_law_is_refused(case):
-    for bad in ((0.0, MOON), (EARTH, -1.0), (EARTH, float("nan"))):
-        with pytest.raises(InputError, match="must lie between"):
-            GravityChange(*bad)
-    negative = SoilDraws(("kphi",), np.asarray([[1e6], [-2e6]]))
-    with pytest.raises(InputError, match="kphi is -2e\\+06"):
-        draws_at_gravity(case, negative, GravityChange(EARTH, MOON))
-    with pytest.raises(InputError, match="had one gravity"):
-        draws_at_gravity(replace(case, simulator=object()), negative, GravityChange(EARTH, MOON))

@@ -7,7 +7,6 @@ import pytest
 
 from soilml import Operating, read_case
 from soilml.config.measurement_noise import Discrepancy, Noise
-from soilml.config.remainder import Remainder, RemainderPart
 from soilml.io.table import Table
 from soilml.traction.draws import SoilDraws
 from soilml.traction.model_errors import draw_model_errors
@@ -46,15 +45,6 @@ def drawn(case, table, loads, *, slips=SLIP, noise_scale=1.0):
     return found[1].amplitude("drawbar_pull"), after, before
 
 
-def test_where_no_pull_was_measured_the_error_is_as_declared(case):
-    amplitude, *both = drawn(case, rows(case), [60.0, 90.0])
-    assert amplitude == pytest.approx(0.5, rel=0.01)
-    for draws in both:
-        assert draws.std(axis=0) == pytest.approx(0.5, rel=0.07)
-        correlation = np.corrcoef(draws[:, 0, 0], draws[:, 1, 0])[0, 1]
-        assert correlation == pytest.approx(np.exp(-0.5 * (np.log(1.5) / 0.6) ** 2), abs=0.05)
-
-
 def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):
     table = rows(case, error=0.4)
     _, after, before = drawn(case, table, [60.0, 2000.0])
@@ -66,29 +56,6 @@ def test_measured_pulls_tell_the_error_near_them_and_not_far_away(case):
     assert before[:, 0].std(axis=0) == pytest.approx(0.5, rel=0.07)
     without = drawn(case, table, [60.0], noise_scale=None)[1]
     assert without.std(axis=0) == pytest.approx(0.5, rel=0.07)
-
-
-def test_a_share_is_of_the_measured_range_or_of_the_predicted_one(case):
-    share = replace(case, discrepancy={"drawbar_pull_N": Discrepancy(share=0.02)})
-    known = drawn(share, rows(case, error=0.0), [60.0])[0]
-    predicted = drawn(share, rows(case), [60.0])[0]
-    assert known == pytest.approx(predicted)
-    assert known > 0.0
-
-
-def test_a_learned_remainder_widens_with_the_distance_from_its_range(case):
-    """Near its points it is known; far from them it has a usual error."""
-    part = RemainderPart(
-        "drawbar_pull_N", "", 0.2, 0.5, 0.3, 0.6, (0.1, 0.5), (60.0, 60.0),
-        ((0.1, 60.0), (0.3, 60.0), (0.5, 60.0)), (1.0, 0.0, 0.0), np.eye(3).tolist(),
-        np.zeros((3, 1)).tolist(),
-    )  # fmt: skip
-    learned = replace(case, remainder=Remainder((part,)), discrepancy={})
-    amplitude, after, before = drawn(learned, rows(case), [60.0, 1200.0])
-    assert amplitude == pytest.approx(0.5, rel=0.03)
-    for draws in (after, before):
-        assert draws[:, 0].std(axis=0).max() < 0.03
-        assert draws[:, 1].std(axis=0) == pytest.approx(0.5, rel=0.07)
 
 
 def test_the_error_widens_the_bands_of_pull_and_slope(case):

@@ -6,19 +6,15 @@ import numpy as np
 import pytest
 from remarked import remarked
 
-from soilml import Operating, Wheel, identify, read_case
+from soilml import Operating, read_case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import Remainder, RemainderPart
 from soilml.config.wheeled_rover import RoverWheel, WheeledRover
-from soilml.errors import InputError, TableError
-from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
-from soilml.physics.model import Model
 from soilml.traction.draws import SoilDraws
-from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.rover_performance import rover_performance
-from soilml.traction.rover_report import rover_report, with_gravity
+from soilml.traction.rover_report import rover_report
 
 NAMES = ("cohesion", "friction_angle", "shear_modulus")
 SOIL = np.asarray([900.0, 0.6, 0.012])
@@ -66,18 +62,6 @@ def test_the_steepest_slope_takes_all_the_pull_there_is(case):
     assert beyond.climbed[0] == 0.0 and np.isnan(beyond.slip[0, 0]) and beyond.margin[0, 0] < 0.0
 
 
-def test_the_work_is_torque_over_the_distance_that_is_travelled(case):
-    found = rover_performance(case, draws(), SLOPES, SLIP)
-    torque = sum(found.torque[name][0] for name in FOUR)
-    assert found.energy[0] == pytest.approx(torque / 0.15 / (1.0 - found.slip[0]), rel=0.01)
-
-
-def test_a_soil_that_lets_nothing_move_has_no_slope(case):
-    found = rover_performance(case, draws([0.0, 0.05, 0.012], SOIL), SLOPES, SLIP)
-    assert np.isnan(found.steepest_slope[0]) and np.isfinite(found.steepest_slope[1])
-    assert np.all(found.climbed <= 0.5)
-
-
 def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
     again = replace(case, model=case.model + EFFECTS["multipass"]())
     found = rover_performance(again, draws(), SLOPES, SLIP)
@@ -85,26 +69,6 @@ def test_wheels_in_a_rut_are_those_of_the_second_pass(case):
     apart = {k: replace(w, left=2.0 * w.left) if "rear" in k else w for k, w in FOUR.items()}
     beside = replace(again, rover=replace(case.rover, wheels=apart))
     assert set(rover_performance(beside, draws(), SLOPES, SLIP).passes.values()) == {1}
-
-
-def test_wheels_have_gears_of_their_own(case):
-    gears = {k: Model(Wheel(radius=r, width=0.12)) for k, r in (("small", 0.1), ("large", 0.15))}
-    wheels = {k: replace(w, gear="small" if "front" in k else "large") for k, w in FOUR.items()}
-    both = replace(case, gears=gears, rover=replace(case.rover, wheels=wheels))
-    found = rover_performance(both, draws(), SLOPES, SLIP)
-    assert found.sinkage["front-left"][0, 0] > found.sinkage["rear-left"][0, 0]
-    equal = {k: replace(w, gear="large") for k, w in FOUR.items()}
-    same = replace(both, rover=replace(case.rover, wheels=equal))
-    expected = rover_performance(case, draws(), SLOPES, SLIP)
-    assert rover_performance(same, draws(), SLOPES, SLIP).slip == pytest.approx(expected.slip)
-
-
-def test_slopes_out_of_range_and_rovers_too_heavy_are_refused(case):
-    with pytest.raises(InputError, match="between 0 and 60 degrees"):
-        rover_performance(case, draws(), np.asarray([-0.1]), SLIP)
-    heavy = replace(case, rover=replace(case.rover, mass=50_000.0))
-    with pytest.raises(InputError, match="does not carry a wheel of"):
-        rover_performance(heavy, draws(), SLOPES, SLIP)
 
 
 def measured(case, wheels):
@@ -120,32 +84,6 @@ def measured(case, wheels):
             "wheel": np.asarray(wheels),
         }
     )
-
-
-def test_a_column_of_wheels_stands_for_gear_and_pass(case):
-    table = with_rover_columns(case, measured(case, ["front-left", "rear-left"]))
-    assert table["pass"].tolist() == [1.0, 2.0]
-    with pytest.raises(TableError, match=r"'nose'; wheels of \[rover\] are: front-left"):
-        with_rover_columns(case, measured(case, ["front-left", "nose"]))
-    with pytest.raises(TableError, match="column wheel: the cell is blank; wheels of"):
-        with_rover_columns(case, measured(case, ["front-left", ""]))
-    again = replace(case, model=case.model + EFFECTS["multipass"]())
-    identify(again, measured(again, list(FOUR)), None, "nonlinear")  # the effect needs the pass
-
-
-@pytest.mark.slow
-def test_the_report_knows_what_the_rows_tell(case):
-    table = measured(case, list(FOUR))
-    found = rover_report(case, table, slopes=SLOPES)
-    truth = rover_performance(case, draws(), SLOPES, SLIP)
-    low, high = np.quantile(found.performance.steepest_slope, [0.005, 0.995])
-    assert low < truth.steepest_slope[0] < high
-    before = np.nanquantile(found.prior_steepest, [0.05, 0.95])
-    after = np.quantile(found.performance.steepest_slope, [0.05, 0.95])
-    assert np.ptp(after) < 0.8 * np.ptp(before)
-    light = rover_report(with_gravity(case, 1.62), table, slopes=SLOPES)
-    assert remarked(light.warnings, "gravity is 1.62")
-    assert remarked(light.warnings, "wheels carry")
 
 
 @pytest.mark.slow
@@ -167,29 +105,3 @@ def test_bands_of_a_rover_have_the_error_of_its_model(case):
         # the wheel carries 68.7 N, two lengths beyond the learned range: a usual error, 0.3 N m
         assert np.std(torque) == pytest.approx(np.hypot(0.3, np.std(exact)), rel=0.15)
     assert remarked(plain.warnings, "not errors of the model")
-
-
-@pytest.mark.slow
-def test_the_error_of_a_gear_is_that_of_its_wheels(case):
-    """Another gear's error changes nothing, and measured rows tell the error of their gear."""
-    names = ("smooth", "lugged")
-    both = replace(
-        case,
-        gears=dict.fromkeys(names, case.model),
-        rover=replace(
-            case.rover,
-            wheels={n: replace(w, gear=names[n[:4] == "rear"]) for n, w in FOUR.items()},
-        ),
-    )
-    part = RemainderPart(
-        "torque_Nm", "lugged", 0.3, 0.3, 0.3, 0.6, (0.1, 0.5), (60.0, 70.0),
-        ((0.3, 65.0),), (0.0,), ((0.0,),), ((0.0,),),
-    )  # fmt: skip
-    learned = replace(both, remainder=Remainder((part,)))
-    at = measured(case, list(FOUR))
-    after, _ = draw_model_errors(learned, with_rover_columns(learned, at), draws(), SLIP, [65.0])
-    assert list(after.functions) == [("torque", "lugged")]
-    found = rover_performance(learned, replace(draws(), errors=after), SLOPES, SLIP)
-    exact = rover_performance(both, draws(), SLOPES, SLIP)
-    assert np.allclose(found.torque["front-left"], exact.torque["front-left"])
-    assert not np.allclose(found.torque["rear-left"], exact.torque["rear-left"], rtol=1e-6)

@@ -8,16 +8,12 @@ from conftest import MODEL
 
 from datagen.recipe import read_recipe
 from soilml import SlipSinkage, read_case
-from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.physics.effects import EFFECTS
 from training.adaptation.campaign import (
     DrivenRange,
-    board_unknowns,
     recipe_text,
     split_runs,
-    untrainable_effects,
 )
 from training.set_posterior.families.recipe_family import RecipeFamily
 
@@ -51,22 +47,6 @@ def test_whole_runs_are_kept_back_by_the_seed():
     assert len({split_runs(table, seed).runs for seed in range(20)}) > 5
 
 
-def test_of_few_runs_none_is_kept_back():
-    table = log(runs=3)
-    split = split_runs(table, 0)
-    assert split.kept_back is None and split.runs == () and len(split.campaign) == len(table)
-
-
-def test_ranges_have_a_margin_and_leave_braking_out(case):
-    table = log()
-    driven = DrivenRange.of(table, case)
-    assert driven.slip == pytest.approx((0.05, 0.55)) and driven.load == (33.3, 120.0)
-    braking = Table(table.columns | {"slip": np.where(table["slip"] < 0.2, -0.2, table["slip"])})
-    assert DrivenRange.of(braking, case).slip[0] == pytest.approx(0.1833, abs=1e-4)
-    with pytest.raises(InputError, match="no row has a slip above 0"):
-        DrivenRange.of(Table(table.columns | {"slip": -table["slip"]}), case)
-
-
 def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     model = replace(case.model, effects=(SlipSinkage(n1=0.4),))
     prior = {**case.prior, "slip-sinkage.n1": Prior(0.3, 0.5)}
@@ -79,22 +59,3 @@ def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     assert recipe.case.prior == prior and recipe.case.model == model
     family = RecipeFamily.of(recipe, ("cohesion", "friction_angle", "shear_modulus"))
     assert len(family.axes) == 4
-
-
-def test_unknowns_beyond_what_a_file_has_are_fixed_and_said(case):
-    more = {name: Prior(1.0, 2.0) for name in ("kphi", "n")}
-    model = replace(case.model, effects=(SlipSinkage(n1=0.4), EFFECTS["grousers"](height=0.01)))
-    sizes = {"slip-sinkage.n1": Prior(0.1, 0.7), "grousers.height": Prior(0.0099, 0.0101)}
-    own = replace(case, model=model, prior={**sizes, **case.prior, **more})
-    kept, remarks = board_unknowns(own)
-    assert "slip-sinkage.n1" in kept.prior and set(case.prior) | set(more) <= set(kept.prior)
-    assert [r.about for r in remarks] == [("grousers.height",)]
-    assert board_unknowns(case) == (case, [])
-    with pytest.raises(InputError, match="none of cohesion, friction_angle, shear_modulus"):
-        board_unknowns(replace(case, prior=more))
-
-
-def test_effects_that_need_more_than_slip_and_load_cannot_be_trained(case):
-    effects = (SlipSinkage(n1=0.4), EFFECTS["multipass"]())
-    own = replace(case, model=replace(case.model, effects=effects))
-    assert untrainable_effects(own) == {"multipass": ("pass",)}

@@ -7,13 +7,10 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL
 
 from soilml import SlipSinkage, read_case, simulate
-from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.quantities import SHEAR
 from training.adaptation.judgement import BoardCandidate, judge
-from training.adaptation.page import adapt_page, adapt_text, judgement_tables, plot_judgement
-from training.adaptation.result import AdaptReport
 
 
 @dataclass
@@ -73,18 +70,6 @@ def test_the_right_model_predicts_to_the_noise_and_the_wrong_one_does_not(case, 
     assert reverse.ratio == pytest.approx(1.0 / found.ratio)
 
 
-def test_log_scores_are_densities_of_the_readings_over_the_range(case, world):
-    true, table = world
-    found = judge(table, candidate(case), candidate(true), first_rows=(8,))
-    rows = table.rows(np.arange(8, 12))
-    scale = max(table["torque_Nm"].max(), 0.0)
-    exact = simulate(true, rows["slip"], rows["load_N"])["torque_Nm"]
-    std = 0.02 * np.abs(rows["torque_Nm"])
-    off = (rows["torque_Nm"] - exact) / std
-    by_hand = np.mean(-0.5 * off**2 - np.log(std / scale) - 0.5 * np.log(2 * np.pi))
-    assert found.runs[0].scores_after["torque_Nm"].log_score == pytest.approx(by_hand, rel=1e-4)
-
-
 def test_a_known_soil_is_compared_and_columns_come_first(case, world):
     true, table = world
     other = replace(case, soil=replace(case.soil, cohesion=500.0))
@@ -95,34 +80,3 @@ def test_a_known_soil_is_compared_and_columns_come_first(case, world):
     found = judge(Table(columns), candidate(other), candidate(true), known)
     assert found.soil_error["cohesion"] == pytest.approx((0.0, 540.0))
     assert judge(table, candidate(case), candidate(true)).soil_error == {}
-
-
-def test_runs_that_are_too_short_cannot_be_judged(case, world):
-    true, table = world
-    short = table.rows(np.r_[0:4, 12:16])
-    with pytest.raises(InputError, match=r"has 4 rows .* more than 4"):
-        judge(short, candidate(case), candidate(true))
-
-
-@pytest.mark.slow
-def test_the_page_leads_with_the_verdict(case, world):
-    true, table = world
-    judgement = judge(table, candidate(case), candidate(true), dict.fromkeys(SHEAR, 1.0))
-    report = AdaptReport(
-        "adapted", "named", "Slip-sinkage.", ("slip-sinkage",), ("a", "b"), judgement,
-        ("adapted.onnx", "adapted.md", "adapted.c"), (), 2000, 0,
-    )  # fmt: skip
-    assert report.sentence.startswith("The adapted file predicts kept-back runs with 0.")
-    assert adapt_text(report).splitlines()[0] == report.sentence
-    assert adapt_page(report).answer[0] == report.sentence
-    assert [len(t.rows) for t in judgement_tables(judgement)] == [6, 3]
-    content = report.as_json()
-    assert content["judgement"]["error_ratio"] == judgement.ratio
-    assert content["judgement"]["by_first_rows"]["4"]["sinkage_m"]["after"]["error"] < 0.03
-    assert plot_judgement(judgement).shape == (2, 2)
-    worse = replace(report, status="not-better")
-    assert worse.sentence.startswith("The old file stays")
-    refused = replace(report, status="not-supported", judgement=None)
-    assert refused.sentence == "The old file stays: Slip-sinkage."
-    with pytest.raises(InputError, match="nothing can be drawn"):
-        refused.plot()

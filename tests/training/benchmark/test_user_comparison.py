@@ -1,16 +1,25 @@
-"""The comparison on test data: every method scored on the same sets."""
+"""`soilml compare`: methods on the same sets, and where training differs from the test data."""
 
 import csv
 import json
+from dataclasses import replace
 
-import numpy as np
 import pytest
 from conftest import MODEL, RECIPE
 
 from soilml import Estimator, read_case, read_table
 from soilml.cli import main
-from soilml.identification import METHODS
-from training.benchmark.user_comparison import compare
+from soilml.errors import InputError
+from training.benchmark.bayes_limit import UNMODELLED_EFFECTS
+from training.benchmark.methods import (
+    ANALYTIC_PREFIX,
+)
+from training.benchmark.suite import (
+    ANALYTIC_METHODS,
+    LIMIT_LABEL,
+    POSTERIOR_LABEL,
+)
+from training.benchmark.user_comparison import check_same_provenance
 
 
 @pytest.fixture(scope="module")
@@ -25,47 +34,6 @@ def test_data(tmp_path_factory):
     (folder / "model.toml").write_text(MODEL + "sinkage_m = 0.0005\n")
     generate(read_recipe(folder / "recipe.toml"), folder / "test.parquet")
     return folder
-
-
-@pytest.fixture(scope="module")
-def scores(test_data, small_model):
-    case = read_case(test_data / "model.toml")
-    table = read_table(test_data / "test.parquet")
-    return compare(case, table, {"small": Estimator.load(small_model)}, analytic_sets=2)
-
-
-def score(scores, rows, method):
-    return next(x for x in scores if x.rows == rows and x.method == method)
-
-
-@pytest.mark.slow
-def test_every_method_is_scored_on_every_size_of_set(scores):
-    methods = {"prior", "small", *(f"analytic {method}" for method in METHODS)}
-    for rows in (1, 12):
-        assert {x.method for x in scores if x.rows == rows} == methods
-
-
-def test_the_prior_scores_itself(scores):
-    prior = score(scores, 1, "prior")
-    np.testing.assert_allclose(prior.rmse_over_prior, 1.0, rtol=0.06)
-    np.testing.assert_allclose(prior.coverage90, 0.9, atol=0.05)
-    np.testing.assert_allclose(prior.coverage50, 0.5, atol=0.08)
-
-
-@pytest.mark.slow
-def test_twelve_readings_reduce_the_error_that_one_leaves(scores):
-    one, twelve = score(scores, 1, "small"), score(scores, 12, "small")
-    assert 0.8 < one.rmse_over_prior[0] < 1.02
-    assert (twelve.rmse_over_prior < one.rmse_over_prior).all()
-    assert (score(scores, 12, "analytic nonlinear").rmse_over_prior < 0.5).all()
-    assert (np.abs(one.coverage90 - 0.9) < 0.05).all()
-
-
-def test_methods_that_need_several_rows_fail_on_one(scores):
-    for method in ("analytic linear", "analytic newton"):
-        assert score(scores, 1, method).failed == score(scores, 1, method).sets
-        assert score(scores, 12, method).failed < score(scores, 12, method).sets
-    assert np.isnan(score(scores, 12, "analytic linear").rmse[2])  # K is fixed, not estimated
 
 
 @pytest.mark.long
@@ -86,3 +54,72 @@ def test_the_command_writes_table_picture_and_page(test_data, small_model, capsy
     content = json.loads((out / "compare.json").read_text())
     assert len(content["columns"]["rmse"]) == len(rows)
     assert content["report"]["kind"] == "compare" and len(content["report"]["files"]) == 3
+
+
+@pytest.mark.long
+def test_the_command_writes_tables_figure_and_goals(small_model, tmp_path, capsys):
+    out = tmp_path / "results"
+    assert main(["compare", str(small_model), "--sets", "1", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert "18 rows, three loads, slips in a grid" in printed and "Bayes limit" in printed
+    rows = list(csv.DictReader((out / "benchmark.csv").read_text().splitlines()))
+    assert {r["method"] for r in rows} == {
+        LIMIT_LABEL,
+        POSTERIOR_LABEL,
+        "prior",
+        "small",
+        *(f"{ANALYTIC_PREFIX}{name}" for name in ANALYTIC_METHODS),
+    }
+    assert {r["unknown_effect"] for r in rows} == {"", *UNMODELLED_EFFECTS}
+    assert (out / "benchmark.png").stat().st_size > 20_000
+    assert "Acceptance goals" in (out / "report.html").read_text()
+    content = json.loads((out / "benchmark.json").read_text())
+    assert content["report"]["answer"][0].endswith("acceptance goals are met.")
+    assert max(map(len, printed.splitlines())) <= 100
+
+
+NAMES = ("cohesion", "friction_angle", "shear_modulus")
+
+
+OTHERS = {
+    "soil": (MODEL.replace("dry_sand", "sandy_loam_32"), ", the model file"),
+    "bearing": (
+        MODEL.replace("[soil.prior]", "kphi = 1e6\n[soil.prior]"),
+        "the model file has 1e+06",
+    ),
+    "effect": (MODEL + '[[effect]]\nname = "slip-sinkage"\nn1 = 0.4\n', "effects none"),
+    "prior": (MODEL.replace("3000.0", "6000.0"), "prior [0.0, 3000.0] of cohesion"),
+    "scale": (
+        MODEL.replace("[0.005, 0.03]", '{ range = [0.005, 0.03], scale = "log" }'),
+        "of shear_modulus",
+    ),
+    "gear": (MODEL.replace('"wheel"', '"linear-wheel"'), "gear type 'wheel'"),
+    "wheel": (MODEL.replace("radius = 0.15", "radius = 0.1"), "radius 0.15"),
+}
+
+
+@pytest.fixture
+def parts(tmp_path, small_data, small_model):
+    table = read_table(small_data)
+    return table.rows(slice(0, 100)), {"small": Estimator.load(small_model)}
+
+
+def case_of(tmp_path, text):
+    (tmp_path / "m.toml").write_text(text)
+    return read_case(tmp_path / "m.toml")
+
+
+@pytest.mark.parametrize("what", OTHERS)
+def test_without_a_recipe_of_the_data_the_training_differences_are_noted(tmp_path, parts, what):
+    text, fragment = OTHERS[what]
+    table, estimators = parts
+    case, table = case_of(tmp_path, text), replace(table, metadata={})
+    if what in ("gear", "wheel"):
+        with pytest.raises(InputError, match="compare data and models of one wheel"):
+            check_same_provenance(case, table, estimators, NAMES)
+    else:
+        (note, *_) = check_same_provenance(case, table, estimators, NAMES)
+        assert (note.code, note.about) == (
+            "trained-otherwise",
+            ("small",),
+        ) and fragment in note.text

@@ -5,7 +5,7 @@ import pytest
 
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import RunConditions
-from training.calibration.held_out import MOST_ROWS, carry_errors, measure_held_out, steady_runs
+from training.calibration.held_out import carry_errors, measure_held_out
 from training.calibration.row_pooling import calibrate_single_rows
 from training.dataset import Dataset
 
@@ -60,25 +60,6 @@ def test_the_share_of_error_in_common_is_found(share):
     np.testing.assert_allclose(
         np.std(found.average_mean - found.average_truth), 0.1 * found.repeat_std[-1, 0], rtol=0.05
     )
-
-
-def test_runs_at_several_slips_are_no_repeats():
-    data = rows([8] * 300, False)
-    assert steady_runs(data, CONDITIONS) == []
-    found = measure_held_out(sensor(0.5), data, CONDITIONS, FACTOR)
-    assert found.repeats.tolist() == [1] and len(found.average_rows) == 0
-    assert found.common_share()[0] == 1.0  # repeated readings then count as one
-
-
-def test_files_choose_the_same_rows_whatever_each_has_in_range():
-    data = rows([1] * (MOST_ROWS + 1500), False)
-    narrow = sensor(0.5, lambda features: features[:, 0] < 0.5)
-    one = measure_held_out(sensor(0.5), data, CONDITIONS, FACTOR)
-    other = measure_held_out(narrow, data, CONDITIONS, FACTOR)
-    assert len(one.rows) == MOST_ROWS
-    assert 0.7 * MOST_ROWS < len(other.rows) < 0.95 * MOST_ROWS
-    assert set(other.rows) <= set(one.rows)
-    assert (other.truth < 0.5).all()
 
 
 def test_repeats_are_scored_on_other_runs():

@@ -107,31 +107,3 @@ def test_versions_are_pinned_where_old_runtimes_still_read_them(small_model):
     kinds = {t.data_type for t in model.graph.initializer}
     assert onnx.TensorProto.FLOAT not in kinds  # weights stay float64 inside
     assert {i.type.tensor_type.elem_type for i in model.graph.input} == {onnx.TensorProto.FLOAT}
-
-
-def test_other_inputs_can_be_used(tmp_path, few_rows):
-    text = 'features = ["slip", "torque/load", "load", "sinkage", "drawbar_pull/load"]\n'
-    original = trained(tmp_path, few_rows, text + MEMBERS["fixed-size-lssvm"])
-    export_model(original, tmp_path / "m.onnx", few_rows)
-    estimator = Estimator.load(tmp_path / "m.onnx")
-    assert estimator.inputs == ("slip", "torque", "load", "drawbar_pull", "sinkage")
-    # drawbar pull and sinkage without noise determine far more than torque alone
-    assert original.scores["estimator"].relative.mean() < 0.72  # torque alone: about 0.80
-
-
-def test_values_with_a_unit_are_numbers_in_the_file(tmp_path):
-    from conftest import RECIPE
-
-    from datagen.generate import generate
-    from datagen.recipe import read_recipe
-
-    text = RECIPE.format(rows=500, seed=9).replace("radius = 0.15", 'radius = "150 mm"')
-    text = text.replace("[0.436332, 0.785398]", '["25 deg", "45 deg"]')
-    (tmp_path / "recipe.toml").write_text(text)
-    data = tmp_path / "data.parquet"
-    generate(read_recipe(tmp_path / "recipe.toml"), data)
-    export_model(trained(tmp_path, data, MEMBERS["linear"]), tmp_path / "m.onnx", data)
-    estimator = Estimator.load(tmp_path / "m.onnx")
-    gear = json.loads(estimator.metadata["gear"])
-    assert gear == {"type": "wheel", "radius": 0.15, "width": 0.12}
-    assert np.rad2deg(estimator.prior.upper[1]) == pytest.approx(45.0)

@@ -72,16 +72,3 @@ def test_every_shape_is_a_number(tmp_path, file):
     assert known >= {name for node in inferred.node for name in node.output if name}
     names = [node.name for node in model.graph.node]
     assert len(set(names)) == len(names) and all(names)
-
-
-def test_a_file_without_a_set_posterior_is_refused(tmp_path, capsys):
-    out = tmp_path / "step.onnx"
-    assert main(["export-step", "exported/wheel_mlp.onnx", str(out)]) == 2
-    assert "has no set posterior" in capsys.readouterr().err
-    assert not out.exists()
-
-
-def test_it_is_no_file_for_the_runtime(tmp_path, capsys):
-    out = exported(tmp_path, "wheel")
-    assert main(["estimate", str(out)]) == 2
-    assert "is one step of a stream" in capsys.readouterr().err

@@ -5,7 +5,6 @@ import shutil
 import numpy as np
 import pytest
 
-from soilml.errors import ModelFileError
 from soilml.onboard.estimator import Estimator
 from training.export.stored_response import write_anew
 
@@ -24,8 +23,3 @@ def test_the_answers_are_the_same(whole_file, tmp_path, size):
     assert after.run(**ROWS).mean == pytest.approx(before.run(**ROWS).mean, rel=1e-3)
     assert after.run(**ROWS).std == pytest.approx(before.run(**ROWS).std, rel=1e-3)
     np.testing.assert_array_equal(after(**ROWS).mean, before(**ROWS).mean)
-
-
-def test_a_file_without_sets_is_refused(small_model):
-    with pytest.raises(ModelFileError, match="has no set posterior"):
-        write_anew(small_model)

@@ -15,8 +15,6 @@ from soilml.onboard.set_posterior import OUTPUTS
 RELEASED = sorted(file.stem for file in (ROOT / "exported").glob("*.onnx"))
 SINGLES = [name for name in RELEASED if not name.startswith("any_wheel")]
 SETS = ["any_wheel", "any_wheel_small", "kls1_wheel", "wheel", "wheel_small"]
-#: Files whose single readings stay in double precision: sums of a kernel method cancel.
-DOUBLES = {"kls1_wheel", "wheel", "wheel_lssvm"}
 #: Largest difference of an estimate from one row, which is computed in double.
 SINGLE = 1e-5
 
@@ -77,12 +75,6 @@ def test_single_readings(name, compiler, compiled):
             assert (error < SINGLE).all()
         error = answer["covariance"].reshape(scale.shape) - expected.covariance[i]
         assert (np.abs(error) / scale < SINGLE).all()
-
-
-@pytest.mark.parametrize("name", SINGLES)
-def test_single_readings_are_in_float_where_that_changes_nothing(name, exported):
-    header = (exported(name) / f"{name}.h").read_text()
-    assert ("double doubles[" in header) == (name in DOUBLES)
 
 
 def probe_rows(estimator, rng, count):
@@ -147,26 +139,6 @@ def test_rows_that_lack_a_reading_are_left_out_as_onnxruntime_does(name, missing
         same_answer(answer, outputs)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", SETS)
-def test_steps_in_which_rows_lack_readings_are_those_of_onnxruntime(name, compiled):
-    """The first step has none but such rows, and others have one."""
-    model, plain = compiled(name), loaded(name)
-    rows, given = probe_rows(plain, np.random.default_rng(15), 12)
-    estimator = plain.on(**given) if given else plain
-    memory, state = model.start(**given), estimator.start()
-    for first, lacking in ((0, [0, 1, 2, 3]), (4, [0]), (8, [3])):
-        part = {key: values[first : first + 4] for key, values in rows.items()}
-        fed = estimator.sets.feed(estimator.sets.rows(part), state)
-        part["torque"] = part["torque"].copy()
-        part["torque"][lacking] = fed["torque"][lacking] = np.nan
-        *outputs, system, counts = estimator.session.run(OUTPUTS, fed)
-        state = state.grown(system, counts)
-        _, answer = model.update(memory, model.rows(**part))
-        assert list(memory.counted) == list(counts)
-        same_answer(answer, outputs)
-
-
 def same_answer(answer, outputs):
     """All numbers of an answer agree with outputs of onnxruntime."""
     expected = {k.removeprefix(SET_PREFIX): v for k, v in zip(OUTPUTS, outputs, strict=False)}
@@ -180,24 +152,6 @@ def same_answer(answer, outputs):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SETS)
-def test_a_set_of_rows_that_all_lack_a_reading_is_the_prior(name, compiled):
-    model, plain = compiled(name), loaded(name)
-    rows, given = probe_rows(plain, np.random.default_rng(14), 4)
-    rows["torque"][:] = np.nan
-    code, answer = model.update(model.start(**given), model.rows(**rows))
-    assert code == model.codes["OUT_OF_RANGE"] and not answer["in_range"]
-    prior = (plain.on(**given) if given else plain).prior
-    assert (np.abs(answer["mean"] - prior.mean) < 0.02 * prior.std).all()
-
-
-@pytest.mark.parametrize("name", ["wheel_linear", "slip_torque"])
-def test_a_single_row_that_lacks_a_reading_is_refused(name, compiled):
-    model = compiled(name)
-    assert model.single(model.row(load=60.0))[0] == model.codes["BAD_READING"]
-
-
-@pytest.mark.slow
 def test_a_context_of_zeros_is_refused_and_a_usual_one_is_that_of_the_file(compiled):
     model, estimator = compiled("wheel"), loaded("wheel")
     zeros, memory = model.structs["wheel_context"](), model.new("memory")
@@ -208,13 +162,6 @@ def test_a_context_of_zeros_is_refused_and_a_usual_one_is_that_of_the_file(compi
     assert model.call("set_start", memory, usual) == 0
     other = model.start()  # of no context at all
     assert bytes(memory) == bytes(other)
-
-
-@pytest.mark.slow
-def test_the_usual_context_of_many_wheels_needs_a_wheel(compiled):
-    model = compiled("any_wheel")
-    code = model.call("set_start", model.new("memory"), model.new("context"))
-    assert code == model.codes["BAD_CONTEXT"]
 
 
 @pytest.mark.parametrize("name", ["wheel_linear", "slip_torque"])

@@ -191,32 +191,3 @@ def test_a_memory_in_which_a_bit_has_flipped_is_refused(compiled):
             assert model.step(memory, row)[0] == model.codes["NOT_STARTED"]
             assert bytes(memory) == before
     assert read <= (30 if gap else 0)
-
-
-def test_a_tracker_whose_memory_is_no_number_is_refused_as_it_is(compiled):
-    model = compiled("wheel")
-    own = CompiledTracker(model, {})
-    for row in day(0)[:20]:
-        own.read(**row)
-    own.tracker.memory.factor[0] = np.nan
-    own.tracker.stale = True
-    before = bytes(own.tracker)
-    assert own.read(**day(0)[20])[0] == model.codes["NOT_STARTED"] and bytes(own.tracker) == before
-
-
-def test_a_tracker_that_was_not_started_is_refused(compiled):
-    model = compiled("wheel")
-    own = CompiledTracker(model, {})
-    own.tracker = model.new("tracker")
-    assert own.read(**day(0)[0])[0] == model.codes["NOT_STARTED"]
-    zeros = model.structs["wheel_context"]()
-    assert model.call("tracker_start", own.tracker, zeros) == model.codes["BAD_CONTEXT"]
-
-
-def test_the_constants_are_those_of_the_tracker_in_python(compiled):
-    model = compiled("wheel")
-    assert {e.name: e.value for e in Event}.items() <= model.codes.items()
-    assert (
-        model.numbers["WHEEL_TRACKER_LENGTH"]
-        == SoilTracker(Estimator.load(ROOT / "exported" / "wheel.onnx")).length
-    )

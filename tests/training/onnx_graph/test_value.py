@@ -1,4 +1,4 @@
-"""Operators on values compute what numpy computes, and append one node each."""
+"""Graphs: operators and factors compute what numpy computes, and shortcuts choose a branch."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,9 @@ from training.onnx_graph.value import (
     Value,
     absolute,
     asinh,
+    cholesky_columns,
     concat,
+    constant,
     exp,
     floor,
     gemm,
@@ -16,6 +18,7 @@ from training.onnx_graph.value import (
     maximum,
     minimum,
     reciprocal,
+    shortcut,
     softmax,
     sqrt,
     tanh,
@@ -23,6 +26,8 @@ from training.onnx_graph.value import (
 )
 
 X = np.asarray([[0.5, 1.5, 2.5], [3.0, 0.25, 1.0]], np.float32)
+
+
 EXPRESSIONS = {
     "2 x + 1": (lambda x: 2.0 * x + 1.0, lambda x: 2.0 * x + 1.0),
     "1 - x / 2": (lambda x: 1.0 - x / 2.0, lambda x: 1.0 - x / 2.0),
@@ -77,17 +82,45 @@ def test_an_expression_computes_what_numpy_computes(name):
     assert session.run(None, {"x": X})[0] == pytest.approx(of_arrays(X), rel=1e-6)
 
 
-def test_a_value_of_doubles_is_combined_with_constants_of_doubles():
+def test_what_no_output_needs_is_left_out():
     graph = Graph()
-    wide = Value(graph, "x").astype(np.float64) + 1e-12
-    (wide - 1.0).astype(np.float32).named("y")
-    session = session_of(graph.model({"x": [1]}, {"y": (1, [1])}))
-    assert session.run(None, {"x": np.ones(1, np.float32)})[0] == pytest.approx(1e-12, rel=1e-3)
+    x = Value(graph, "x")
+    unused = constant(graph, np.arange(4.0)) * x
+    (x + 1.0).named("y")
+    model = graph.model({"x": [1]}, {"y": (1, [1])})
+    assert [node.op_type for node in model.graph.node] == ["Add"]
+    assert unused.name not in {node.output[0] for node in model.graph.node}
+    assert len(model.graph.initializer) == 1
 
 
-def test_only_the_last_node_can_be_given_the_name_of_an_output():
-    x = Value(Graph(), "x")
-    first = x + 1.0
-    assert (first * 2.0).named("y").name == "y"
-    with pytest.raises(ValueError, match="not an output of the last node"):
-        first.named("z")
+@pytest.fixture
+def model():
+    """y is x where the sum of x is not positive, else x + 2, within two branches."""
+    graph = Graph()
+    x = Value(graph, "x")
+
+    def general(inner: Value) -> Value:
+        return shortcut(inner.sum() <= 100.0, lambda v: v + 2.0, lambda v: v + 3.0, inner)
+
+    (shortcut(x.sum() <= 0.0, lambda v: v, general, x) * 1.5).named("y")
+    return graph.model({"x": [2]}, {"y": (1, [2])})
+
+
+@pytest.mark.parametrize("x", [(-1.0, 0.5), (1.0, 0.5), (99.0, 2.0)])
+def test_a_shortcut_is_taken_where_its_condition_is_true(model, x):
+    added = 0.0 if sum(x) <= 0.0 else 2.0 if sum(x) <= 100.0 else 3.0
+    found = session_of(model).run(None, {"x": np.asarray(x, np.float32)})[0]
+    assert found == pytest.approx(1.5 * (np.asarray(x) + added))
+
+
+@pytest.mark.parametrize("p", [2, 4, 6])
+def test_the_factor_of_moments_is_that_of_numpy(p):
+    rng = np.random.default_rng(p)
+    points = np.concatenate([np.ones((50, 1)), rng.normal(0.3, 0.4, (50, p - 1))], axis=1)
+    moments = points.T @ points / 50.0
+    graph = Graph()
+    cholesky_columns(Value(graph, "moments"), p).named("factor")
+    session = session_of(graph.model({"moments": [p, p]}, {"factor": (1, [p, p])}))
+    found = session.run(None, {"moments": moments.astype(np.float32)})[0]
+    assert found == pytest.approx(np.linalg.cholesky(moments), abs=1e-4)
+    assert found[:, 0] == pytest.approx(points.mean(axis=0), abs=1e-6)

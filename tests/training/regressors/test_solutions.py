@@ -1,4 +1,4 @@
-"""Solutions in tiles and in parts: the same as at once, in the memory that was stated."""
+"""Solutions in tiles and in parts are those at once; gradients are those of differences."""
 
 import tracemalloc
 
@@ -8,6 +8,9 @@ import pytest
 from soilml.processes import limited_workers
 from training.regressors import exact_solution, nystrom_features
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.regressors.rbf_expansion import rbf
+from training.regressors.tanh_network import TanhNetwork
+from training.regressors.tiled_cholesky import TILE, TiledCholesky
 
 
 def curve(rows, seed=0, noise=0.1):
@@ -66,14 +69,6 @@ def test_a_fit_stays_within_the_memory_that_it_states(regressor, rows, monkeypat
     assert 0.3 * stated < peak < stated
 
 
-def test_ten_times_the_rows_need_little_more_memory_where_prototypes_are_few():
-    few, many = (FixedSizeLSSVM().requirements(n, 3, 3) for n in (100_000, 1_000_000))
-    assert many.memory - few.memory < 0.25e9
-    assert many.size == "fixed-size, 150 prototypes"
-    exact = LSSVM(solution="exact").requirements(20_000, 3, 3)
-    assert 1.6e9 < exact.memory < 2.5e9  # half of the matrix of 3.2 GB, and what it takes beside
-
-
 @pytest.mark.slow
 def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
     rng = np.random.default_rng(0)
@@ -90,13 +85,40 @@ def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
         assert sound < 0.75 * misled
 
 
-def test_the_number_of_rows_picks_the_solution_unless_it_is_stated(monkeypatch):
-    monkeypatch.setattr("training.regressors.lssvm.MOST_EXACT_ROWS", 100)
-    few, many = curve(100)[:2], curve(101)[:2]
-    assert LSSVM(centres=10).fit(*few).fitted_settings().startswith("exact, 100 centres")
-    assert LSSVM(centres=10).fit(*many).fitted_settings().startswith("fixed-size, 10 centres")
-    stated = LSSVM(solution="exact").fit(*many)
-    assert stated.fitted_settings().startswith("exact, 101 centres")
-    assert stated.learning_curve_parameters() is None
-    fixed = LSSVM(solution="fixed-size", centres=10).fit(*few).learning_curve_parameters()
-    assert fixed["solution"] == "fixed-size"
+def no_progress(done, total):
+    pass
+
+
+@pytest.mark.parametrize("rows", [40, 2 * TILE, 2 * TILE + 77])
+def test_solution_and_diagonal_of_the_inverse_are_those_of_the_whole_matrix(rows):
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(rows, 3)), rng.normal(size=(rows, 2))
+    factor = TiledCholesky.of(x, 0.8, 30.0, no_progress)
+    inverse = np.linalg.inv(rbf(x, x, 0.8) + np.eye(rows) / 30.0)
+    np.testing.assert_allclose(factor.solve(y), inverse @ y, rtol=1e-9, atol=1e-10)
+    np.testing.assert_allclose(
+        factor.inverse_diagonal(no_progress), np.diag(inverse), rtol=1e-9, atol=1e-11
+    )
+
+
+def test_the_gradient_is_that_of_differences():
+    rng = np.random.default_rng(0)
+    x, y = (rng.normal(size=(20, k)).astype(np.float32) for k in (3, 2))
+    network = TanhNetwork([3, 8, 7, 2], rng)
+    network.backward(network.forward(x) - y)
+    layers = network.layers()
+
+    def loss(parts):
+        h = x.astype(np.float64)
+        for weights, bias in zip(parts[0:-2:2], parts[1:-2:2], strict=True):
+            h = np.tanh(h @ weights + bias)
+        return 0.5 * np.sum((h @ parts[-2] + parts[-1] - y) ** 2)
+
+    gradients = [part for layer in network._gradients for part in layer]
+    for k, part in enumerate(layers):
+        for index in list(np.ndindex(part.shape))[::5]:
+            shifted = [[p.copy() for p in layers] for _ in range(2)]
+            shifted[0][k][index] += 1e-5
+            shifted[1][k][index] -= 1e-5
+            slope = (loss(shifted[0]) - loss(shifted[1])) / 2e-5
+            assert gradients[k][index] == pytest.approx(slope, rel=1e-3, abs=1e-4)

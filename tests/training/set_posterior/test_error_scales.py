@@ -5,65 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml.errors import InputError
-from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 from training.set_posterior.validation import graph_outputs, posterior_session
-from training.spec import read_spec
-
-SPEC = """\
-[[regressor]]
-type = "linear"
-[set_posterior]
-designs = 600
-hidden = 24
-epochs = 60
-"""
-CHECKED = """\
-[[set_posterior.model_errors]]
-probability = 0.75
-bearing = 0.1
-channels = 0.2
-laws = 0.5
-[[set_posterior.model_errors]]
-probability = 0.25
-bearing = 1
-channels = 1
-laws = 1
-"""
-
-
-def read(folder, text):
-    (folder / "s.toml").write_text(text)
-    return read_spec(folder / "s.toml").set_posterior.scales
-
-
-def test_a_spec_states_scales_and_has_the_usual_ones_without(tmp_path):
-    assert read(tmp_path, SPEC) == USUAL_SCALES
-    scales = read(tmp_path, SPEC + CHECKED)
-    assert scales.scales[0] == ErrorScale(0.75, bearing=0.1, channels=0.2, laws=0.5)
-    assert scales.judged == 1 and ErrorScales.of_list(scales.as_list()) == scales
-    columns = dict(zip(MODEL_ERROR_COLUMNS, scales.of_columns[0], strict=True))
-    assert (columns["contact"], columns["sinkage"], columns["strength"]) == (0.1, 0.2, 0.5)
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        (("0.75", "0.7"), "sum 1"),
-        (("bearing = 0.1", "bearing = -1"), "negative"),
-        (("laws = 0.5\n", ""), "laws"),
-        (("laws = 0.5\n", "laws = 0.5\nother = 1\n"), "other"),
-    ],
-)
-def test_scales_that_are_none_are_refused(tmp_path, change, message):
-    with pytest.raises(InputError, match=message):
-        read(tmp_path, SPEC + CHECKED.replace(*change, 1))
-
-
-def test_no_scales_are_refused():
-    with pytest.raises(InputError, match="0 scales"):
-        ErrorScales(())
 
 
 @pytest.mark.slow
@@ -86,27 +29,3 @@ def test_a_file_answers_by_its_own_scales(wheel_posterior):
     assert stds["one"][0] == pytest.approx(told[0], rel=1e-3)  # of the size that it is told
     for std in told[1:]:
         assert std == pytest.approx(told[0], rel=1e-3)
-
-
-SENSORS = "[set_posterior.sensor_errors]\nslip_bias = 0.004\ntorque_gain = 0\n"
-
-
-@pytest.mark.slow
-def test_a_spec_states_errors_of_sensors_and_a_file_has_them(tmp_path, wheel_posterior):
-    (tmp_path / "s.toml").write_text(SPEC + SENSORS)
-    stated = read_spec(tmp_path / "s.toml").set_posterior.sensor_errors
-    assert stated == {"slip_bias": 0.004, "torque_gain": 0.0}
-    usual, own = wheel_posterior.typical_errors, replace(wheel_posterior, sensor_errors=stated)
-    assert own.typical_errors == usual | stated
-    assert float(own.defaults()["slip_bias"][0]) == np.float32(0.004)
-    assert own.defaults()["load_gain"] == wheel_posterior.defaults()["load_gain"]
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [(("0.004", "-0.004"), "0 or more"), (("torque_gain", "torque_scale"), "torque_scale")],
-)
-def test_errors_of_sensors_that_are_none_are_refused(tmp_path, change, message):
-    (tmp_path / "s.toml").write_text(SPEC + SENSORS.replace(*change))
-    with pytest.raises(InputError, match=message):
-        read_spec(tmp_path / "s.toml")

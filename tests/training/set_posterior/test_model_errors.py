@@ -14,18 +14,12 @@ from soilml.onboard.set_contract import (
     MODEL_ERROR_COLUMNS,
 )
 from soilml.physics.effects.exit_angle import ExitAngle
-from soilml.physics.effects.slip_sinkage import SlipSinkage
-from soilml.physics.gears import Track, Wheel
-from soilml.physics.model import Model
-from soilml.physics.operating_point import Operating
 from soilml.quantities import SHEAR
 from training.onnx_graph.builder import Graph, session_of
 from training.onnx_graph.value import Value, constant
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.families.wheel_family import (
     LAW_ERRORS,
-    USUAL_MODEL_ERRORS,
-    typical_model_errors,
 )
 from training.set_posterior.graph import ROW_INPUTS, SetPosteriorGraph
 from training.set_posterior.monomials import monomials
@@ -92,41 +86,6 @@ def true_readings(family) -> dict[str, np.ndarray]:
     return readings | {"sinkage": np.exp(y[:, 1]), "drawbar_pull": y[:, 2] * LOAD}
 
 
-def test_a_stronger_soil_under_a_heavier_load_responds_alike():
-    case = read_recipe("wheel").case
-    forces = []
-    for factor in (1.0, 1.7):
-        stronger = {name: factor * getattr(case.soil, name) for name in ("kc", "kphi")}
-        soil = case.with_values(stronger | {"cohesion": factor * 900.0}).soil
-        force = case.model(soil, Operating(slip=SLIP, load=factor * LOAD))
-        forces.append([force.torque / factor, force.sinkage, force.drawbar_pull / factor])
-    assert np.asarray(forces[1]) == pytest.approx(np.asarray(forces[0]), rel=1e-7)
-
-
-@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
-def test_columns_of_the_bearing_are_changes_with_its_logarithm(kind, request):
-    posterior, step = request.getfixturevalue(kind), 1e-4
-    family, readings = posterior.family, true_readings(posterior.family)
-    found = model_columns(posterior, readings, 1.0)
-
-    def channels(factor):
-        """Channels (rows, 3) where load and cohesion are smaller by a factor."""
-        cohesion = family.axes[0]
-        ends = np.linspace(-1.0, 1.0, 20001)
-        lower = np.interp(cohesion.value(SOIL[0]) / factor, cohesion.value(ends), ends)
-        designs = family.features(np.stack([SLIP, LOAD / factor], axis=1))
-        return posterior.response.predict(designs, np.asarray([lower, *SOIL[1:]]))
-
-    change = (channels(1.0 + step) - channels(1.0 - step)) / (2.0 * step)
-    if family.linear_torque:  # torque itself is larger by the factor
-        change[:, 0] += readings["torque"] * posterior_slope(posterior, readings)
-    middle = float(family.recipe.load.at(np.asarray(0.5)))
-    profile = [1.0 + 0.0 * SLIP, SLIP, np.log(LOAD / middle)]
-    for i, (name, values) in enumerate(zip(MODEL_ERROR_COLUMNS[:3], profile, strict=True)):
-        expected = USUAL_MODEL_ERRORS[name] * values[:, None] * change
-        assert pytest.approx(expected, abs=0.01 * np.abs(expected).max()) == found[:, :, i].T
-
-
 @pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
 def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
     posterior = request.getfixturevalue(kind)
@@ -144,27 +103,6 @@ def test_the_column_of_the_contact_is_the_change_by_the_effect(kind, request):
     for channel in range(3):
         tolerance = 0.1 * np.abs(expected[channel]).max()
         assert found[channel] == pytest.approx(expected[channel], abs=tolerance)
-
-
-@pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
-def test_channels_have_errors_of_their_own(kind, request):
-    posterior = request.getfixturevalue(kind)
-    readings = true_readings(posterior.family)
-    found = model_columns(posterior, readings, 0.5)[:, :, 4:9]
-    of_torque = readings["torque"] * posterior_slope(posterior, readings)
-    expected = np.zeros((3, len(SLIP), 5))
-    for number, (name, channel, factor) in enumerate(
-        [
-            ("sinkage", 1, 1.0),
-            ("drawbar_pull", 2, 1.0),
-            ("torque_by_slip", 0, of_torque * SLIP),
-            ("sinkage_by_slip", 1, SLIP),
-            ("drawbar_pull_by_slip", 2, SLIP),
-        ]
-    ):
-        expected[channel, :, number] = USUAL_MODEL_ERRORS[name] * factor
-    assert found == pytest.approx(expected, rel=1e-4, abs=1e-7)
-    assert not model_columns(posterior, readings, 0.0).any()
 
 
 @pytest.mark.parametrize("kind", ["wheel_posterior", "linear_posterior"])
@@ -198,21 +136,3 @@ def test_columns_of_the_laws_are_changes_with_strength_and_shear_modulus(kind, r
     ):
         own = found[:, :, LAW_ERROR_COLUMNS.index(name)].T / LAW_ERRORS[name]
         assert own == pytest.approx(expected, abs=0.01 * np.abs(expected).max())
-
-
-def test_what_the_model_has_is_none_of_its_errors(any_posterior):
-    wheel = Model(Wheel(radius=0.1, width=0.1))
-    assert typical_model_errors(SHEAR, wheel) == USUAL_MODEL_ERRORS | LAW_ERRORS
-
-    def nil(unknown, model=wheel):
-        return {name for name, std in typical_model_errors(unknown, model).items() if std == 0.0}
-
-    assert nil([*SHEAR, "kphi", "n"]) == {"bearing", "bearing_by_load"}
-    digging = wheel + SlipSinkage(n1=0.2)
-    assert nil([*SHEAR, "slip-sinkage.n1"], digging) == {"bearing_by_slip"}
-    assert nil(SHEAR, wheel + ExitAngle(kappa=0.1)) == {"contact"}
-    assert nil(["friction_angle"]) == {"bearing", "bearing_by_slip", "bearing_by_load"}
-    track = Track(radius=0.1, width=0.1, base=0.4)
-    assert nil(SHEAR, Model(track)) == {"contact"}
-    given = any_posterior.family.model_errors()
-    assert given["bearing"] == given["bearing_by_load"] == 0.0 < given["bearing_by_slip"]

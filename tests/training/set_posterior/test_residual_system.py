@@ -38,13 +38,6 @@ def test_the_system_has_residuals_over_noise(wheel_posterior, session, sets):
         assert found == pytest.approx(values / np.hypot(std, response.error[k]), abs=2e-3)
 
 
-def test_a_channel_that_was_not_measured_has_no_row(wheel_posterior, session, sets):
-    torque_only = int(np.argmax(sets.readings["sinkage_std"][:, 0] > 1e5))
-    found = graph_outputs(session, wheel_posterior.response, sets, torque_only)
-    assert len(found["memory_out"]) == 6
-    assert found["counted_out"].tolist() == [6.0, 6.0, 6.0]
-
-
 def test_common_errors_are_integrated_out_of_the_likelihood():
     rng = np.random.default_rng(0)
     a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 3)), rng.normal(size=5)
@@ -57,17 +50,3 @@ def test_common_errors_are_integrated_out_of_the_likelihood():
     assert found @ found == pytest.approx((a @ b) @ dense, rel=1e-5)
     steady = np.concatenate([a, 0.0 * g], axis=1).astype(np.float32)
     assert session.run(None, {"system": steady})[0] == pytest.approx(a, abs=1e-6)
-
-
-def test_a_row_out_of_range_by_its_noise_is_left_out_and_not_counted(wheel_posterior, session):
-    sets = wheel_posterior.family.sets(1, 8, 3)
-    lowest = wheel_posterior.family.recipe.slip.lower
-    for index in range(5):
-        sets.readings["slip"][0, index] = 0.6 * lowest
-    exact = graph_outputs(session, wheel_posterior.response, sets, 0)
-    assert exact["counted_out"][1:].tolist() == [8.0, 3.0] and not exact["set_in_range"][0]
-    sets.readings["slip_std"] = np.full((1, 8), 0.2 * lowest)
-    noisy = graph_outputs(session, wheel_posterior.response, sets, 0)
-    assert noisy["counted_out"].tolist() == [exact["counted_out"][0], 8.0, 8.0]
-    assert noisy["row_in_range"].tolist() == [False] * 5 + [True] * 3
-    assert noisy["set_in_range"][0]

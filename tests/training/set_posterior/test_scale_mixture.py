@@ -63,19 +63,3 @@ def test_the_likelihood_is_the_average_over_scales(session, example):
     parts = [parts[JUDGED], *(part for k, part in enumerate(parts) if k != JUDGED)]
     assert shares == pytest.approx(np.exp(np.asarray(parts) - expected), abs=1e-4)
     assert least[0] == pytest.approx(misfits[JUDGED], rel=1e-4)
-
-
-@pytest.mark.parametrize("size", [0.0, 0.5, 1.0])
-def test_a_size_that_is_told_is_the_only_one(session, example, size):
-    surprise, least, shares = run(session, *example, size)
-    misfit, log_determinant = dense(*example, np.full(ERRORS, size))
-    assert least[0] == pytest.approx(misfit, rel=1e-4)
-    assert surprise[0] == pytest.approx(misfit + log_determinant, rel=1e-4)
-    others = [p for k, p in enumerate(PROBABILITIES) if k != JUDGED]
-    expected = np.outer([PROBABILITIES[JUDGED], *others], np.ones(POINTS))
-    assert shares == pytest.approx(expected, rel=1e-3)
-
-
-def test_scales_rise_and_their_probabilities_are_one_in_all():
-    assert (np.diff(SIZES, axis=0) >= 0.0).all() and sum(GROUPS) == ERRORS
-    assert sum(PROBABILITIES) == pytest.approx(1.0)

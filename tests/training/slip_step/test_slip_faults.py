@@ -1,18 +1,15 @@
 """The slip filter under wild readings, and files and states in which bits have flipped."""
 
 import ctypes
-import json
 from dataclasses import replace
 
 import numpy as np
-import onnx
 import pytest
 from compiled_c import COMPILERS, CompiledModel, compile_library
 
 from soilml.errors import InputError, ModelFileError
-from soilml.onboard.model_file import Session, open_slip_step, with_checksums
-from soilml.onboard.slip_stream import FLAGS, SLIP_FORMAT, SlipStream
-from soilml.slip_filter.drive import slip_of_drive
+from soilml.onboard.model_file import Session
+from soilml.onboard.slip_stream import FLAGS, SlipStream
 
 #: Readings that no rover has, by the name of the argument.
 IMPOSSIBLE = [
@@ -70,21 +67,6 @@ class Driven:
         return self.model.call("step", self.state, own, answer, self.model.work), answer
 
 
-@pytest.mark.parametrize("torque", [1e20, -1e20, 1e38, 1e300])
-def test_a_wild_torque_is_set_aside_and_the_rows_after_it_are_answered(
-    torque, slip_stream, slip_drive
-):
-    state = plain = slip_stream.start()
-    for i in range(45, 50):
-        wild = {"torque": torque} if i == 46 else {}
-        found, state = slip_stream.step(state, **row_of(slip_drive, i, **wild))
-        assert ("torque-set-aside" in found.flags) == (i == 46 and abs(torque) < 1e30)
-        assert np.isfinite([found.speed, found.speed_std, *found.speeds, *found.slips.flat]).all()
-        missing = {"torque": np.nan} if i == 46 else {}
-        without, plain = slip_stream.step(plain, **row_of(slip_drive, i, **missing))
-        assert found.speed == pytest.approx(without.speed)
-
-
 @pytest.mark.parametrize(("name", "value"), IMPOSSIBLE)
 def test_what_is_not_possible_is_refused_and_the_state_goes_on(
     name, value, slip_stream, slip_drive
@@ -96,20 +78,6 @@ def test_what_is_not_possible_is_refused_and_the_state_goes_on(
     assert np.array_equal(state.grounds, before)
     found, _ = slip_stream.step(state, **row_of(slip_drive, 46))
     assert found.answered and np.isfinite(found.speed)
-
-
-def test_the_batch_sets_a_wild_torque_aside_too(slip_case, slip_drive):
-    rows = range(45, 53)
-    part = replace(slip_drive, **{
-        name: getattr(slip_drive, name)[rows]
-        for name in ("time", "rim_speed", "torque", "load", "slope", "commanded")
-    })  # fmt: skip
-    wild, missing = part.torque.copy(), part.torque.copy()
-    wild[2, 0], missing[2, 0] = 1e200, np.nan
-    found = slip_of_drive(slip_case, replace(part, torque=wild), soils=64)
-    without = slip_of_drive(slip_case, replace(part, torque=missing), soils=64)
-    assert ["torque-set-aside" in flags for flags in found.flags] == [i == 2 for i in range(8)]
-    assert np.array_equal(found.speed, without.speed) and np.isfinite(found.speed).any()
 
 
 def flipped(content, rng):
@@ -131,15 +99,6 @@ def test_a_state_in_which_a_bit_has_flipped_is_refused(slip_stream, slip_drive):
     assert slip_stream.step(state, **row)[0].answered
 
 
-def test_a_state_of_another_file_or_version_is_refused(slip_stream):
-    state = slip_stream.start()
-    for file in ("", "1-" + slip_stream.identity[2:], "another"):
-        with pytest.raises(InputError, match="which is another file or version than '2-"):
-            slip_stream.step(replace(state, file=file), [0.1] * 4, [1.0] * 4, [70.0] * 4, 0.0)
-    with pytest.raises(InputError, match="state is a tuple; needed is a SlipState: begin with"):
-        slip_stream.step((1, 2), [0.1] * 4, [1.0] * 4, [70.0] * 4, 0.0)
-
-
 def test_a_file_in_which_a_bit_has_flipped_is_refused(slip_files, tmp_path, monkeypatch):
     """And before the runtime sees it."""
     content, rng = (slip_files / "rover.onnx").read_bytes(), np.random.default_rng(1)
@@ -148,35 +107,6 @@ def test_a_file_in_which_a_bit_has_flipped_is_refused(slip_files, tmp_path, monk
         (tmp_path / "bad.onnx").write_bytes(flipped(content, rng))
         with pytest.raises(ModelFileError):
             SlipStream.load(tmp_path / "bad.onnx")
-
-
-def test_files_of_earlier_versions_and_of_other_contents_are_refused(slip_files, tmp_path):
-    _, metadata = open_slip_step(slip_files / "rover.onnx", SLIP_FORMAT)
-    model = onnx.load(str(slip_files / "rover.onnx"))
-    del model.metadata_props[:]
-    graph = model.SerializeToString(deterministic=True)
-
-    def written(**changed):
-        entries = {k: v for k, v in {**metadata, **changed}.items() if v}
-        (tmp_path / "own.onnx").write_bytes(with_checksums(graph, entries))
-        return tmp_path / "own.onnx"
-
-    assert SlipStream.load(written()).wheels[0] == "front-left"
-    with pytest.raises(ModelFileError, match=r"has format 1 of slip filters; .* write it again"):
-        SlipStream.load(written(soilml_format=""))
-    with pytest.raises(ModelFileError, match="its metadata is damaged"):
-        SlipStream.load(written(rover=""))
-    with pytest.raises(ModelFileError, match="fails its own probe on this machine"):
-        SlipStream.load(written(probe=metadata["probe"].replace('"speed": 0.', '"speed": 0.9')))
-
-
-def test_the_metadata_has_rover_and_prior(slip_stream, slip_case):
-    assert slip_stream.radius == pytest.approx(0.15)
-    assert '"mass_kg": 30.0' in slip_stream.metadata["rover"]
-    assert set(slip_case.prior) <= set(json.loads(slip_stream.metadata["prior"]))
-    assert (
-        "[soil.prior]" in slip_stream.metadata["case"] and "[rover]" in slip_stream.metadata["case"]
-    )
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ from conftest import input_box, solved
 from soilml import EFFECTS, GEARS, Model, Operating, Status, Track, Wheel, soil
 from soilml.errors import InputError
 from soilml.parameters import check, declared
-from soilml.physics import effects
 from soilml.physics.effects.base import KINDS, STAGES, Effect, SlipLoadScaling
 from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears.rigid_wheel import RigidWheel
@@ -89,14 +88,6 @@ def test_neutral_changes_nothing_to_the_last_bit(name, gear):
         assert getattr(neutral, field).tobytes() == getattr(plain(gear), field).tobytes(), field
 
 
-@on_its_gear
-def test_an_effect_that_is_given_no_size_is_neutral(name):
-    model = WHEEL if name in OF_WHEELS else TRACK
-    before, neutral = model(SAND, AT), (model + EFFECTS[name]())(SAND, AT)
-    for field in FORCES:
-        assert getattr(neutral, field).tobytes() == getattr(before, field).tobytes(), field
-
-
 @pytest.mark.slow
 @on_every_wheel
 def test_finite_over_the_whole_box_or_flagged(name, gear):
@@ -143,11 +134,6 @@ def test_any_size_within_its_bounds_is_answered_or_flagged(name):
         ok = force.status == Status.OK
         for channel in CHANNELS:
             np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
-
-
-@pytest.mark.parametrize("name", EFFECTS)
-def test_a_sign_is_a_sign(name):
-    assert set(EFFECTS[name].about.signs.values()) <= {-1, 1}
 
 
 @on_its_gear
@@ -229,12 +215,6 @@ def test_what_nobody_measured_is_asked_for_by_its_column(name):
         assert str(caught.value) == f"the effect {name} needs the column {COVARIATES[need]}"
 
 
-@every
-def test_nothing_else_is_asked_for(name):
-    spare = {field: None for field in COVARIATES if field not in EFFECTS[name].about.needs}
-    assert ((WHEEL + sized(name))(SAND, replace(AT, **spare)).status == 0).all()
-
-
 @shaped
 @pytest.mark.parametrize("slip, load", [(0.3, 100.0), (0.5, 40.0), (-0.2, 130.0)])
 def test_the_size_runs_with_slip_and_load_as_written(name, slip, load):
@@ -274,11 +254,6 @@ def test_the_two_forms_of_the_exit_angle_exclude_each_other():
     exit_angle(kappa=np.asarray([0.0, 0.2]), b0=np.asarray([-0.1, 0.0]))
 
 
-def test_an_effect_can_stand_in_a_model_once():
-    with pytest.raises(InputError, match="already"):
-        _ = WHEEL + EFFECTS["slip-sinkage"]() + EFFECTS["slip-sinkage"]()
-
-
 def test_a_users_own_effect_takes_part():
     class DeeperRut(Effect):
         name = "deeper-rut"
@@ -299,36 +274,3 @@ def test_a_misspelt_stage_is_refused_when_the_class_is_defined(wrong, meant):
         InputError, match=f"{wrong} is not a stage of a model; did you mean {meant}"
     ):
         type("Misspelt", (Effect,), {wrong: lambda self, value, load_case: value})
-
-
-def test_a_stage_that_is_misspelt_in_a_mixin_is_refused_too():
-    class Mixin:
-        def on_soils(self, soil, load_case):
-            return soil
-
-    with pytest.raises(InputError, match="Mixed: on_soils is not a stage"):
-
-        class Mixed(Mixin, Effect):
-            pass
-
-
-def test_stages_that_an_effect_does_not_override_return_their_value():
-    effect, value = EFFECTS["torque-gain"](gain=0.1), object()
-    assert [stage for stage in STAGES if effect.overrides(stage)] == ["on_reading"]
-    for stage in set(STAGES) - {"on_reading"}:
-        assert getattr(effect, stage)(value, None) is value
-
-
-def test_what_is_no_effect_is_refused_by_the_model():
-    with pytest.raises(InputError, match="object is not an effect; derive it from"):
-        Model(WHEEL.gear, (object(),))
-
-
-def test_the_catalogue_exports_each_effect_by_its_class_name():
-    assert list(EFFECTS)[:4] == ["slip-sinkage", "grousers", "track-grousers", "bulldozing"]
-    assert {name for name in vars(effects) if name[0].isupper()} == {
-        *("EFFECTS", "Effect", "EffectCard"),
-        *(cls.__name__ for cls in EFFECTS.values()),
-    }
-    for cls in EFFECTS.values():
-        assert getattr(effects, cls.__name__) is cls

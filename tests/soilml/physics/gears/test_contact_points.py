@@ -6,23 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml import LinearWheel, Midstance, Operating, Track, soil
+from soilml import Midstance, Operating, Track, soil
 
 SAND = soil("wong1989/dry_sand", kc=2e4, n=1.1)
 FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
 TRACK = Track(radius=0.1, width=0.08, base=0.6)
-
-
-def at_rest(load, n=SAND.n):
-    return replace(SAND, n=n), Operating(slip=np.zeros(1), load=np.asarray([load]))
-
-
-@pytest.mark.parametrize("number", [float, np.asarray])
-def test_the_arc_of_a_foot_ends_at_the_length_and_rise_given(number):
-    foot = Midstance.of_foot(number(0.05), number(0.012), 0.03, 0.2)
-    assert foot.radius * np.sin(foot.arc) == pytest.approx(0.05, rel=1e-12)
-    assert foot.radius * (1.0 - np.cos(foot.arc)) == pytest.approx(0.012, rel=1e-12)
-    assert (foot.width, foot.leg_length, foot.tip_height) == (0.03, 0.2, 0.012)
 
 
 @pytest.mark.parametrize("sinkage", [0.002, 0.02, 0.1])  # low, medium and high
@@ -82,11 +70,3 @@ def test_a_profile_of_a_belt_is_that_of_the_points_of_its_contact(slip, shape):
         assert length <= along[-1] * (1.0 + 1e-9)
     assert profile.shear_lever_arm == contact.shear_lever_arm == track.radius
     assert not profile.area.any() and not profile.horizontal_area.any()
-
-
-def test_a_profile_of_straight_lines_has_their_two_ends():
-    wheel, at = LinearWheel(radius=0.15, width=0.12), at_rest(60.0)[1]
-    rim = wheel.contact_geometry(np.asarray([0.02]), SAND, at)
-    angle, contact = wheel.profile_contact(rim, at, 101)
-    np.testing.assert_array_equal(angle, [[0.0], rim.peak])
-    assert contact.depth[1] == pytest.approx(0.15 * (np.cos(rim.peak) - np.cos(rim.entry)))

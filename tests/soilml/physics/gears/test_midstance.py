@@ -2,16 +2,12 @@
 
 from itertools import pairwise
 
-import array_api_strict as strict
 import numpy as np
 import pytest
-import torch
 from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.stats import qmc
 
-from datagen.generate import generate
-from datagen.recipe import read_recipe
 from soilml import (
     EFFECTS,
     Midstance,
@@ -21,13 +17,10 @@ from soilml import (
     Status,
     identify,
     read_case,
-    read_table,
     soil,
 )
-from soilml.cli import main
 from soilml.errors import InputError
 from soilml.io.table import Table
-from soilml.parameters import with_values
 from soilml.physics.contact import integrate, stress
 from soilml.quantities import column
 
@@ -93,14 +86,6 @@ def test_rests_where_the_printed_integrals_carry_the_load(slip, load):
     assert force.torque == pytest.approx(printed(theta1, slip, SAND)[1], rel=5e-4)
 
 
-def test_the_loads_above_stand_in_all_three_cases():
-    force = Model(FOOT)(SAND, Operating(slip=0.125, load=np.asarray([2.0, 12.0, 45.0])))
-    peak = (SAND.a0 + SAND.a1 * 0.125) * force.entry_angle
-    assert force.entry_angle[0] < FOOT.arc
-    assert peak[1] < FOOT.arc < force.entry_angle[1]
-    assert FOOT.arc < peak[2]
-
-
 @pytest.mark.parametrize("slip", [-0.2, 0.3])
 def test_forces_and_their_slopes_run_on_from_case_to_case(slip):
     peak_share = SAND.a0 + SAND.a1 * slip
@@ -138,25 +123,6 @@ def test_the_torque_about_the_hub_is_that_about_the_arc_plus_the_pull_at_its_hei
     np.testing.assert_allclose(
         force.torque, Model(centred)(SAND, at).torque + raised * force.drawbar_pull, rtol=1e-7
     )
-
-
-def test_a_foot_has_the_length_and_rise_it_was_given():
-    assert pytest.approx(0.04) == FOOT.radius * np.sin(FOOT.arc)
-    assert pytest.approx(0.0055) == FOOT.radius * (1 - np.cos(FOOT.arc))
-
-
-def test_softer_soil_sinks_more_and_a_longer_foot_less():
-    at = Operating(slip=0.2, load=12.0)
-    stiff = Model(FOOT)(SAND, at).sinkage
-    assert Model(FOOT)(soil("comin2017/ssc-3"), at).sinkage > stiff
-    longer = Midstance.of_foot(length=0.065, height=0.0055, width=0.029, leg_length=0.18)
-    assert Model(longer)(SAND, at).sinkage < stiff
-
-
-def test_a_load_that_the_foot_never_carries_is_flagged():
-    force = Model(FOOT)(soil("comin2017/ssc-1"), Operating(slip=0.1, load=[10.0, 36.8]))
-    assert list(force.status) == [Status.OK, Status.TOO_HEAVY]
-    assert np.isnan(force.torque[1])
 
 
 @pytest.mark.slow
@@ -218,51 +184,3 @@ def test_a_model_file_of_a_foot_identifies_its_soil(tmp_path):
     assert fit["kphi"] == pytest.approx(4e5, rel=1e-3)
     with pytest.raises(InputError, match="take nonlinear"):
         identify(case, Table(columns), method="linear")
-
-
-def test_a_model_file_of_a_foot_makes_synthetic_data(tmp_path):
-    recipe = (
-        "rows = 64\nseed = 1\n" + MODEL + "[operating]\nslip = [0.0, 0.5]\nload_N = [4.0, 40.0]\n"
-    )
-    (tmp_path / "recipe.toml").write_text(recipe)
-    generate(read_recipe(tmp_path / "recipe.toml"), tmp_path / "foot.parquet")
-    made = read_table(tmp_path / "foot.parquet")
-    assert len(made) == 64
-    assert (np.isfinite(made["torque_Nm"]) == made.answered).all()
-    assert made.answered.mean() > 0.8 and (made["torque_Nm"][made.answered] > 0).mean() > 0.95
-
-
-def test_a_foot_is_simulated_from_the_command_line(tmp_path):
-    (tmp_path / "foot.toml").write_text(MODEL)
-    out = tmp_path / "out.csv"
-    driven = ["--slip", "0.1,0.3", "--load", "12,90", "--out", str(out)]
-    assert main(["simulate", str(tmp_path / "foot.toml"), *driven]) == 0
-    assert out.read_text().count(",ok") == 2
-
-
-@pytest.mark.parametrize("make", [strict.asarray, torch.from_numpy])
-def test_a_foot_gives_the_same_in_another_array_library(make):
-    slip, load = np.asarray([-0.3, 0.0, 0.2, 0.5]), np.asarray([8.0, 20.0, 45.0, 300.0])
-    expected = Model(FOOT)(SAND, Operating(slip=slip, load=load))
-    found = Model(FOOT)(SAND, Operating(slip=make(slip), load=make(load)))
-    for name in ("torque", "drawbar_pull", "sinkage", "status"):
-        np.testing.assert_allclose(
-            np.asarray(getattr(found, name)), getattr(expected, name), rtol=1e-12
-        )
-
-
-@pytest.mark.parametrize("name", ["friction_angle", "shear_modulus", "kphi", "n"])
-def test_gradients_flow_through_the_foot(name):
-    slip, load = np.asarray([0.05, 0.3]), np.asarray([5.0, 30.0])
-    at = Operating(slip=torch.from_numpy(slip), load=torch.from_numpy(load))
-
-    def value(x):
-        force = Model(FOOT)(with_values(SAND, {name: x}), at)
-        return force.torque.sum() + 50.0 * force.sinkage.sum()
-
-    reference = float(getattr(SAND, name))
-    x = torch.tensor(reference, dtype=torch.float64, requires_grad=True)
-    value(x).backward()
-    h = 1e-5 * reference
-    expected = float(value(reference + h) - value(reference - h)) / (2 * h)
-    assert float(x.grad) == pytest.approx(expected, rel=1e-4)

@@ -2,13 +2,11 @@
 
 from dataclasses import replace
 
-import array_api_strict as strict
 import numpy as np
 import pytest
-import torch
 from conftest import input_box
 
-from soilml import EFFECTS, Model, Operating, ShearSoftening, Soil, Status, Track, Wheel, soil
+from soilml import EFFECTS, Model, Operating, Soil, Status, Track, Wheel, soil
 from soilml import TrackGrousers as Grousers
 from soilml.errors import InputError
 
@@ -18,7 +16,6 @@ SAND, CLAY = soil("wang2018/sand"), soil("wang2018/clay")
 LOAD = 637.0
 AT = Operating(slip=np.linspace(0.1, 0.9, 5), load=LOAD)
 FIELDS = ("torque", "drawbar_pull", "sinkage", "entry_angle")
-EFFECTS_OF_TRACKS = {name: cls for name, cls in EFFECTS.items() if cls.applies_to(GEAR)}
 KNOWN = {"speed": 0.1, "pass_number": 2.0, "slip_angle": 0.15}
 
 
@@ -135,78 +132,6 @@ def test_every_row_of_a_wide_box_is_answered_or_too_heavy():
         np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", EFFECTS_OF_TRACKS)
-def test_effects_are_neutral_or_finite_on_tracks(name):
-    cls = EFFECTS_OF_TRACKS[name]
-    neutral, plain = boxed(32, 5, [cls()])[0], boxed(32, 5)[0]
-    for field in (*FIELDS, "load", "status"):
-        assert getattr(neutral, field).tobytes() == getattr(plain, field).tobytes(), field
-    force, _ = boxed(32, 5, [cls(**cls.about.reference)])
-    ok = force.status == Status.OK
-    assert ok.mean() > 0.5
-    for channel in FIELDS:
-        np.testing.assert_array_equal(np.isfinite(getattr(force, channel)), ok)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("library", ["strict", "torch"])
-@pytest.mark.parametrize("effects", [(), (Grousers(spacing=0.8), ShearSoftening(share=1.0))])
-def test_same_answers_in_another_array_library(library, effects):
-    make = strict.asarray if library == "strict" else torch.from_numpy
-    slip = np.concatenate([np.linspace(-0.5, 0.8, 9), [0.3]])
-    load = np.concatenate([np.linspace(20.0, 2000.0, 9), [1e7]])  # the last cannot be carried
-    model = Model(GEAR, effects)
-    expected = model(SAND, Operating(slip=slip, load=load))
-    found = model(SAND, Operating(slip=make(slip), load=make(load)))
-    assert type(found.torque) is type(make(slip))
-    assert np.asarray(found.status).tolist() == expected.status.tolist() == 9 * [0] + [1]
-    for name in FIELDS:
-        values = np.asarray(getattr(found, name))
-        np.testing.assert_allclose(values, getattr(expected, name), rtol=1e-9, atol=1e-15)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "path", ["cohesion", "friction_angle", "shear_modulus", "kphi", "n", "settling", "rebound",
-             "leaving", "rear_leaving", "radius", "base", "spacing", "height"]
-)  # fmt: skip
-def test_gradients_flow_through_the_equilibrium(path):
-    grousers = Grousers(spacing=0.7)
-
-    def value(x):
-        ground, gear, effect = (
-            replace(part, **{path: x}) if hasattr(part, path) else part
-            for part in (SAND, GEAR, grousers)
-        )
-        slip = np.asarray([0.1, 0.3, 0.6])
-        at = Operating(slip=torch.from_numpy(slip) if torch.is_tensor(x) else slip, load=LOAD)
-        f = (Model(gear) + effect)(ground, at)
-        return f.torque.sum() + 0.1 * f.drawbar_pull.sum() + 500.0 * f.sinkage.sum()
-
-    middle = next(getattr(p, path) for p in (SAND, GEAR, grousers) if hasattr(p, path))
-    middle = 0.9 * middle
-    x = torch.tensor(middle, dtype=torch.float64, requires_grad=True)
-    value(x).backward()
-    h = 1e-5 * middle
-    expected = (value(middle + h) - value(middle - h)) / (2.0 * h)
-    assert float(x.grad) == pytest.approx(expected, rel=1e-5)
-
-
-def test_load_carried_is_smooth_in_sinkage():
-    from soilml.physics.forces import forces_at_sinkage
-    from soilml.physics.load_case import LoadCase
-    from soilml.physics.model import flattened
-
-    z = np.linspace(1e-4, 0.08, 4001)
-    slack = replace(GEAR, leaving=0.1)
-    load_case, _ = flattened(LoadCase(slack, CLAY, Operating(slip=0.3 + 0.0 * z, load=LOAD)))
-    load = forces_at_sinkage(load_case, z).load
-    assert (np.diff(load) > 0).all()
-    steepness = np.diff(load) / np.diff(z)
-    assert np.abs(np.diff(steepness)[40:]).max() < 0.02 * steepness.max()
-
-
 def test_profile_follows_the_law_and_is_nothing_where_the_belt_does_not_touch():
     slack = Model(replace(GEAR, leaving=0.2, rebound=0.2))
     profile = slack.profile(SAND, Operating(slip=0.3, load=LOAD), points=2001)
@@ -232,43 +157,6 @@ def test_torque_and_load_of_the_profile_are_those_of_the_force():
     assert force.torque == pytest.approx(turning, rel=1e-4)
 
 
-def test_a_track_sinks_less_and_pulls_more_than_a_wheel_under_the_same_load():
-    at = replace(AT, load=300.0)
-    track, wheel = TRACK(SAND, at), Model(Wheel(radius=0.1, width=0.08))(SAND, at)
-    assert (track.sinkage < 0.5 * wheel.sinkage).all()
-    assert (track.drawbar_pull > wheel.drawbar_pull).all()
-
-
-def test_softer_soil_sinks_more_and_stronger_soil_pulls_more():
-    assert (TRACK(replace(SAND, kphi=5e5), AT).sinkage > TRACK(SAND, AT).sinkage).all()
-    for change in ({"cohesion": 3e3}, {"friction_angle": 0.6}, {"shear_modulus": 0.01}):
-        stronger = TRACK(replace(SAND, **change), AT)
-        assert (stronger.drawbar_pull > TRACK(SAND, AT).drawbar_pull).all()
-
-
-def test_a_taut_belt_spreads_the_load():
-    def deep(leaving):
-        return TRACK.__class__(replace(GEAR, leaving=leaving))(SAND, AT).sinkage
-
-    assert (deep(0.02) < deep(0.05)).all() and (deep(0.05) < deep(0.2)).all()
-
-
-def test_pull_is_below_what_mohr_and_coulomb_allow():
-    for ground in (SAND, CLAY):
-        most = 0.08 * 0.9 * ground.cohesion + LOAD * np.tan(ground.friction_angle)
-        assert (TRACK(ground, AT).drawbar_pull < most).all()
-
-
-def test_grousers_matter_on_cohesive_soil_and_hardly_on_sand():
-    def gain(ground):
-        lugged, bare = (TRACK + Grousers(spacing=0.8))(ground, AT), TRACK(ground, AT)
-        return lugged.drawbar_pull - bare.drawbar_pull
-
-    assert (gain(SAND) > 0).all() and (gain(CLAY) > 3.0 * gain(SAND)).all()
-    dry = replace(SAND, cohesion=0.0)
-    assert (np.abs(gain(dry))[1:] < 0.05 * TRACK(dry, AT).drawbar_pull[1:]).all()
-
-
 def test_grousers_far_slipped_shear_the_whole_block():
     """Cohesion on the tips' plane and both sides, friction on the plane: eq. 13 beyond j_k."""
     ground = replace(CLAY, shear_modulus=1e-4)
@@ -277,12 +165,6 @@ def test_grousers_far_slipped_shear_the_whole_block():
     area = (bare.torque / 0.1 - LOAD * np.tan(ground.friction_angle)) / ground.cohesion
     sides = force.torque / 0.1 - bare.torque / 0.1
     assert sides == pytest.approx(ground.cohesion * area * 2.0 * 0.012 / 0.08, rel=0.1)
-
-
-def test_shear_that_softens_costs_pull_at_large_slip():
-    soft = TRACK + ShearSoftening(share=1.0, residual=0.7, peak=1.0)
-    ratio = soft(CLAY, AT).drawbar_pull / TRACK(CLAY, AT).drawbar_pull
-    assert ratio[0] > 1.0 and 0.65 < ratio[-1] < 0.8 and (np.diff(ratio) < 0).all()
 
 
 def test_what_cannot_be_is_refused():

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from soilml import Soil, soil, soil_catalogue
+from soilml import soil, soil_catalogue
 from soilml.errors import InputError
 from soilml.parameters import check
 
@@ -33,12 +33,6 @@ def test_every_soil_is_valid_and_says_where_it_comes_from(name):
     assert not set(entry.assumed) & set(entry.published)
 
 
-def test_a_negative_published_cohesion_is_kept_and_not_used():
-    entry = soil_catalogue()["comin2017/es-3"]
-    assert entry.published["cohesion"] == -830.0
-    assert entry.soil.cohesion == 0.0
-
-
 def test_printed_ranges_surround_the_value_and_stand_within_bounds():
     spread = {n: e for n, e in soil_catalogue().items() if e.spread}
     assert {"ding2015/lunar_soil", "moore1999/drift", "scott1970/apollo12"} <= set(spread)
@@ -50,13 +44,6 @@ def test_printed_ranges_surround_the_value_and_stand_within_bounds():
             check(soil(entry.name, **{field: high}))
     ends = np.rad2deg(soil_catalogue()["moore1999/cloddy"].spread["friction_angle"])
     assert ends == pytest.approx([34.0, 39.0], abs=1e-4)
-
-
-def test_single_values_can_be_replaced():
-    changed = soil("wong1989/dry_sand", friction_angle=0.6)
-    assert isinstance(changed, Soil)
-    assert changed.friction_angle == 0.6
-    assert changed.cohesion == soil("wong1989/dry_sand").cohesion
 
 
 def test_unknown_names_come_with_a_hint():

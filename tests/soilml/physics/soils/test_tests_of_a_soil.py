@@ -5,7 +5,6 @@ import pytest
 
 from soilml import soil
 from soilml.physics.soils.soil_tests import (
-    LEAST_SHARE,
     PlatePressure,
     ShearStrength,
     deviation_rates,
@@ -47,15 +46,3 @@ def test_rates_are_derivatives_of_deviations():
     assert deviation_rates([], SAND, NAMES, at).shape == (0, 3)
     by_n = PLATE.rates({"kc": 0.0, "kphi": 1e6, "n": 1.1})["n"]
     assert by_n == pytest.approx(1e6 * 0.02**1.1 * np.log(0.02))
-
-
-def test_a_soil_without_strength_is_as_far_off_as_one_with_a_millionth():
-    weak = ShearStrength(normal_stress=8e3, strength=5e3, scatter=0.1)
-    found = weak.deviation({"cohesion": 0.0, "friction_angle": 0.0})
-    assert found == pytest.approx(np.log(LEAST_SHARE) / 0.1)
-
-
-def test_labels_say_what_was_tested():
-    assert PLATE.label() == "pressure under a plate of 0.05 m at 0.02 m"
-    assert PLATE.measured == 9e3 and SHEAR.measured == 5e3
-    assert "8" in SHEAR.label()

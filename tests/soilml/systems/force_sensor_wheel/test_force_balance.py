@@ -8,14 +8,11 @@ import pytest
 from scipy.integrate import quad
 
 from soilml import ExitAngle, Model, Operating, StressShift, Wheel, soil
-from soilml.errors import FitError, InputError
 from soilml.systems.force_sensor_wheel import (
     MohrCoulomb,
     SensingWheel,
     SteadyRun,
     StressProfile,
-    balanced_arc,
-    bekker_stress_profile,
     forces_from_profile,
     parabolic_arc,
     solve_force_balance,
@@ -23,7 +20,6 @@ from soilml.systems.force_sensor_wheel import (
 
 SENSORS = SensingWheel(noise=0.0)
 PHI, TRUE, WEIGHT = math.radians(38.0), 0.0072, 28.92
-STRENGTH = MohrCoulomb(friction_angle=PHI)
 RIM = {"radius": 0.055, "width": 0.064}
 
 
@@ -86,89 +82,3 @@ def test_the_stress_of_the_model_gives_the_forces_of_the_model():
         profile, pulled, SENSORS, MohrCoulomb(friction_angle=float(sand.friction_angle))
     )
     assert back.shear_modulus == pytest.approx(TRUE, rel=0.02)
-
-
-@pytest.mark.parametrize(("slip", "slope"), [(0.11, 0.0), (0.39, 6.0), (0.8, 8.0)])
-def test_modulus_and_magnification_are_recovered(slip, slope):
-    at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(slope))
-    arc = balanced_arc(math.radians(30.0), at, SENSORS, STRENGTH, TRUE, lean=0.2)
-    found = solve_force_balance(StressProfile(arc.angle, arc.normal / 1.7), at, SENSORS, STRENGTH)
-    assert found.shear_modulus == pytest.approx(TRUE, rel=1e-6)
-    assert found.magnification == pytest.approx(1.7, rel=1e-6)
-
-
-def test_the_arc_implied_by_table_i_moves_forward_with_slip():
-    printed = {0.11: (0.0072, 0), 0.18: (0.0073, 2), 0.29: (0.0070, 4), 0.39: (0.0066, 6)}
-    printed[0.80] = (0.0026, 8)
-    peaks = [
-        balanced_arc(
-            math.radians(30.0),
-            SteadyRun(slip=s, weight=WEIGHT, slope=math.radians(a)),
-            SENSORS,
-            STRENGTH,
-            k,
-        ).peak_angle
-        for s, (k, a) in printed.items()
-    ]
-    assert (np.diff(peaks) > 0).all()
-
-
-def test_the_conventional_profile_overestimates_the_pull():
-    at = SteadyRun(slip=0.11, weight=WEIGHT)
-    sand, wheel = soil("nagatani2009/toyoura_sand"), Wheel(**RIM)
-    wide = bekker_stress_profile(wheel, sand, slip=0.11, sinkage=0.016, rebound=0.3)
-    assert wide.entry_angle == pytest.approx(math.acos(1.0 - 0.016 / 0.055))
-    assert wide.exit_angle == pytest.approx(-math.acos(1.0 - 0.3 * 0.016 / 0.055))
-    assert solve_force_balance(wide, at, SENSORS, STRENGTH).shear_modulus > 2.0 * TRUE
-    found = forces_from_profile(wide, shear_modulus=TRUE, friction_angle=PHI, slip=0.11, **RIM)
-    assert float(found.drawbar_pull / found.load) * WEIGHT > 4.0
-
-
-def test_a_missing_solution_names_its_side():
-    front, rear = parabolic_arc(0.9, 0.5, 2e4), parabolic_arc(-0.5, 0.5, 2e4)
-    at = SteadyRun(slip=0.2, weight=WEIGHT)
-    with pytest.raises(FitError, match="even with fully mobilised shear"):
-        solve_force_balance(front, at, SENSORS, STRENGTH)
-    with pytest.raises(FitError, match="even with hardly any shear"):
-        solve_force_balance(rear, at, SENSORS, STRENGTH)
-    with pytest.raises(FitError, match="cohesion alone"):
-        solve_force_balance(
-            parabolic_arc(0.6, 0.5, 2e4),
-            SteadyRun(slip=0.2, weight=0.001),
-            SENSORS,
-            MohrCoulomb(friction_angle=PHI, cohesion=9e5),
-        )
-
-
-@pytest.mark.parametrize(
-    ("angle", "normal", "message"),
-    [
-        ([0.0, 0.1, 0.2], [0.0, 0.0, 0.0], "without contact"),
-        ([0.0, 10.0, 20.0], [0.0, 1.0, 0.0], "radians"),
-        ([0.0, 0.2, 0.1], [0.0, 1.0, 0.0], "increase"),
-        ([0.0, 0.1, 0.2], [0.0, -1.0, 0.0], "sensor's zero"),
-        ([0.0, 0.1, 0.2], [0.0, math.nan, 0.0], "not finite"),
-        ([0.0, 0.1], [0.0, 1.0], "three or more"),
-        ([1.0, 1.7, 1.8], [0.0, 1.0, 0.0], "above the axle"),
-        ([[0.0, 0.1, 0.2]], [0.0, 1.0, 0.0], "must be"),
-    ],
-)
-def test_an_invalid_profile_is_refused(angle, normal, message):
-    with pytest.raises(InputError, match=message):
-        StressProfile(np.asarray(angle), np.asarray(normal))
-
-
-def test_values_out_of_range_are_refused():
-    profile = parabolic_arc(0.2, 0.5, 2e4)
-    with pytest.raises(InputError, match="degrees"):
-        forces_from_profile(profile, shear_modulus=TRUE, friction_angle=38.0, slip=0.2, **RIM)
-    with pytest.raises(InputError, match="slip"):
-        forces_from_profile(profile, shear_modulus=TRUE, friction_angle=PHI, slip=1.2, **RIM)
-    with pytest.raises(InputError, match="slope"):
-        SteadyRun(slip=0.2, weight=WEIGHT, slope=8.0)
-    with pytest.raises(InputError, match="rebound"):
-        bekker_stress_profile(
-            Wheel(**RIM), soil("nagatani2009/toyoura_sand"), slip=0.1, sinkage=0.06, rebound=0.1
-        )
-    with pytest.raises(FitError, match="no position of an arc"):
-        balanced_arc(0.5, SteadyRun(slip=0.1, weight=WEIGHT, slope=-1.2), SENSORS, STRENGTH, TRUE)

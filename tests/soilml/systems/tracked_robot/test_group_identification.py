@@ -1,16 +1,12 @@
 """Soil from the pull of a track, group by group."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from soilml import Case, Model, soil
 from soilml.config.measurement_noise import Noise
-from soilml.errors import InputError
 from soilml.numerics.prior import Prior
 from soilml.systems.tracked_robot.group_identification import (
-    PARAMETERS,
     identify_groups,
     simulate_group,
 )
@@ -59,31 +55,3 @@ def test_the_truth_lies_within_the_reported_uncertainty(groups):
     truth = np.asarray([getattr(CASE.soil, name) for name in groups.names])
     assert (np.abs(groups.mean - truth) < 3.0 * groups.std).all()
     assert (np.abs(groups.pooled.values - truth) < 3.0 * groups.pooled.std).all()
-
-
-def test_averaging_reduces_only_scatter_between_groups(groups):
-    each = np.sqrt(np.mean([fit.std**2 for fit in groups.fits], axis=0))
-    assert (groups.std <= 1.2 * each).all()
-    same = replace(groups, fits=(groups.fits[0],) * 4)
-    np.testing.assert_allclose(same.std, groups.fits[0].std)
-
-
-def test_the_five_parameters_are_those_of_the_paper_and_one_group_is_refused():
-    assert set(PARAMETERS) == set(PRIOR)
-    table = simulate_group(CASE, np.linspace(0.1, 0.8, 4), WANG2018.load, np.random.default_rng(0))
-    with pytest.raises(InputError, match="1 groups of data"):
-        identify_groups(CASE, [table])
-    with pytest.raises(InputError, match="must carry"):
-        simulate_group(CASE, np.asarray([0.3]), 1e6, np.random.default_rng(0))
-
-
-def test_the_average_as_a_fit_says_what_is_not_known_and_stays_within_the_groups(groups):
-    fit = groups.average
-    np.testing.assert_array_equal(fit.values, groups.mean)
-    np.testing.assert_allclose(fit.std, groups.std)
-    assert fit.rows_used == sum(one.rows_used for one in groups.fits)
-    assert ("not-identified", ("cohesion",)) in [(w.code, w.about) for w in fit.warnings]
-    low, high = fit.interval
-    ends = np.asarray([one.interval for one in groups.fits])
-    assert (low >= ends[:, 0].min(axis=0)).all() and (high <= ends[:, 1].max(axis=0)).all()
-    assert (low < fit.values).all() and (fit.values < high).all()

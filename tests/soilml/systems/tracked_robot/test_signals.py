@@ -4,12 +4,8 @@ import numpy as np
 import pytest
 from scipy import signal as scipy_signal
 
-from soilml.errors import FitError, InputError
 from soilml.systems.tracked_robot.signals import (
     low_pass,
-    rear_sinkage,
-    rut_mean,
-    slip_from_displacements,
     stationary_mean,
 )
 
@@ -57,64 +53,3 @@ def test_ramps_before_and_after_the_pull_are_excluded():
     assert stationary_mean(pull[:900]).mean == pytest.approx(
         0.0, abs=8.0
     )  # waiting stands still too
-
-
-def test_a_signal_without_stationary_part_is_refused():
-    with pytest.raises(FitError, match="are stationary"):
-        stationary_mean(np.linspace(0.0, 600.0, 2000))
-    with pytest.raises(FitError, match="are stationary"):
-        stationary_mean(np.full(2000, 10.0), above=50.0)
-
-
-def test_slip_of_a_belt_that_runs_ahead_of_the_robot():
-    belt = np.linspace(0.0, 2.0, 201)
-    np.testing.assert_allclose(slip_from_displacements(belt, 0.7 * belt, 10), 0.3)
-    assert len(slip_from_displacements(belt, belt, 10)) == 191
-    with pytest.raises(InputError, match="must move forward"):
-        slip_from_displacements(np.r_[belt, belt[-1] * np.ones(20)], np.zeros(221), 10)
-    with pytest.raises(InputError, match="span is 300"):
-        slip_from_displacements(belt, belt, 300)
-
-
-def test_rear_sinkage_is_the_ruts_depth_whatever_the_robots_trim():
-    depth, height, spacing = 0.018, 0.2, 0.7
-    for delta in (-0.05, 0.0, 0.05):
-        front = height + 0.5 * spacing * np.sin(delta)
-        rear = height + depth - 0.5 * spacing * np.sin(delta)
-        found = rear_sinkage([rear], [front], [delta], spacing)
-        assert found == pytest.approx(depth, abs=1e-12)
-
-
-def test_the_mean_of_a_rut_keeps_the_volume_of_soil():
-    lower, raised, part, pitch = 0.010, 0.006, 0.012, 0.05
-    mean = rut_mean([lower + raised], [lower], part, pitch)
-    assert (mean - lower) * pitch == pytest.approx(raised * part)  # eq. 16
-    assert rut_mean([0.02], [0.01], pitch, pitch) == pytest.approx(0.02)
-
-
-def test_invalid_signals_are_refused_with_their_cause():
-    good = np.zeros(500)
-    with pytest.raises(InputError, match="signal is nan at sample 7"):
-        low_pass(np.where(np.arange(500) == 7, np.nan, good), RATE, 5.0)
-    with pytest.raises(InputError, match="one row of 10 samples or more"):
-        low_pass(good[:5], RATE, 5.0)
-    with pytest.raises(InputError, match="one row of 160 samples"):
-        stationary_mean(good[:100])
-    with pytest.raises(InputError, match="cutoff is 60 Hz"):
-        low_pass(good, RATE, 60.0)
-    with pytest.raises(InputError, match="rear 3, front 2, angle 3"):
-        rear_sinkage([1, 2, 3], [1, 2], [0, 0, 0], 0.5)
-    with pytest.raises(InputError, match="track 2, robot 3"):
-        slip_from_displacements([0, 1], [0, 1, 2], 1)
-    with pytest.raises(InputError, match="crest_length"):
-        rut_mean([0.1], [0.1], 0.06, 0.05)
-    with pytest.raises(InputError, match=r"below 0\.001 Hz the filter is inaccurate"):
-        low_pass(good, RATE, 1e-9)
-    with pytest.raises(InputError, match="rate of inf Hz"):
-        low_pass(good, np.inf, 5.0)
-    with pytest.raises(
-        InputError, match="angle is 10 at sample 1; needed is an inclination in rad"
-    ):
-        rear_sinkage([1, 2], [1, 2], [0, 10], 0.5)
-    with pytest.raises(InputError, match="spacing is nan"):
-        rear_sinkage([1], [1], [0], np.nan)

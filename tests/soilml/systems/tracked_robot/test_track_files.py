@@ -48,23 +48,3 @@ def test_a_load_that_the_soil_does_not_carry_is_a_blank_row_with_its_reason(mode
     light, heavy = csv.DictReader(curve.read_text().splitlines())
     assert light["status"] == "ok" and np.isfinite(float(light["drawbar_pull_N"]))
     assert "no equilibrium" in heavy["status"] and heavy["drawbar_pull_N"] == ""
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "message"),
-    [
-        ("base = 0.6", "base = 0.15", "model.toml [gear]: base is 0.15 m with wheels of radius"),
-        ("base = 0.6\n", "", "model.toml [gear]: base is missing"),
-        ("base = 0.6", "base = 0.6\nleaving = 0.9", "leaving is 0.9; it must lie between"),
-        (
-            "[noise]",
-            '[[effect]]\nname = "grousers"\n[noise]',
-            "grousers does not apply to the gear",
-        ),
-    ],
-)
-def test_an_invalid_track_is_refused_in_one_line(model, old, new, message, capsys):
-    model.write_text(MODEL.replace(old, new))
-    assert main(["simulate", str(model), "--slip", "0.2", "--load", "600"]) == 2
-    error = capsys.readouterr().err
-    assert message in error and error.count("\n") == 1

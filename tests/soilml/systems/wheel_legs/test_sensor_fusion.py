@@ -3,10 +3,8 @@
 import numpy as np
 import pytest
 
-from soilml.errors import FitError
 from soilml.systems.wheel_legs.sensor_fusion import (
     PROPERTIES,
-    RULES,
     SENSORS,
     fit_estimators,
     score_estimators,
@@ -38,15 +36,3 @@ def test_rules_for_independent_errors_are_overconfident_for_correlated_errors(es
 def test_sinkage_estimates_the_stiffness_better_than_torque_or_vibration():
     found = score_estimators(fit_estimators(LEARN, "normal_stiffness"), HOLD)
     assert found["sinkage"].rmse < 0.7 * min(found["torque"].rmse, found["vibration"].rmse)
-
-
-def test_weights_sum_to_one_for_every_stance(estimators):
-    for rule in RULES:
-        weights = estimators.fused(HOLD, rule).weights
-        assert weights.shape == (3, 300)
-        np.testing.assert_allclose(weights.sum(axis=0), 1.0)
-
-
-def test_a_few_stances_are_refused():
-    with pytest.raises(FitError, match="5 stances are given; 20 or more"):
-        fit_estimators(simulate_stances(5, seed=1), "friction_angle")

@@ -3,12 +3,8 @@
 import numpy as np
 import pytest
 
-from soilml.errors import FitError, InputError
 from soilml.systems.wheel_legs.resistive_force import GROUNDS
 from soilml.systems.wheel_legs.sinkage_fit import (
-    PRINTED_SINKAGE,
-    SinkageFit,
-    fit_simulated_sinkage,
     fit_sinkage,
     simulate_sinkage,
 )
@@ -19,11 +15,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def rows():
     return simulate_sinkage()
-
-
-@pytest.fixture(scope="module")
-def fit(rows):
-    return fit_simulated_sinkage(rows)
 
 
 def test_exact_relations_are_recovered():
@@ -55,29 +46,3 @@ def test_soils_left_out_of_the_fit_lie_within_its_uncertainty(rows):
     assert np.abs(stiffness_off).max() < 3
     assert np.sqrt(np.mean(np.square(stiffness_off))) < 1.5
     assert np.sqrt(np.mean(np.square(friction_off))) < 1.5
-
-
-def test_friction_is_not_identified_by_simulated_sinkage(rows, fit):
-    assert fit.friction_r2 < 0.2
-    assert fit.friction_scatter > np.std(rows.friction_angle)
-
-
-@pytest.mark.parametrize("sinkage", [0.0, -0.01, np.nan])
-def test_an_invalid_sinkage_is_refused(fit, sinkage):
-    with pytest.raises(InputError, match="above 0"):
-        fit(sinkage)
-
-
-def test_too_few_soils_are_refused():
-    with pytest.raises(FitError, match="2 soils"):
-        fit_sinkage([0.01, 0.02, 0.03], [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], ["a", "b", "b"])
-    with pytest.raises(FitError, match="different sinkages"):
-        fit_sinkage([0.02] * 3, [3e4, 2e4, 1e4], [0.5, 0.6, 0.7], list("abc"))
-    assert SinkageFit.__doc__
-
-
-def test_the_printed_relations_can_be_called():
-    found = PRINTED_SINKAGE([0.01, 0.05])
-    assert found.normal_stiffness == pytest.approx([33900.0, 6780.0])  # 3.39 N/cm over 1 and 5 cm
-    assert found.friction_angle == pytest.approx([0.69, 0.41])
-    assert found.in_range.tolist() == [True, False]

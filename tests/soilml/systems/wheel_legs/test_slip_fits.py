@@ -7,7 +7,6 @@ from soilml.errors import FitError
 from soilml.systems.wheel_legs.slip_models import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
-    fit_lines,
     fit_torque_slip,
     fit_vibration_slip,
 )
@@ -38,29 +37,6 @@ def test_a_vibration_model_is_recovered_from_its_own_values():
     a, b = law.line(*GRID)
     fitted = fit_vibration_slip((SLIPS[:, None] - a) / b, SLIPS, *GRID, planar=True)
     np.testing.assert_allclose(fitted.law.matrix, law.matrix, atol=1e-9)
-
-
-def test_without_the_stiffness_the_law_leaves_more_unexplained():
-    law = VIBRATION_SLIP["planar"]
-    a, b = law.line(*GRID)
-    felt = (SLIPS[:, None] - a) / b
-    linear = fit_vibration_slip(felt, SLIPS, *GRID, planar=False)
-    assert linear.law.c_k == 0.0 and linear.law.assumed == pytest.approx(800.0)
-    assert linear.goodness["intercept"] < 0.99
-
-
-def test_lines_are_those_of_a_polynomial_of_degree_one():
-    felt = np.random.default_rng(0).normal(size=(5, 3)) + SLIPS[:, None]
-    a, b, r2 = fit_lines(felt, SLIPS)
-    for k in range(3):
-        np.testing.assert_allclose(np.polyfit(felt[:, k], SLIPS, 1), [b[k], a[k]])
-        assert r2[k] == pytest.approx(np.corrcoef(felt[:, k], SLIPS)[0, 1] ** 2)
-
-
-def test_midstance_torque_rises_with_slip_on_the_stiff_soils_and_then_no_more():
-    torque = midstance_torques(four_soils())
-    assert (torque[1, [0, 1, 3]] > 1.2 * torque[0, [0, 1, 3]]).all()
-    assert (np.abs(torque[-1] / torque[1] - 1) < 0.05).all()
 
 
 def test_a_soil_that_does_not_carry_the_foot_has_no_line():

@@ -39,19 +39,6 @@ def test_estimates_scale_with_the_wheel_at_the_same_pressure(any_posterior):
     assert in_range
 
 
-def test_designs_of_one_size_ratio_have_the_same_features_and_answers(any_posterior):
-    family = any_posterior.family
-    base = family.designs(20, 1)
-    scaled = base.copy()
-    _, r, b, w, n, k, _, shear = scaled.T
-    for column, power in ((r, 1.0), (b, 1.0), (w, 2.0), (shear, 1.0)):
-        column *= 1.7**power
-    k *= 1.7**-n
-    assert family.features(scaled) == pytest.approx(family.features(base))
-    x = np.zeros((20, 1, 5))
-    assert family.responses(scaled, x) == pytest.approx(family.responses(base, x), rel=1e-6)
-
-
 @pytest.mark.slow
 def test_features_in_the_graph_are_those_of_the_training(any_posterior):
     family = any_posterior.family
