@@ -16,7 +16,7 @@ from conftest import MODEL
 
 from soilml import Estimator
 from soilml.cli import main
-from soilml.experiment_design.advice_after_results import _trained_for, advice_after_estimate
+from soilml.experiment_design.advice_after_results import advice_after_estimate, trained_case
 from soilml.remarks import texts
 
 pytestmark = pytest.mark.slow
@@ -156,7 +156,7 @@ def test_an_estimate_abstains_in_words_and_keeps_its_table_clean(folder, small_m
 
 
 def test_slips_and_loads_of_the_advice_are_those_trained_for(small_model):
-    case, ranges = _trained_for(Estimator.load(small_model))
+    case, ranges = trained_case(Estimator.load(small_model))
     assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus"}
     assert (min(ranges.slips), max(ranges.slips)) == (0.05, 0.6)
     assert (min(ranges.loads), max(ranges.loads)) == (30.0, 120.0)
@@ -212,6 +212,7 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
         "estimate.run(parser.parse_args())\n"
     )
     command = [sys.executable, "-c", code, str(small_model), "runs.csv", "--by", "run"]
+    command += ["--case", "model.toml"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr
