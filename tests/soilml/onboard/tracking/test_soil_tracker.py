@@ -199,7 +199,7 @@ def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
     with pytest.raises(InputError, match="length is 15;"):
         SoilTracker(estimator, length=15)
     assert SoilTracker(estimator, length=16).length == 16
-    with pytest.raises(InputError, match="wheel_linear.onnx has no set posterior"):
+    with pytest.raises(InputError, match=r"wheel_linear\.onnx has no set posterior"):
         SoilTracker(Estimator.load("wheel_linear")).read(slip=0.3, torque=2.0, load=60.0)
 
 
