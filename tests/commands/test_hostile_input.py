@@ -89,11 +89,6 @@ def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
     assert "bad-data: the noise of torque_Nm" in capsys.readouterr().out
 
 
-def test_an_audit_without_a_usable_row(folder, capsys):
-    table(folder / "bad.csv", [[*line, "too heavy"] for line in rows()], f"{HEADER},status")
-    refused(["audit", "model.toml", "bad.csv"], capsys, "bad.csv: no row has the status ok")
-
-
 @pytest.mark.parametrize(
     "setting", ['slip = "1e300 %"', "speed_m_s = 1e300", 'load_N = "1e4%+1e10"']
 )

@@ -31,8 +31,3 @@ def test_rules_for_independent_errors_are_overconfident_for_correlated_errors(es
     assert found["inverse variance"].coverage_95 < 0.92
     assert found["pairwise"].coverage_95 < 0.92
     assert found["best linear"].coverage_95 == pytest.approx(0.95, abs=0.035)
-
-
-def test_sinkage_estimates_the_stiffness_better_than_torque_or_vibration():
-    found = score_estimators(fit_estimators(LEARN, "normal_stiffness"), HOLD)
-    assert found["sinkage"].rmse < 0.7 * min(found["torque"].rmse, found["vibration"].rmse)
