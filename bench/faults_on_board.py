@@ -1,25 +1,21 @@
-"""Faults that a released file flags as flown.
-
-Beside the flag of the answer, whose model has errors, the fault detector `Estimate.disagrees`, with
-sensors of usual errors and with exact ones.
-"""
+"""Faults that a released file flags as flown: by its answer, and by the detector beside it."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
+from board import estimator_of
 from faults import Fault, Readings, definitions, faults, simulate
 from flags import LOAD, SLIP, add_noise, select_rows, shuffled_conditions
-from runner import Bench, Row, Sample, markdown
+from runner import ROOT, Bench, Row, Sample, each, percent, table
 from wrong_worlds import World
 from wrong_worlds import simulate as simulate_world
 
 from datagen.recipe import read_recipe
 from soilml import Estimator
-from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.onboard.set_contract import SENSOR_ERROR_INPUTS
 from soilml.quantities import SHEAR
@@ -27,7 +23,7 @@ from soilml.quantities import SHEAR
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 #: Soils of each line, rows of each set, and the seed of both.
-SETS, QUICK_SETS, ROWS, SEED = 100, 6, 16, 31
+SETS, ROWS, SEED, QUICK_SETS = 100, 16, 31, 4
 #: What no flag of the answer shows, simulated by the reference wheel of the blind sets.
 WORLDS = (
     World("radius 0.18 m for 0.15 m", radius=1.2),
@@ -35,7 +31,17 @@ WORLDS = (
     World("shear curve with a peak of 30 %", mechanism=("shear-softening/peak-and-decay", 0.3)),
 )
 CHANNELS = ("slip", "load", "torque", "sinkage", "drawbar_pull")
-TIMED = 300  # Calls of which the least time is taken, in turn
+#: Flags of a set, as columns.
+FLAGS = ("answer", "detector", "detector, exact sensors")
+TIMED, QUICK_TIMED = 300, 10  # Calls of which the least time is taken, in turn
+FILES = ("wheel", "any_wheel")
+EXACT_SENSORS, USUAL_SENSORS = "no fault, exact sensors", "no fault, usual sensor errors"
+ABOUT = (
+    f"`wheel.onnx` as flown, on {SETS} soils a line, {ROWS} rows each: sets flagged by the answer, "
+    "whose model has errors; by the fault detector beside it (`Estimate.disagrees`), with sensors "
+    "of usual errors and with exact ones, in per cent; and coverage of the 90 % intervals of the "
+    "answer."
+)
 
 
 def with_usual_sensor_errors(r: Readings, estimator: Estimator, seed: int) -> Readings:
@@ -52,129 +58,99 @@ def with_usual_sensor_errors(r: Readings, estimator: Estimator, seed: int) -> Re
     }
 
 
-def lines(case: Case, estimator: Estimator, sets: int) -> Iterator[tuple[str, Readings, Floats]]:
-    """Name, readings (sets, rows) and soils (sets, 3) of each line; the soils are the same."""
-    rng = np.random.default_rng(SEED)
-    truth = np.stack([case.prior[name].at(rng.random(sets)) for name in SHEAR], axis=1)
-    order = shuffled_conditions(sets, SEED)[:, :ROWS]
-    for fault in (Fault("-", "no fault"), *definitions(), *faults(case)):
-        true = simulate(fault.case(case), truth, SLIP, LOAD)
-        read = select_rows(fault.report(add_noise(true, case, SEED)), fault, order)
-        if fault.name == "no fault":
-            yield "no fault, exact sensors", read, truth
-            read = with_usual_sensor_errors(read, estimator, SEED)
-            yield "no fault, usual sensor errors", read, truth
-        else:
-            yield fault.name, read, truth
-    for world in WORLDS:
-        drives = simulate_world(world, sets, ROWS, SEED)
-        yield world.name, drives.readings, drives.truth
+@cache
+def studied() -> dict[str, Fault]:
+    """All faults by name."""
+    case = read_recipe("wheel").case
+    return {fault.name: fault for fault in (*definitions(), *faults(case))}
 
 
 def cases(sample: Sample) -> list[Row]:
-    """One file, with torque only and with all channels."""
+    """Sound sets, each fault and each world; the soils are the same."""
     sets = QUICK_SETS if sample.quick else SETS
-    return [{"file": "wheel", "channels": n, "sets": sets} for n in (3, 5)]
+    names = [EXACT_SENSORS, USUAL_SENSORS, *studied(), *(world.name for world in WORLDS)]
+    return [{"fault": name, "sets": sets} for name in (names[:4] if sample.quick else names)]
 
 
-def flagged(asked: Row) -> list[Row]:
-    """Each line: shares flagged by the answer and by both detectors; coverage of the answer."""
-    case, estimator = read_recipe("wheel").case, Estimator.load(asked["file"])
-    exact = estimator.on(**dict.fromkeys(SENSOR_ERROR_INPUTS, 0.0))
-    return [
-        {"fault": name, **rates((estimator, exact), readings, truth, asked["channels"])}
-        for name, readings, truth in lines(case, estimator, asked["sets"])
-    ]
+def read(case: Row, estimator: Estimator) -> tuple[Readings, Floats]:
+    """Readings (sets, rows) and soils (sets, 3) of a line."""
+    name, sets, model = case["fault"], case["sets"], read_recipe("wheel").case
+    for world in WORLDS:
+        if world.name == name:
+            drives = simulate_world(world, sets, ROWS, SEED)
+            return drives.readings, drives.truth
+    rng, fault = np.random.default_rng(SEED), studied().get(name, Fault("-", "no fault"))
+    truth = np.stack([model.prior[key].at(rng.random(sets)) for key in SHEAR], axis=1)
+    order = shuffled_conditions(sets, SEED)[:, :ROWS]
+    true = simulate(fault.case(model), truth, SLIP, LOAD)
+    found = select_rows(fault.report(add_noise(true, model, SEED)), fault, order)
+    if name == USUAL_SENSORS:
+        found = with_usual_sensor_errors(found, estimator, SEED)
+    return found, truth
 
 
-def rates(
-    estimators: tuple[Estimator, Estimator], r: Readings, truth: Floats, channels: int
-) -> Row:
-    """Shares of the sets that are flagged; of those that are answered, in which intervals hold."""
-    found = []
-    for i in range(len(truth)):
-        rows = {name: r[name][i] for name in CHANNELS[:channels]}
-        try:
-            answer, exact = (one.run(**rows) for one in estimators)
-        except InputError:
-            found.append((True, True, True, np.nan, np.nan, np.nan))
-            continue
-        covered = np.where((truth[i] >= answer.low) & (truth[i] <= answer.high), 1.0, 0.0)
-        found.append((not answer.in_range, bool(answer.disagrees), bool(exact.disagrees), *covered))
-    values = np.asarray(found, float)
-    known = values[~np.isnan(values[:, 3])][:, 3:]
-    covered = known.mean(axis=0).tolist() if len(known) else None
-    return {"flagged": values[:, :3].mean(axis=0).tolist(), "covered": covered}
+def flagged(case: Row) -> list[Row]:
+    """Each set with torque and with all channels: flags of the answer, of both detectors."""
+    estimator, rows = Estimator.load(ROOT / "exported" / "wheel.onnx"), []
+    files = (estimator, estimator.on(**dict.fromkeys(SENSOR_ERROR_INPUTS, 0.0)))
+    readings, truth = read(case, estimator)
+    for count, channels in ((3, "torque"), (5, "all channels")):
+        for i, soil in enumerate(truth):
+            own = {name: readings[name][i] for name in CHANNELS[:count]}
+            try:
+                answer, exact = (file.run(**own) for file in files)
+            except InputError:
+                rows.append({"channels": channels} | dict.fromkeys(FLAGS, True))
+                continue
+            flags = (not answer.in_range, bool(answer.disagrees), bool(exact.disagrees))
+            covered = (soil >= answer.low) & (soil <= answer.high)
+            rows.append(
+                {"channels": channels, "covered": covered} | dict(zip(FLAGS, flags, strict=True))
+            )
+    return rows
 
 
 def tables(rows: list[Row]) -> str:
-    """Faults by what flags them, with torque only and with all channels."""
-    texts = []
-    for n, what in ((3, "torque only"), (5, "all channels")):
-        body = []
-        for row in (r for r in rows if r["channels"] == n):
-            covered = row["covered"]
-            held = "-" if covered is None else " ".join(f"{100.0 * c:.0f}" for c in covered)
-            body.append([row["fault"], *(f"{100.0 * f:.0f}" for f in row["flagged"]), held])
-        head = [
-            f"fault, {ROWS} rows, {what}",
-            "answer",
-            "detector",
-            "exact sensors",
-            "covered c phi K",
-        ]
-        texts.append(markdown(head, body))
-    return "\n\n".join(texts)
+    """A line for each fault, with torque only and with all channels."""
+    columns = {name: percent(name) for name in FLAGS} | {"covered: c, phi, K": percent("covered")}
+    return table(rows, {"fault": "fault", "channels": "channels"}, columns)
 
 
 def cost_cases(sample: Sample) -> list[Row]:
-    """Files with a detector."""
-    return [{"file": name} for name in ("wheel", "wheel_small")]
+    """Each file."""
+    return [{"file": name, "calls": QUICK_TIMED if sample.quick else TIMED} for name in FILES]
 
 
-def cost(asked: Row) -> Row:
-    """Least times of a call with and without the detector, measured in turn, ms."""
-    estimator, times = Estimator.load(asked["file"]), np.zeros((TIMED, 2))
-    sets = estimator.sets
+def cost(case: Row) -> Row:
+    """Least times (ms) of a call without and with the detector, measured in turn."""
+    estimator, times = estimator_of(case["file"]), np.zeros((case["calls"], 2))
+    sets, rng = estimator.sets, np.random.default_rng(SEED)
     assert sets is not None
-    rng = np.random.default_rng(SEED)
     slip, load = rng.uniform(0.08, 0.5, ROWS), rng.uniform(45.0, 105.0, ROWS)
     rows = {"slip": slip, "load": load, "torque": 0.06 * load * (1.0 - np.exp(-slip / 0.15))}
-    for i in range(TIMED):
+    for i in range(len(times)):
         start = time.perf_counter()
         sets.update(estimator.session, sets.rows(rows), estimator.start())
         middle = time.perf_counter()
         estimator.run(**rows)
         times[i] = middle - start, time.perf_counter() - middle
     without, both = 1e3 * times.min(axis=0)
-    return {"without": without, "with": both}
+    return {"without": without, "both": both, "ratio": both / without}
 
 
-def cost_tables(rows: list[Row]) -> str:
-    """Times and their ratio."""
-    body = [
-        [r["file"], f"{r['without']:.2f}", f"{r['with']:.2f}", f"{r['with'] / r['without']:.2f}"]
-        for r in rows
-    ]
-    return markdown(["file", "ms without the detector", "ms with it", "ratio"], body)
-
-
-ON_BOARD = Bench(
-    "faults_on_board",
-    "Faults that a file flags as flown",
-    f"{SETS} sets of {ROWS} rows of the reference wheel with 2 % torque noise; shares in %. "
-    "*Answer*: the flag of the estimate, whose model has errors; *detector*: `disagrees`, with "
-    "usual errors of sensors; *exact sensors*: with none. Covered: 90 % intervals of the answer.",
-    cases,
-    flagged,
-    tables,
+FAULTS_ON_BOARD = Bench(
+    "faults-on-board", "Faults that a file flags as flown", ABOUT, cases, flagged, tables
 )
 DETECTOR_COST = Bench(
-    "detector_cost",
-    "What the fault detector costs",
-    f"Least of {TIMED} calls of {ROWS} rows, with and without it in turn.",
+    "detector-cost",
+    "Time of the fault detector",
+    f"A set of {ROWS} rows: least time of {TIMED} calls, without the detector and with it.",
     cost_cases,
     cost,
-    cost_tables,
+    lambda rows: table(
+        rows,
+        {"file": "file"},
+        {"without, ms": each("without"), "with, ms": each("both"), "ratio": each("ratio")},
+    ),
     timed=True,
 )

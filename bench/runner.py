@@ -95,6 +95,8 @@ def run(
             part.flush()
             kept[_key(case)] = json.loads(line)
             done(number)
+    if source_state() != state:
+        sys.exit(f"{bench.name}: code, recipes or released files changed meanwhile; run it again")
     return [{"case": (own := kept[_key(c)])["case"], "rows": own["rows"]} for c in cases]
 
 
@@ -288,7 +290,7 @@ def source_state() -> str:
 
 def source_version() -> str:
     """The version of soilml, and the commit where the source is a repository."""
-    words = ["git", "-C", str(ROOT), "rev-parse", "--short", "HEAD"]
+    words = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude", "*"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     commit = f", commit {done.stdout.strip()}" if done.returncode == 0 else ""
     return f"soilml {version('soilml')}{commit}"
@@ -306,8 +308,3 @@ def machine() -> str:
         f"{name}, {os.cpu_count()} cores, {platform.system()} {platform.machine()}, Python "
         f"{platform.python_version()}, {versions}; one thread for each process."
     )
-
-
-def progress(text: str) -> None:
-    """A line on standard error."""
-    print(text, file=sys.stderr, flush=True)

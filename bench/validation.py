@@ -179,9 +179,9 @@ def adapt_line() -> str:
     """What a board gains by an adaptation."""
     (_, *rows), (_, own, right) = tables_of("adapt")[:2]
     return (
-        f"Adaptations.\n{len(rows)} campaigns with a hidden effect. The error on other soils, "
-        f"after over before, has the\nmedian {own[1]}; it is larger in {own[3]}. Over that with "
-        f"the old model taken as right: {right[1]}; {right[3]}."
+        f"Adaptations.\n{len(rows)} campaigns, each with a hidden effect. On other soils the "
+        f"error after over before has the\nmedian {own[1]}; it is larger in {own[3]}. Over that "
+        f"with the old model taken as right: {right[1]}; {right[3]}."
     )
 
 

@@ -20,7 +20,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, TypeVar
 
-from soilml.errors import InputError, MissingLibraryError
+from soilml.errors import InputError
+from soilml.optional_imports import need
 from soilml.processes import prepare_worker, usable_cores
 
 Item = TypeVar("Item")
@@ -58,12 +59,9 @@ def dask_map(
     answers at the address, it has no worker, a task killed several workers, or a worker has other
     versions of the libraries.
     """
-    try:
-        from distributed import Client, LocalCluster
-    except ImportError:
-        raise MissingLibraryError(
-            "--engine dask needs dask, which is not installed: pip install 'soilml[cluster]'"
-        ) from None
+    need("distributed", "", "cluster", what="--engine dask")
+    from distributed import Client, LocalCluster
+
     for name in list(logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":  # errors are reported in one line
             logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -20,8 +20,11 @@ else:
 __all__ = ["load_matplotlib", "need", "quiet_matplotlib", "tomllib"]
 
 
-def need(module: str, command: str, extra: str = "ground") -> None:
-    """Import a module; raises `MissingLibraryError`, naming the extra, for a missing library."""
+def need(module: str, command: str, extra: str = "ground", *, what: str = "") -> None:
+    """Import a module; raises `MissingLibraryError`, naming the extra, for a missing library.
+
+    command: Of soilml, for the message; "" where `what` says what needs the module.
+    """
     try:
         if module == "matplotlib":
             load_matplotlib()
@@ -30,7 +33,8 @@ def need(module: str, command: str, extra: str = "ground") -> None:
         raise
     except ImportError as error:
         raise MissingLibraryError(
-            f"`soilml {command}` needs {error.name or 'a library'}, which is not installed: "
+            f"{what or f'`soilml {command}`'} needs {error.name or 'a library'}, which is not "
+            f"installed: "
             f"pip install 'soilml[{extra}]'"
         ) from None
 

@@ -14,7 +14,7 @@ from soilml.onboard.model_file import FORMAT
 from soilml.onboard.set_contract import INTERFACE
 
 ROOT = Path(__file__).parents[1]
-PAGE = (ROOT / "docs" / "onnx-interface.md").read_text()
+PAGE = (ROOT / "docs/reference/onnx.md").read_text()
 RELEASED = {
     "wheel": "whole",
     "wheel_small": "whole",

@@ -1,4 +1,4 @@
-"""Peak memory and time of commands at their largest tables, for RELIABILITY.md: `make bounds`."""
+"""Peak memory and time of commands at large tables, for docs/concepts/limits.md: `make bounds`."""
 
 from __future__ import annotations
 

@@ -70,6 +70,7 @@ def printed(command: str) -> str | None:
     words = shlex.split(command)
     if words[0] == "python":
         words[0] = sys.executable
+    (ROOT / "build").mkdir(exist_ok=True)  # for files that a command writes beside its output
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
     if done.returncode == SKIPPED:
         return print(f"left as it is: {command}: {done.stderr.strip()}")

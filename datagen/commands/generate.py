@@ -31,7 +31,7 @@ with the true soil parameters in further columns.
 
 `wheel` is a packaged recipe, like wheel_test, wheel_leg and benchmark.
 
-A recipe is a model file (see README) with rows and seed at the top, and
+A recipe is a model file with rows and seed at the top, and
 
   [operating]                ranges of slip (ratio) and load (N)
   slip = [0.05, 0.6]
@@ -55,7 +55,7 @@ with either engine.
 OUT is a file, or with a slash at its end a folder of files that the workers
 write. The same command completes a folder after an interruption: files that
 are there and right are kept. `soilml train` reads the folder like one file.
-docs/cluster.md describes generation on several machines.
+docs/how-to/train.md describes generation on several machines.
 """
 
 

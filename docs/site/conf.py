@@ -1,4 +1,4 @@
-"""Settings of the documentation site, which `make docs` builds from the Markdown of the repository.
+"""Settings of the documentation site, which `make docs` builds from the pages for users.
 
 The source folder is the root of the repository, so that the pages and the links between them are
 those that one reads there. Nothing is loaded from the network, neither here nor by the pages.
@@ -47,15 +47,17 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinx_design",
+    "command_listing",
     "command_output",
     "error_listing",
     "foreign_addresses",
     "mathml",
     "page_tree",
     "python_reference",
+    "repository_files",
 ]
-include_patterns = ["*.md", "docs/**.md", "exported/*.md", "examples/*/README.md"]
-exclude_patterns = [".*", "build", "demo", "dist", "docs/site", "node_modules", "tests"]
+include_patterns = ["CHANGELOG.md", "docs/**.md", "exported/*.md", "examples/*/README.md"]
+exclude_patterns = [".*", "build", "demo", "dist", "docs/decisions", "docs/site", "tests"]
 
 # words in the types of parameters, such as `rows`, are looked up as names, and some are attributes
 suppress_warnings = ["ref.python"]

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-PAGE = ROOT / "docs/reference/error-messages.md"
+PAGE = ROOT / "docs/reference/errors.md"
 PACKAGES = ("soilml", "datagen", "training")
 #: What users meet; ValueError and others are turned into one of these before they leave soilml.
 RAISED = (

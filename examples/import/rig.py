@@ -1,4 +1,4 @@
-"""Logs of a simulated single-wheel rig, with what real logs have: see docs/import.md.
+"""Logs of a simulated single-wheel rig, with what real logs have: see docs/how-to/import.md.
 
 The columns are those of a rig in Germany: UTF-16, semicolons, decimal commas, degrees of a motor
 before a gearbox of 99 to 1, a pull sensor that reads 14 N at rest and a burst of missing samples.

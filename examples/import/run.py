@@ -1,4 +1,4 @@
-"""From raw logs to the soil, and the picture of docs/import.md: `make demo-import`."""
+"""From raw logs to the soil, and the picture of docs/how-to/import.md: `make demo-import`."""
 
 from __future__ import annotations
 

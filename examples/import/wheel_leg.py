@@ -1,4 +1,4 @@
-"""Logs of a wheel-leg, simulated with the defects of real ones, to slip (docs/how-to/wheel-leg.md).
+"""Logs of a wheel-leg, simulated with the defects of real ones, to slip (docs/how-to/import.md).
 
 Each run has two files. That of the motor (100 Hz) has an encoder which starts again at 360 degrees
 and reads 12 degrees where a leg is vertical, a current that reads 0.05 A at rest, and a draw wire.
@@ -238,7 +238,7 @@ def compare(table: Table, truth: Truth) -> None:
     print(
         f"\nStances: {len(table)} rows of {len(SLIPS)} runs against what the logs were made from\n"
     )
-    head = ("column", "mean", "RMS error", "median std", "90 % holds")
+    head = ("column", "mean", "RMS error", "median std", "90 % covers")
     print(format_table((*head, f"seeds {SEEDS[0]} to {SEEDS[-1]}"), lines))
 
 
@@ -254,7 +254,7 @@ def slip_on_board(table: Table) -> None:
         inside = (estimate.low[:, 0] <= table["slip"]) & (table["slip"] <= estimate.high[:, 0])
         lines.append((name, f"{rms:.3f}", f"{rms / spread:.2f}", f"{inside.mean():.0%}"))
     print("\nSlip of the stances on board, without the draw wire\n")
-    print(format_table(("slip by", "RMS error", "over the prior's std", "90 % holds"), lines))
+    print(format_table(("slip by", "RMS error", "over the prior's std", "90 % covers"), lines))
 
 
 def picture(files: list[Path], target: Path) -> None:

@@ -135,7 +135,7 @@ STORIES = (
                     (
                         ("Fig. 10", "slip from torque, learned; soil unknown"),
                         ("Fig. 11", "slip from vibration, learned; soil unknown"),
-                        ("Table VI", "both fused, and how well intervals hold"),
+                        ("Table VI", "both fused, and the coverage of intervals"),
                         ("Tables VIII, IX", "the soil from one stride, by what was read"),
                     ),
                 ),

@@ -178,7 +178,7 @@ def draw(found: dict, shares: dict[str, list[float]], soil: dict[str, np.ndarray
     held = [np.mean(np.abs(slip - twice.mean[:, 0]) <= _half(b) * twice.std[:, 0]) for b in BANDS]
     axes[1][0].plot(100 * BANDS, 100 * (held - BANDS), "--", color="C3", label="both by eq. 26")
     axes[1][0].axhline(0.0, color="k", lw=0.8)
-    axes[1][0].set(xlabel="interval claims to hold, %", ylabel="it holds more by, % of rows")
+    axes[1][0].set(xlabel="stated coverage, %", ylabel="coverage beyond it, % of rows")
     axes[1][0].set_ylim(-16, 8)
     axes[1][0].set_title("calibration on another seed; soil unknown", fontsize=10)
     axes[1][0].legend(fontsize=7, loc="upper left", ncols=2)
@@ -234,18 +234,18 @@ def run() -> None:
             if case == "soil unknown":
                 unknown = found
         soil = soil_of(folder, UNKNOWN)
-    print("Slip: RMSE / prior std, and what the 90 % interval holds (in one file: as the rule")
+    print("Slip: RMSE / prior std, and what the 90 % interval covers (in one file: as the rule")
     print(f"claims -> recalibrated). {ROWS} rows each, {TEST_ROWS} of another seed.\n")
     for some in (list(CASES)[:2], list(CASES)[2:]):
         groups = zip(*(figures[case] for case in some), strict=True)
         rows = [(group[0][0], *(cell for line in group for cell in line[1:])) for group in groups]
-        head = ("", *(text for case in some for text in (case, "90 % holds")))
+        head = ("", *(text for case in some for text in (case, "90 % covers")))
         print(format_table(head, rows), end="\n\n")
     print("The soil from one stride whose slip is measured (unknown soil):\n")
     rows = [
         (k, *(f"{x:.2f}" for x in v[:2]), *(f"{x:.0%}" for x in v[2:])) for k, v in soil.items()
     ]
-    print(format_table(("read", "friction angle", "stiffness", "90 % holds", "90 % holds"), rows))
+    print(format_table(("read", "friction angle", "stiffness", "90 % covers", "90 % covers"), rows))
     draw(unknown, shares, soil)
     print(f"\npicture: {OUT}")
 

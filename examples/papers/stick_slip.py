@@ -218,8 +218,8 @@ def informed() -> None:
                 found.append(f"{best.cover90[0]:.0%}")
             rows.append(tuple(found))
     print(f"Slip on unknown soil in the regime of the paper: linear files of {ROWS} rows, RMSE /\n"
-          "prior std, and what the 90 % interval holds\n")  # fmt: skip
-    print(format_table(("vibration by", "torque", "holds", "vibration", "holds"), rows))
+          "prior std, and what the 90 % interval covers\n")  # fmt: skip
+    print(format_table(("vibration by", "torque", "covers", "vibration", "covers"), rows))
 
 
 def draw(chosen: dict[str, float]) -> None:

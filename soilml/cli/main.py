@@ -158,7 +158,12 @@ def _other_commands() -> dict[str, str]:
     """Modules of the commands of other distributions, by name."""
     from importlib.metadata import entry_points
 
-    others = {entry.name: entry.value for entry in entry_points(group="soilml.commands")}
+    # an installation of this one that is older than its files may name a command that is gone
+    others = {
+        entry.name: entry.value
+        for entry in entry_points(group="soilml.commands")
+        if entry.dist is None or entry.dist.name != "soilml"
+    }
     return {name: others[name] for name in sorted(others.keys() - COMMANDS.keys())}
 
 

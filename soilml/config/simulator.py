@@ -162,7 +162,7 @@ def emulated(
     Raises `InputError` where there are no runs, or too few, where a run has no output, where two
     runs of one input differ, and where the soil or a prior reaches beyond the design.
     """
-    need("scipy", "a model file with [simulator]")
+    need("scipy", "", what="a model file with [simulator]")
     table = simulator.runs_read
     if table is None:
         assert simulator.runs is not None

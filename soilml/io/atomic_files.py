@@ -9,6 +9,7 @@ files that were complete take their places, incomplete ones are removed.
 from __future__ import annotations
 
 import errno
+import glob
 import json
 import os
 import signal
@@ -149,8 +150,7 @@ def _journal_name(target: Path, token: str) -> Path:
 
 
 def _journal_pattern(target: Path) -> str:
-    escaped = "".join(f"[{c}]" if c in "*?[" else c for c in target.name[:40])
-    return f".{escaped}.{'[0-9a-f]' * 8}.journal"
+    return f".{glob.escape(target.name[:40])}.{'[0-9a-f]' * 8}.journal"
 
 
 @contextmanager

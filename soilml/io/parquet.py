@@ -11,9 +11,10 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-from soilml.errors import MissingLibraryError, TableError
+from soilml.errors import TableError
 from soilml.io.bounds import COLUMNS, ROWS, TABLE_VALUES, TEXT_BYTES, Bound
 from soilml.io.table import TEXT, Column, text_column
+from soilml.optional_imports import need
 
 
 def read_parquet(path: Path, most: Bound = TABLE_VALUES) -> tuple[dict[str, Any], dict[str, str]]:
@@ -27,12 +28,9 @@ def read_parquet(path: Path, most: Bound = TABLE_VALUES) -> tuple[dict[str, Any]
     or more than a bound of `soilml.io.bounds`, or where a folder has no file, files of different
     tables, or fewer rows than it should.
     """
-    try:
-        import pyarrow as pa
-    except ImportError:
-        raise MissingLibraryError(
-            f"{path}: reading Parquet needs pyarrow: pip install 'soilml[ground]'"
-        ) from None
+    need("pyarrow", "", what=f"{path}: reading Parquet")
+    import pyarrow as pa
+
     files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
     if not files:
         raise TableError(f"{path} is a folder without a Parquet file")
@@ -64,12 +62,9 @@ class ArrowStream(Protocol):
 
 def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
     """Arrow columns by name of a data frame; raises `TableError` for a column that occurs twice."""
-    try:
-        import pyarrow as pa
-    except ImportError:
-        raise MissingLibraryError(
-            "reading a data frame needs pyarrow: pip install 'soilml[ground]'"
-        ) from None
+    need("pyarrow", "", what="reading a data frame")
+    import pyarrow as pa
+
     arrow = pa.table(frame)
     if len(set(arrow.column_names)) < len(arrow.column_names):
         raise TableError("data frame: a column occurs twice")

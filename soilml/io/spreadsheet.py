@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any, NoReturn
 from xml.etree import ElementTree
 
-from soilml.errors import MissingLibraryError, TableError
+from soilml.errors import TableError
 from soilml.io.spreadsheet_size import check_spreadsheet_size
+from soilml.optional_imports import need
 
 ENDINGS = (".xlsx", ".xlsm")
 _SHEET = re.compile(r"(.+\.xls[xm])#([^#]+)", re.IGNORECASE | re.DOTALL)
@@ -104,13 +105,9 @@ def sheet_rows(path: Path) -> list[list[str]]:
 def _opened(file: Path) -> Iterator[_Book]:
     """A spreadsheet, closed at the end; what fails within is a damaged part of it."""
     check_spreadsheet_size(file)
-    try:
-        from python_calamine import CalamineWorkbook
-    except ImportError:
-        raise MissingLibraryError(
-            f"{file}: reading spreadsheets needs python-calamine: pip install 'soilml[logs]'; or "
-            "save the sheet as CSV"
-        ) from None
+    need("python_calamine", "", "logs", what=f"{file}: reading spreadsheets")
+    from python_calamine import CalamineWorkbook
+
     try:
         with zipfile.ZipFile(file) as packed, CalamineWorkbook.from_path(file) as cells_of:
             yield _Book(file, packed, cells_of, _parts(packed), _percent_styles(packed))

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import MissingLibraryError, TableError
+from soilml.errors import TableError
 from soilml.io.bounds import MOST_TEXT
 from soilml.io.cell_text import is_plain, read_number
+from soilml.optional_imports import need
 from soilml.row_status import Status
 
 Column = NDArray[Any]
@@ -148,12 +149,9 @@ class Table:
         >>> Table({"slip": np.array([0.1, 0.3])}).to_arrow().column_names
         ['slip']
         """
-        try:
-            import pyarrow as pa
-        except ImportError:
-            raise MissingLibraryError(
-                "an Arrow table needs pyarrow: pip install 'soilml[ground]'"
-            ) from None
+        need("pyarrow", "", what="an Arrow table")
+        import pyarrow as pa
+
         return pa.table(self.columns)
 
     def place(self, row: int) -> str:

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]  # the board does without soilml.arrays
 
 
 #: Version of what a caller of the graph may feed and reads, in the metadata as `soilml_interface`;
-#: files without that entry have version 1. docs/onnx-interface.md lists the changes.
+#: files without that entry have version 1. docs/reference/onnx.md lists the changes.
 INTERFACE = "5"
 
 #: Readings that every row must have, and readings that a row may lack.

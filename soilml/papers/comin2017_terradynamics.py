@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +17,7 @@ from soilml.systems.wheel_legs.gait_metrics import (
     compare_legs,
     decreasing_until,
 )
+from soilml.systems.wheel_legs.geometry import WheelLeg
 from soilml.systems.wheel_legs.resistive_force import LinearGround, stress_gains
 from soilml.systems.wheel_legs.sinkage_fit import (
     SimulatedSinkage,
@@ -27,14 +30,22 @@ from soilml.systems.wheel_legs.sinkage_fit import (
 MIDDLE = LinearGround(stiffness=0.7e6)
 
 
-@cache
-def _legs() -> GaitMetrics:
-    return compare_legs(MIDDLE)
+#: What the paper leaves open of legs and body: as assumed, and other readings of it.
+OPEN_CHOICES: dict[str, dict[str, Any]] = {
+    "as assumed": {},
+    "legs bent forwards": {"leg": replace(WheelLeg().leg, arc=-WheelLeg().leg.arc)},
+    "body 5 cm below the hub": {"clearance": 0.05},
+}
 
 
 @cache
-def _feet() -> FeetComparison:
-    return compare_feet()
+def _legs(choice: str = "as assumed") -> GaitMetrics:
+    return compare_legs(MIDDLE, **OPEN_CHOICES[choice])
+
+
+@cache
+def _feet(choice: str = "as assumed") -> FeetComparison:
+    return compare_feet(**OPEN_CHOICES[choice])
 
 
 @cache
@@ -47,36 +58,57 @@ def _fit() -> SinkageFit:
     return fit_simulated_sinkage(_soils())
 
 
-def _rank(values: Array, foot: str) -> float:
-    """Rank of a foot, from 1 for the lowest value; NaN if grounds disagree."""
-    rows = values.reshape(len(_feet().feet), -1)
-    ranks = 1 + np.argsort(np.argsort(rows, axis=0), axis=0)[_feet().feet.index(foot)]
+def _rank(name: str, foot: str, choice: str = "as assumed") -> float:
+    """Rank of a foot by `sinkage` or `slip`, 1 for the lowest; NaN if grounds disagree."""
+    feet = _feet(choice)
+    ranks = 1 + np.argsort(np.argsort(getattr(feet, name), axis=0), axis=0)[feet.feet.index(foot)]
     return float(ranks[0]) if np.ptp(ranks) == 0 else float("nan")
 
 
-def _slope(values: Array) -> Array:
-    return _feet().sensitivity(values)[0]
+def _slope_rank(name: str, foot: str, choice: str = "as assumed", errors: float = 0.0) -> float:
+    """Rank of a foot by the slope of its values over stiffness, 1 for the steepest.
 
+    `errors` moves its slope by so many standard errors of the line.
+    """
+    feet = _feet(choice)
+    slope, error = feet.sensitivity(getattr(feet, name))
+    own = feet.feet.index(foot)
+    slope[own] += errors * error[own]
+    return float(1 + np.argsort(np.argsort(slope))[own])
+
+
+def _less_sunk_of_six(choice: str = "as assumed") -> float:
+    return 5 + int(np.argmin(_legs(choice).rms_sinkage[4:]))
+
+
+def _slip_to_five(choice: str = "as assumed") -> float:
+    return decreasing_until(_legs(choice).rms_slip[:5]) - 1
+
+
+#: Quantity and foot of each rank, by key.
+RANKS = {
+    f"rank_{name}_{foot.lower()}": (name, foot)
+    for name in ("sinkage", "slip")
+    for foot in ("none", "CIF")
+}
+SLOPE_RANKS = {
+    f"rank_{name}_slope_{foot.lower()}": (name, foot)
+    for name, feet in (("sinkage", ("LTF", "CIF")), ("slip", ("none", "LTF", "CIF")))
+    for foot in feet
+}
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "alpha_z_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[1]),
     "alpha_x_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[0]),
     "rms_slip_legs": lambda: decreasing_until(_legs().rms_slip),
-    "rms_slip_to_five": lambda: decreasing_until(_legs().rms_slip[:5]) - 1,
+    "rms_slip_to_five": _slip_to_five,
     "rms_sinkage_legs": lambda: decreasing_until(-_legs().rms_sinkage),
     "max_sinkage_drop": lambda: 2 + int(np.argmax(_drop() >= 0.05)),
-    "rms_sinkage_six": lambda: 5 + int(np.argmin(_legs().rms_sinkage[4:])),
+    "rms_sinkage_six": _less_sunk_of_six,
     "max_sinkage_six": lambda: 5 + int(np.argmin(_legs().max_sinkage[4:])),
-    "rank_sinkage_none": lambda: _rank(_feet().sinkage, "none"),
-    "rank_sinkage_cif": lambda: _rank(_feet().sinkage, "CIF"),
-    "rank_slip_none": lambda: _rank(_feet().slip, "none"),
-    "rank_slip_cif": lambda: _rank(_feet().slip, "CIF"),
-    "rank_sinkage_slope_ltf": lambda: _rank(_slope(_feet().sinkage), "LTF"),
-    "rank_sinkage_slope_cif": lambda: _rank(_slope(_feet().sinkage), "CIF"),
-    "rank_slip_slope_none": lambda: _rank(_slope(_feet().slip), "none"),
-    "rank_slip_slope_ltf": lambda: _rank(_slope(_feet().slip), "LTF"),
-    "rank_slip_slope_cif": lambda: _rank(_slope(_feet().slip), "CIF"),
+    **{key: partial(_rank, *own) for key, own in RANKS.items()},
+    **{key: partial(_slope_rank, *own) for key, own in SLOPE_RANKS.items()},
     "s_sigma": lambda: _fit().s_sigma / 100.0,
     "s_sigma_r2": lambda: _fit().stiffness_r2,
     "s_i": lambda: _fit().s_i,
@@ -89,3 +121,23 @@ def _drop() -> Array:
     """Relative decrease of the maximum sinkage by each additional leg."""
     largest = _legs().max_sinkage
     return 1.0 - largest[1:] / largest[:-1]
+
+
+def _alternatives(compute: Callable[..., float], *own: str) -> tuple[Callable[[], float], ...]:
+    """A number by each of the other readings of `OPEN_CHOICES`."""
+    return tuple(partial(compute, *own, choice) for choice in list(OPEN_CHOICES)[1:])
+
+
+#: By key: the same number by the other open choices; a rank by a slope also within its error.
+ALTERNATIVES: dict[str, tuple[Callable[[], float], ...]] = {
+    "rms_slip_to_five": _alternatives(_slip_to_five),
+    "rms_sinkage_six": _alternatives(_less_sunk_of_six),
+    **{key: _alternatives(_rank, *own) for key, own in RANKS.items()},
+    **{
+        key: (
+            *_alternatives(_slope_rank, *own),
+            *(partial(_slope_rank, *own, errors=errors) for errors in (-1.0, 1.0)),
+        )
+        for key, own in SLOPE_RANKS.items()
+    },
+}

@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from soilml.errors import InputError, MissingLibraryError
+from soilml.errors import InputError
+from soilml.optional_imports import need
 from soilml.parameters import mapped
 from soilml.physics.contact import Force
 from soilml.physics.load_case import LoadCase
@@ -37,10 +38,9 @@ def computing_on(device: str) -> Iterator[None]:
     Raises `InputError` where torch has no such device or it lacks float64, or its memory does not
     suffice; `MissingLibraryError` where torch is not installed.
     """
-    try:
-        import torch
-    except ImportError:
-        raise MissingLibraryError("a device needs torch: pip install 'soilml[torch]'") from None
+    need("torch", "", "torch", what="a device")
+    import torch
+
     try:
         torch.zeros(1, dtype=torch.float64, device=device)
     except (RuntimeError, AssertionError, TypeError) as error:

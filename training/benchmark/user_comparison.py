@@ -25,6 +25,7 @@ from soilml.numerics.prior import Prior
 from soilml.onboard.estimator import Estimator
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
+from soilml.processes import usable_cores
 from soilml.quantities import column
 from soilml.remarks import Remark
 from training.benchmark.methods import Method, analytic_method, model_file_method, prior_method
@@ -182,9 +183,7 @@ def compare(
 
 def _affordable(method: Method, sets: Sequence[Table], q: int, seconds: float) -> int:
     """How many sets a method can estimate in a time, by the time of the first; at least these."""
-    started = time.monotonic()
-    method.estimate_sets(sets[:PILOT], q)
-    each = (time.monotonic() - started) / min(PILOT, len(sets))
+    each = float(np.mean(method.estimate_sets(sets[:PILOT], q).seconds)) / usable_cores()
     return int(np.clip(seconds / max(each, 1e-6) - PILOT, PILOT, ANALYTIC_SETS))
 
 

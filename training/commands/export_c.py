@@ -28,7 +28,7 @@ Functions, with NAME the name of OUT.c:
   NAME_tracker_start   begin a drive over soils that change
   NAME_tracker_read    one row of it: what it is, and the soil after it
 
-docs/c-export.md describes them, with an example in C and one in C++.
+docs/how-to/deploy.md describes them, with an example in C and one in C++.
 """
 #: Rows of one step that the working memory may be asked for, and rows that a tracker remembers.
 MOST_ROWS = 4096

@@ -21,7 +21,7 @@ its header OUT.h. They use the structs that export-c writes for each file.
   soilml export-fusion slip.c exported/slip_torque.onnx exported/slip_vibration.onnx
 
 slip_fuse() weighs the estimates by their variances and by the correlation of
-their errors, which the files carry. docs/c-export.md describes it.
+their errors, which are in the files. docs/how-to/deploy.md describes it.
 """
 
 

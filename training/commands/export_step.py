@@ -14,7 +14,7 @@ for compilers that need fixed shapes, such as those of accelerators.
 
   soilml export-step exported/wheel.onnx wheel_step.onnx
 
-docs/onnx-interface.md says how its memory is fed from step to step. Python
+docs/reference/onnx.md says how its memory is fed from step to step. Python
 uses MODEL.onnx itself; soilml export-c writes C that needs no library.
 """
 MOST_ROWS = 4096  # Rows that one step may take

@@ -44,7 +44,7 @@ contains
   hidden = 64                        # response to slip, load and soil
   epochs = 500
   small = true                       # for a microcontroller: fewer monomials,
-  terms = 14                         # 10 to 25, and fewer points (docs/c-export.md)
+  terms = 14                         # 10 to 25, and fewer points (docs/how-to/deploy.md)
 """
 
 

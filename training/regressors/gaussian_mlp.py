@@ -31,16 +31,27 @@ class GaussianMLP(GaussianRegressor):
 
     .. math:: L = \tfrac12 \sum_k \left[\log v_k + (y_k - \mu_k)^2 / v_k\right]
 
-    hidden: Width of each hidden layer.
-    epochs, batch, learning_rate: Of AdamW with a cosine schedule.
-    warm_up: Share of the epochs in which the variance is fixed at 1, so that the mean is fitted
-        first.
-    patience: Epochs without improvement on the validation rows after which training stops.
-    validation: Share of the rows used for validation, unless `fit_with_validation` is given some.
-    random_state: Seed of weights and batches.
+    Parameters
+    ----------
+    hidden : sequence of int
+        Width of each hidden layer.
+    epochs, batch, learning_rate : int, int, float
+        Of AdamW with a cosine schedule.
+    warm_up : float
+        Share of the epochs in which the variance is fixed at 1, so that the mean is fitted first.
+    patience : int
+        Epochs without improvement on the validation rows after which training stops.
+    validation : float
+        Share of the rows used for validation, unless `fit_with_validation` is given some.
+    random_state : int
+        Seed of weights and batches.
 
-    layers_: Weights and bias of each layer in turn.
-    history_: See `loss_history`.
+    Attributes
+    ----------
+    layers_ : list
+        Weights and bias of each layer in turn.
+    history_ : list
+        See `loss_history`.
 
     References: Nix and Weigend, Proc. IEEE ICNN, 1994.
     """

@@ -76,8 +76,12 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     A subclass has a `type_name` for the spec, hyperparameters as keyword arguments of `__init__`,
     and the three abstract methods, which know standardised inputs (n, d) and outputs (n, q) alone.
 
-    x_scaling_, y_scaling_: Of the inputs (d,) and outputs (q,).
-    head_: From standardised outputs to mean and standard deviation.
+    Attributes
+    ----------
+    x_scaling_, y_scaling_ : Standardisation
+        Of the inputs (d,) and outputs (q,).
+    head_ : GaussianHead
+        From standardised outputs to mean and standard deviation.
     """
 
     type_name: ClassVar[str]

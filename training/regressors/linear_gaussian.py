@@ -15,7 +15,10 @@ from training.regressors.rbf_expansion import log_squared_residuals
 class LinearGaussian(GaussianRegressor):
     """Mean and log-variance linear in X, by ridge regression.
 
-    ridge: Penalty on the weights of standardised inputs, per row.
+    Parameters
+    ----------
+    ridge : float
+        Penalty on the weights of standardised inputs, per row.
 
     Notes
     -----

@@ -24,15 +24,21 @@ class LSSVM(GaussianRegressor):
 
     .. math:: f(x) = \sum_j \alpha_j k(x, c_j) + b
 
-    solution ({"by-rows", "exact", "fixed-size"}): "exact" has a prototype for each row; its time
-        grows with the cube of the number of rows and its memory with the square. "fixed-size" has
-        `centres` prototypes, see `FixedSizeLSSVM`; its time is proportional to the number of rows.
-        "by-rows" is exact up to 20 000 rows.
-    centres: Prototypes of the fixed-size solution.
-    gamma: Weight of the errors against smoothness; selected if None, by the error on validation
-        rows, or where there are too few by closed-form leave-one-out.
-    width: Kernel width in standardised inputs; selected in the same way if None.
-    random_state: Seed of the rows on which they are selected, and of the prototypes.
+    Parameters
+    ----------
+    solution : {"by-rows", "exact", "fixed-size"}
+        "exact" has a prototype for each row; its time grows with the cube of the number of rows and
+        its memory with the square. "fixed-size" has `centres` prototypes, see `FixedSizeLSSVM`; its
+        time is proportional to the number of rows. "by-rows" is exact up to 20 000 rows.
+    centres : int
+        Prototypes of the fixed-size solution.
+    gamma : float, optional
+        Weight of the errors against smoothness; selected if None, by the error on validation rows,
+        or where there are too few by closed-form leave-one-out.
+    width : float, optional
+        Kernel width in standardised inputs; selected in the same way if None.
+    random_state : int
+        Seed of the rows on which they are selected, and of the prototypes.
 
     Notes
     -----
@@ -139,9 +145,14 @@ class FixedSizeLSSVM(LSSVM):
 
     Rows are read in parts: time is proportional to their number, memory hardly depends on it.
 
-    centres: Size of the subset, and of the exported model.
-    gamma, width: As for `LSSVM`.
-    random_state: Seed of the selection of centres.
+    Parameters
+    ----------
+    centres : int
+        Size of the subset, and of the exported model.
+    gamma, width : float, optional
+        As for `LSSVM`.
+    random_state : int
+        Seed of the selection of centres.
 
     Notes
     -----

@@ -138,7 +138,7 @@ def _text(given: dict[str, str | float | None], rover: str | None) -> str:
     noise = str(given["torque_noise"] or "2 %")
     written = noise if is_number(noise) else f'"{noise}"'
     parts = [
-        "# Model file of soilml; docs/model-file.md explains every section. SI units.",
+        "# Model file of soilml; docs/reference/model-file.md explains every section. SI units.",
         f'[gear]\ntype = "wheel"\nradius = {given["radius"]} # m\nwidth = {given["width"]} # m',
         _soil(None if name is None else str(name)),
         "[noise] # standard deviations of the sensors: of the reading, in its unit, or both\n"

@@ -21,7 +21,7 @@ HELP = "printed numbers of the source papers next to the computed ones"
 DESCRIPTION = """\
 Compute the numbers that the source papers print, and compare them.
 
-  soilml papers                        all papers; takes about twenty seconds
+  soilml papers                        all papers; takes about forty seconds
   soilml papers nagatani2009           one paper
   soilml papers --summary              how many numbers of each status
   soilml papers comin2017 --all        every number, also those not computed
@@ -32,6 +32,8 @@ status: reproduced     computed without the number, within the tolerance
         recovered      the number, or what it follows from, was put into a
                        simulation and found again
         arithmetic     follows from other printed numbers
+        depends        an order or a count that another choice of what is not
+                       printed turns round
         tuned          agrees because an input that is not printed was chosen
                        so, or only for that choice of it
         missed         computed; the difference is larger, for the reason given

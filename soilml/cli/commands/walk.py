@@ -24,12 +24,12 @@ grounds and commanded slips.
   soilml walk --foot none --legs 1:6:6 --stiffness 0.7e6
   soilml walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --over-time turn.csv
 
-Feet are none, LTF, SRF and CIF (table III); grounds SSC-1, SSC-2, SSC-3 and ES-3
-(table I), or --stiffness, the stress in N/m^3 of depth under a flat plate. A row
-has means, root mean squares and largest values over the last full turn, and the
-sinkage at midstance. Without --slip the wheel rolls freely. --over-time has the
-motion of that turn. The picture shows it, or, where legs, stiffness or slip have
-three values or more, the row's values against them.
+Feet are none, LTF (Load Testing Foot), SRF and CIF (table III); grounds SSC-1,
+SSC-2, SSC-3 and ES-3 (table I), or --stiffness, the stress in N/m^3 of depth under
+a flat plate. A row has means, root mean squares and largest values over the last
+full turn, and the sinkage at midstance. Without --slip the wheel rolls freely.
+--over-time has the motion of that turn. The picture shows it, or, where legs,
+stiffness or slip have three values or more, the row's values against them.
 
 The stress is proportional to the depth: --offset adds the stress at the surface.
 Neighbouring legs do not act on each other, and the body is a plate below the hub.

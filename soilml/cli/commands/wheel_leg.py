@@ -42,7 +42,7 @@ On a known soil the same relations give the slip of each stride:
 with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
 STRIDES.csv is then passed on as slip_measured.
 
-The relations are of one wheel-leg: five legs, load testing feet, 3.75 kg. For
+The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque. --sinkage-model
 walks fits those of the sinkage to simulated walks (soilml walk), which the
 printed ones do not agree with.

@@ -104,7 +104,7 @@ class WheelMap:
 
 @dataclass(frozen=True)
 class LogMap:
-    """How a log is read; see docs/import.md for the file."""
+    """How a log is read; see docs/how-to/import.md for the file."""
 
     source: str
     wheels: tuple[WheelMap, ...]

@@ -39,7 +39,7 @@ NOISE = {
     "sinkage_m": Noise(constant=0.001),
 }
 _COMMENTS = (
-    "Wheel and soil as chosen on the page; docs/model-file.md explains every section. SI units.",
+    "Wheel and soil as chosen on the page; docs/reference/model-file.md explains all sections. SI.",
     "[soil.prior] is what may be true before the log: cohesion, friction angle and shear modulus",
     "are identified in it. [noise] is one standard deviation of each sensor: correct both.",
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -62,11 +63,13 @@ def _rms(values: Array) -> Array:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def compare_legs(ground: LinearGround, turns: float = 2.0) -> GaitMetrics:
-    """1 to `MAX_LEGS` legs without feet on one ground (Comin and Saaj 2017, fig. 5); (legs,)."""
-    return gait_metrics(
-        walk([wheel_leg("none", legs=n + 1) for n in range(MAX_LEGS)], ground, turns=turns)
-    )
+def compare_legs(ground: LinearGround, turns: float = 2.0, **changes: Any) -> GaitMetrics:
+    """1 to `MAX_LEGS` legs without feet on one ground (Comin and Saaj 2017, fig. 5); (legs,).
+
+    `changes` replace fields of the `WheelLeg`.
+    """
+    wheels = [wheel_leg("none", legs=n + 1, **changes) for n in range(MAX_LEGS)]
+    return gait_metrics(walk(wheels, ground, turns=turns))
 
 
 @dataclass(frozen=True)
@@ -94,11 +97,14 @@ class FeetComparison:
 
 
 def compare_feet(
-    stiffnesses: Sequence[float] = STIFFNESSES, feet: Sequence[str] = tuple(FEET)
+    stiffnesses: Sequence[float] = STIFFNESSES, feet: Sequence[str] = tuple(FEET), **changes: Any
 ) -> FeetComparison:
-    """Five legs with each of the feet, rolling freely on each of three or more grounds."""
+    """Five legs with each of the feet, rolling freely on each of three or more grounds.
+
+    `changes` replace fields of the `WheelLeg`.
+    """
     cases = list(product(feet, stiffnesses))
-    wheels = [wheel_leg(foot) for foot, _ in cases]
+    wheels = [wheel_leg(foot, **changes) for foot, _ in cases]
     found = gait_metrics(walk(wheels, [LinearGround(stiffness=alpha) for _, alpha in cases]))
     shape = (len(feet), len(stiffnesses))
     return FeetComparison(

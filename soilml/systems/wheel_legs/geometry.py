@@ -52,7 +52,9 @@ class Foot:
     heel: Section | None = None
 
 
-#: Feet by name (Comin and Saaj 2017, table III): load testing, symmetric rubber, camel inspired.
+#: Feet by name (Comin and Saaj 2017, table III): Load Testing Foot, Symmetric Rubber Foot, Camel
+#: Inspired Foot. The arc of the LTF is taken as symmetric about its chord, of radius 3.9 cm; in
+#: midstance (`stances.FOOT`) the same print is taken as an arc that leaves the leg level, 14.8 cm.
 FEET: dict[str, Foot] = {
     "none": Foot(),
     "LTF": Foot(tip=Section(20, 0.029, 0.04, 0.0055)),

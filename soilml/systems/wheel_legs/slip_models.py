@@ -35,7 +35,7 @@ class TorqueSlip:
     Coefficients in rad, N/cm^2 and N m as printed; methods use SI units. sigma_1 is the
     linearised normal stress at 1 cm depth, sigma_0 + alpha_z (1 cm). With `intercept` a is constant
     over all soils, and sigma_1 follows from b. References: Comin and Saaj 2017, eqs. 18, 19
-    and 27, table IV. Valid for a five-legged wheel-leg with load testing feet under a similar load.
+    and 27, table IV. Valid for a five-legged wheel-leg with Load Testing Feet under a similar load.
     """
 
     friction: tuple[float, float, float]  # c_tau, b_tau, a_tau

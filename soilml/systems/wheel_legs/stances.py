@@ -184,7 +184,8 @@ def _check_ranges(slip: Floats, static: Floats, gap: Floats) -> None:
             raise InputError(f"{name} is {wrong:g}; it must lie between {low:g} and {high:g}")
 
 
-#: The load testing foot of Comin and Saaj 2017, table III, all of it ahead of the leg.
+#: The Load Testing Foot of Comin and Saaj 2017, table III, all of it ahead of the leg: an arc of
+#: radius 14.8 cm that leaves the leg level. In walks (`geometry.FEET`) its radius is 3.9 cm.
 FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
 #: Load, N: a third of the printed 3.75 kg, which one foot does not carry on two of the four soils.
 LOAD = 12.0

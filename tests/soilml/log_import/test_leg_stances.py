@@ -95,13 +95,6 @@ def test_what_the_map_lacks_or_has_twice_is_named(logs, tmp_path):
             imported(logs, tmp_path, *edits)
 
 
-def test_the_page_has_the_map_of_the_example():
-    page = (ROOT / "docs/how-to/wheel-leg.md").read_text()
-    shown = page.partition("```toml\n")[2].partition("```")[0]
-    parts = [table_of(rig.MAP, name) for name in ("wheel_leg", "clearance")]
-    assert shown.startswith(parts[0]) and shown.endswith(parts[1])
-
-
 def test_without_the_table_its_channels_are_unknown(logs, tmp_path):
     table = table_of(rig.MAP, "wheel_leg")
     with pytest.raises(InputError, match="unknown key"):

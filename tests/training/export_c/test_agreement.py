@@ -4,8 +4,8 @@ Tolerances are in standard deviations of the answer. Sums in another order round
 importance sampling passes that on: with the rows of a set in another order, onnxruntime's own means
 and standard deviations change by 6e-5 in one set of 100 and by 3e-4 at most of 1000, and its
 interval ends, which are read from an empirical distribution function, by 5e-4 (of streams 2e-3) and
-by 0.08 (`python bench/run.py c`). A change of the readings by their last digit moves single sets by
-6e-4. The error of the sampling itself is 0.1. C is allowed a small
+by 0.08 (`python bench/run.py c-answers`). A change of the readings by their last digit moves single
+sets by 6e-4. The error of the sampling itself is 0.1. C is allowed a small
 multiple of the former.
 """
 

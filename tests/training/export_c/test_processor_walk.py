@@ -1,4 +1,4 @@
-"""The commands of docs/c-export.md, as written, from an empty folder to an emulated processor."""
+"""The commands of docs/how-to/deploy.md, as written, up to an emulated processor."""
 
 import os
 import re
@@ -9,7 +9,7 @@ import pytest
 from compiled_c import COMPILERS, ROOT
 from emulated_board import MISSING
 
-PAGE = ROOT / "docs" / "c-export.md"
+PAGE = ROOT / "docs/how-to/deploy.md"
 #: Lines that need a network or rights: the environment of this test stands for what they install.
 INSTALLED = ("SOILML=", "python3 -m venv", "venv/bin/pip", "sudo apt-get")
 

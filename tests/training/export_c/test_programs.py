@@ -51,8 +51,8 @@ def test_a_compiler_that_takes_no_nan_is_refused(compiler, flag, exported):
 
 @pytest.mark.parametrize("compiler", ONE_FIRST)
 def test_the_walk_through_of_the_page(compiler, exported, library, tmp_path):
-    """The program of docs/c-export.md, which ends with a row that is set aside."""
-    page = (ROOT / "docs" / "c-export.md").read_text()
+    """The program of docs/how-to/deploy.md, which ends with a row that is set aside."""
+    page = (ROOT / "docs/how-to/deploy.md").read_text()
     (tmp_path / "main.c").write_text(re.search(r"<<'END'\n(.*?)^END$", page, re.M | re.S)[1])
     folder, program, made = exported("wheel"), tmp_path / "board", library("wheel", compiler)
     command = [compiler, *WARNINGS, f"-I{folder}", tmp_path / "main.c", made]

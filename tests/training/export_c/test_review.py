@@ -1,4 +1,4 @@
-"""What docs/c-review.md states of the generated code: stack, recursion, loops, state, tests."""
+"""What docs/decisions/generated-c.md states: stack, recursion, loops, state, tests."""
 
 import os
 import re
@@ -9,7 +9,7 @@ import pytest
 from c_call_graph import call_graph
 from compiled_c import COMPILERS, ROOT
 
-PAGE = ROOT / "docs" / "c-review.md"
+PAGE = ROOT / "docs/decisions/generated-c.md"
 #: Functions of the C library that the code may call: mathematics, and copies of memory.
 LIBRARY = {
     *("cos", "exp", "floor", "log", "sin", "sqrt", "tanh", "rint", "fabs"),
