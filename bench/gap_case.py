@@ -92,7 +92,7 @@ def _said(report: GapReport) -> dict[str, Any]:
         "cause_set": [tuple(sorted(names)) for names in report.cause_set],
         "probabilities": dict(getattr(report, "probabilities", {})),
         "suspects": [tuple(sorted(s.effects)) for s in getattr(report, "suspects", ())],
-        "p_gap": report.p_gap,
+        "gap_probability": report.gap_probability,
         "unclaimed": list(report.best_unclaimed),
         "reasons": texts(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from gap_records import Judged, interval
 
-from soilml.gap.evidence.prior_odds import EXPECTED_CAUSES
+from soilml.inference.constants import EXPECTED_CAUSES
 
 #: Statements in a bin.
 BIN = 50

@@ -38,8 +38,6 @@ LEAST_EIGENVALUE = 1e-3
 AMPLITUDE_BOUNDS, SCATTER_BOUNDS, NOISE_BOUNDS = (-3.5, 3.7), (-3.0, 2.0), (0.0, 2.3)
 #: Where hyperparameters start: logarithms of usual amplitudes and of usual scatter, a bit less.
 FIRST_AMPLITUDE, FIRST_SCATTER = -0.5, -0.3
-#: Standard deviation of an outlier, in its usual one: it then weighs nothing.
-WEIGHTLESS = 1e3
 #: Kinds of hyperparameters.
 DISCREPANCY, SCATTER = "discrepancy", "scatter"
 #: Group of columns whose weights have unit variance.
@@ -153,22 +151,9 @@ class GaussianTerms:
         basis, size, _ = np.linalg.svd(white, full_matrices=False)
         return Whitening(noise, basis, 1.0 - 1.0 / np.sqrt(1.0 + size**2))
 
-    def noise_matrix(self, at: Hyperparameters) -> Floats:
-        """Covariance (m, m) of the noise."""
-        r = self.readings
-        std = r.std * self.noise_scale(at)[r.channel]
-        if not at.autocorrelation:
-            return np.diag(std**2)
-        run, order = r.run[r.row], r.order[r.row]
-        same = (run[:, None] == run) & (r.channel[:, None] == r.channel)
-        lag = np.abs(np.subtract.outer(order, order))
-        return np.asarray(np.outer(std, std) * np.where(same, at.autocorrelation**lag, 0.0))
-
-    def matrix(self, at: Hyperparameters) -> Floats:
-        """Covariance (m, m) of the readings."""
-        return np.asarray(
-            self.noise_matrix(at) + (self.columns * self.variance(at)) @ self.columns.T
-        )
+    def noise_std(self, at: Hyperparameters) -> Floats:
+        """Standard deviation (m,) of the noise."""
+        return np.asarray(self.readings.std * self.noise_scale(at)[self.readings.channel])
 
     def without_discrepancy(self, at: Hyperparameters) -> Hyperparameters:
         """The same noise and scatter, and no discrepancy."""
@@ -176,9 +161,8 @@ class GaussianTerms:
 
     def std(self, at: Hyperparameters) -> Floats:
         """Standard deviation (m,) of the readings by noise and scatter."""
-        r, variance = self.readings, self.variance(replace(at, present=False))
-        noise = r.std * self.noise_scale(at)[r.channel]
-        return np.asarray(np.sqrt(noise**2 + (self.columns**2) @ variance))
+        variance = self.variance(replace(at, present=False))
+        return np.asarray(np.sqrt(self.noise_std(at) ** 2 + (self.columns**2) @ variance))
 
 
 @dataclass(frozen=True)
@@ -254,17 +238,48 @@ def gaussian_terms(
         if own is not None and own.shape[1]:
             parts.append(own)
             group.append(np.full(own.shape[1], FIXED))
-    run = readings.run[readings.row]
-    runs = np.unique(run)
-    for number in runs if runs.size > 1 else ():
-        parts.append(np.where((run == number)[:, None], scatter, 0.0))
-        group.append(channels + np.arange(scatter.shape[1]))
+    if np.unique(readings.run[readings.row]).size > 1:
+        parts.append(_by_run(readings, scatter))
+        group.append(np.tile(channels + np.arange(scatter.shape[1]), len(readings.runs)))
     return GaussianTerms(
         readings=readings,
         columns=np.concatenate(parts, axis=1),
         group=np.concatenate(group).astype(np.int64),
         kinds=(*(DISCREPANCY,) * channels, *(SCATTER,) * scatter.shape[1]),
         usual=process.usual,
+    )
+
+
+def terms_like(
+    terms: GaussianTerms, at: Hyperparameters, readings: Readings, scatter: Floats
+) -> tuple[GaussianTerms, Hyperparameters]:
+    """Noise and scatter of other readings, as that of known ones was found.
+
+    scatter (m, 2): Change of each of these readings by one unit of scatter. Where the known
+        readings are of one run, whose scatter nothing tells, there is none.
+    """
+    index = {name: i for i, name in enumerate(terms.readings.channels)}
+    scale = terms.noise_scale(at)
+    own = [np.log(scale[index[n]]) if n in index else 0.0 for n in readings.channels]
+    several = bool(terms.scatter(at).any())
+    columns = _by_run(readings, scatter) if several else np.zeros((len(readings), 0))
+    kinds = (SCATTER,) * scatter.shape[1]
+    new = GaussianTerms(
+        readings=readings,
+        columns=columns,
+        group=np.tile(np.arange(len(kinds)), columns.shape[1] // len(kinds)),
+        kinds=kinds,
+        usual=np.ones(len(readings.channels)),
+    )
+    log = np.concatenate([at.log[terms.of_kind(SCATTER)], own])
+    return new, Hyperparameters(log, present=False)
+
+
+def _by_run(readings: Readings, scatter: Floats) -> Floats:
+    """Columns (m, runs k) of a change (m, k) that each run has of its own."""
+    run = readings.run[readings.row]
+    return np.concatenate(
+        [np.where((run == r)[:, None], scatter, 0.0) for r in range(len(readings.runs))], axis=1
     )
 
 

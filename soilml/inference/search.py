@@ -323,29 +323,15 @@ class Search:
                 self.nodes[hypothesis] = node
 
     def _outliers(self, node: Node) -> Booleans:
-        r"""Readings (m,) that stray, by their density given all others.
+        """Readings (m,) that stray, by their density given all others.
 
-        .. math:: e_i = [V^{-1} r]_i / [V^{-1}]_{ii}, \quad v_i = 1 / [V^{-1}]_{ii}
-
-        are the error of the prediction of reading i from all others, and its variance. A reading
-        strays where a normal density with half the range of its channel, and a small prior
-        probability, is likelier. One is taken at a time, the farthest first.
-
-        References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.12.
+        A reading strays where a normal density with half the range of its channel, and a small
+        prior probability, is likelier. One is taken at a time, the farthest first.
         """
-        strays, model = node.outliers.copy(), node.linear
-        precision = np.diag(model.precision) + model.information
-        covariance = self.terms.matrix(node.at)
-        covariance += model.jacobian @ np.linalg.solve(precision, model.jacobian.T)
-        width = self.terms.largest_outlier
-        large = (1e3 * width) ** 2
-        covariance[strays, strays] += large[strays]
+        strays, width = node.outliers.copy(), self.terms.largest_outlier
         odds = np.log(constants.OUTLIER_PRIOR / (1.0 - constants.OUTLIER_PRIOR))
         for _ in range(MOST_OUTLIERS):
-            inverse = np.linalg.inv(covariance)
-            variance = 1.0 / np.diag(inverse)
-            error = (inverse @ model.residual) * variance
-            variance = np.maximum(np.where(strays, variance - large, variance), 1e-12)
+            error, variance = node.linear.without(strays).leave_one_out(node.at)
             wide = variance + width**2
             usual = -0.5 * (error**2 / variance + np.log(variance))
             far = -0.5 * (error**2 / wide + np.log(wide)) + odds
@@ -353,7 +339,6 @@ class Search:
             i = int(np.argmax(gain))
             if gain[i] < constants.OUTLIER_GAIN:
                 break
-            covariance[i, i] += -large[i] if strays[i] else large[i]
             strays[i] = not strays[i]
         return strays
 

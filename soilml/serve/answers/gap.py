@@ -16,7 +16,7 @@ from soilml.gap.report.page import (
     suspect_table,
 )
 from soilml.remarks import texts
-from soilml.report.numbers import format_estimate, format_p_value
+from soilml.report.numbers import format_estimate, format_probability
 from soilml.serve.answers.estimate import read_rows
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
@@ -61,7 +61,7 @@ def verdict(report: GapReport) -> dict[str, Any]:
             for s in suspect_table(report)
         ],
         "maps": discrepancy_maps(report),
-        "p_gap": format_p_value(report.p_gap),
+        "gap_probability": format_probability(report.gap_probability),
         "sizes": [
             {"rows": name, "before": g.before, "after": g.after, "what": g.description}
             for name, g in report.gap.items()

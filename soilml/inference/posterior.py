@@ -1,0 +1,380 @@
+"""Every answer as a marginal of one posterior over hypotheses, hyperparameters and unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.errors import InputError
+from soilml.fitting.coordinates import values_at
+from soilml.fitting.covariance import Whitening
+from soilml.fitting.effect_signatures import Signature
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.predictions import PredictionRequest, predict_many
+from soilml.inference import constants
+from soilml.inference.evidence import log_density_of_size
+from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
+from soilml.inference.problem import SOIL_ALONE, InferenceProblem
+from soilml.inference.search import Node, Search
+from soilml.quantities import Z_90
+from soilml.remarks import Remark
+
+Names = tuple[str, ...]
+
+#: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
+MOST_LOG_ODDS = 500.0
+#: Probability of a component below which it is not drawn from.
+LEAST_DRAWN = 0.003
+#: Draws of a posterior, hyperparameters that are drawn of a component at most, draws of each at
+#: least, and proposals of each draw.
+DRAWS, HYPER_DRAWS, FEWEST, PROPOSALS = 600, 6, 8, 2
+#: Factor on the standard deviations of proposals, which are of Student's t with so many degrees.
+PROPOSAL_WIDTH, PROPOSAL_DEGREES = 1.15, 5.0
+#: Rounds in which proposals outside of the bounds are drawn again, before they are clipped.
+REDRAWN = 12
+
+
+def infer(
+    problem: InferenceProblem, progress: Callable[[float], None] = lambda _: None
+) -> Posterior:
+    """The posterior of a problem.
+
+    Raises `InputError` where the model cannot be fitted. Where it cannot carry the loads of some
+    rows, `Posterior.refused` is the fit that shows which.
+    """
+    search = Search(problem, progress).run()
+    return Posterior(search)
+
+
+@dataclass(frozen=True, eq=False)
+class Component:
+    """A hypothesis, with a discrepancy or without one, and its probability."""
+
+    node: Node
+    at: Hyperparameters
+    weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Draws:
+    """Coordinates (k, p) of one component at hyperparameters that were drawn, and their weights.
+
+    The weights of all draws of a posterior sum to one.
+    """
+
+    node: Node
+    at: Hyperparameters
+    x: Floats
+    weight: Floats
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """A parameter's marginal: its mean, and ends of its central 90 % interval."""
+
+    mean: float
+    low: float
+    high: float
+    unit: str
+
+    @property
+    def std(self) -> float:
+        """Standard deviation of the normal distribution with an interval as wide."""
+        return (self.high - self.low) / (2.0 * Z_90)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Probabilities of hypotheses, and what follows from them.
+
+    Single effects that were never fitted, since their prediction is far from the best, count with
+    their predicted evidence.
+    """
+
+    search: Search
+
+    @property
+    def problem(self) -> InferenceProblem:
+        """The problem, with the noise that its readings have at the fit."""
+        return self.search.problem
+
+    @property
+    def terms(self) -> GaussianTerms:
+        """All that is no effect."""
+        return self.search.terms
+
+    @property
+    def refused(self) -> Solution | None:
+        """The best fit where none carries the loads of all rows."""
+        return self.search.refused
+
+    @cached_property
+    def nodes(self) -> tuple[Node, ...]:
+        """Fitted hypotheses, the likeliest first."""
+        return tuple(sorted(self.search.nodes.values(), key=lambda node: node.value))
+
+    @property
+    def best(self) -> Node:
+        """The likeliest hypothesis."""
+        return self.nodes[0]
+
+    @property
+    def soil(self) -> Node:
+        """The soil alone, within the priors of the case."""
+        return self.search.nodes[SOIL_ALONE]
+
+    @cached_property
+    def noise(self) -> Hyperparameters:
+        """Noise and scatter by the likeliest hypothesis, without a discrepancy."""
+        return self.terms.without_discrepancy(self.best.at)
+
+    @cached_property
+    def std(self) -> Floats:
+        """Standard deviation (m,) of the readings by noise and scatter."""
+        return self.terms.std(self.noise)
+
+    @property
+    def outliers(self) -> NDArray[np.bool_]:
+        """Readings (m,) that stray by the likeliest hypothesis."""
+        return self.best.outliers
+
+    @cached_property
+    def whiten(self) -> Whitening:
+        """What whitens noise and scatter; outliers weigh nothing."""
+        return self.terms.whiten(self.noise, self.outliers)
+
+    def discrepancy(self, node: Node) -> Floats:
+        """Mean (m,) of the smooth discrepancy beside a node, in the unit of the readings."""
+        terms, at = self.terms, node.at
+        found = node.linear.evaluate(at)
+        own = found.used[np.isin(terms.group[found.used], np.arange(terms.channels))]
+        weights = found.weights[np.isin(found.used, own)] * np.sqrt(terms.variance(at)[own])
+        return np.asarray(terms.columns[:, own] @ weights)
+
+    @property
+    def signatures(self) -> list[Signature]:
+        """Signatures of all effects beside the soil alone."""
+        return self.search.signatures.get((), [])
+
+    @property
+    def untestable(self) -> dict[str, Remark]:
+        """Why the rows cannot test some effects, by name."""
+        return self.search.untestable
+
+    @cached_property
+    def _weights(self) -> tuple[list[Names], Floats, Floats]:
+        """Effects, probability, and share that counts for the effects, of every hypothesis."""
+        tried = self.search.nodes
+        items = [(n.hypothesis, n.value) for n in self.nodes]
+        items += [
+            (h, own.value)
+            for h, own in self.search.predicted.items()
+            if h not in tried and len(h.effects) == 1 and h not in self.search._tried
+        ]
+        values = np.asarray([value for _, value in items])
+        weights = np.exp(-0.5 * (values - values.min()))
+        weights /= weights.sum()
+        lowest: dict[tuple[Names, bool], float] = {}
+        for h, value in items:
+            key = h.effects, h.free_law
+            lowest[key] = min(value, lowest.get(key, np.inf))
+        shares = [_by_catalogue(h.effects, h.free_law, lowest) for h, _ in items]
+        return [h.effects for h, _ in items], weights, np.asarray(shares)
+
+    def node_weight(self, node: Node) -> float:
+        """Probability of a fitted hypothesis."""
+        return float(self._weights[1][self.nodes.index(node)])
+
+    @cached_property
+    def sets(self) -> dict[Names, float]:
+        """Probability of exactly these effects within the catalogue, the likeliest first."""
+        found: dict[Names, float] = {}
+        for names, weight, share in zip(*self._weights, strict=True):
+            found[names] = found.get(names, 0.0) + float(weight * share)
+        return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+
+    @cached_property
+    def no_effect(self) -> float:
+        """Probability that no effect is present, whatever else is."""
+        return self.sets.get((), 0.0)
+
+    @cached_property
+    def no_gap(self) -> float:
+        """Probability that the soil alone, within its priors, explains the rows."""
+        own = self.soil
+        return self.node_weight(own) * own.share_without
+
+    def within(self, effects: Collection[str]) -> float:
+        """Probability that these effects are present, within the catalogue."""
+        return sum(p for names, p in self.sets.items() if set(effects) <= set(names))
+
+    def probability(self, *effects: str) -> float:
+        """Probability that these effects are present, causes outside the catalogue included."""
+        return constants.IN_CATALOGUE * self.within(effects)
+
+    def log_odds(self, *effects: str) -> float:
+        """Natural logarithm of the odds that these effects are present, within the catalogue."""
+        p = self.within(effects)
+        odds = np.log(max(p, 1e-300)) - np.log(max(1.0 - p, 1e-300))
+        return float(np.clip(odds, -MOST_LOG_ODDS, MOST_LOG_ODDS))
+
+    def effects(self) -> list[str]:
+        """All effects with a probability, the likeliest first."""
+        names = {name for own in self.sets for name in own}
+        return sorted(names, key=lambda name: (-self.within([name]), name))
+
+    def node_of(self, effects: Names) -> Node | None:
+        """The likeliest fitted hypothesis of exactly these effects."""
+        return next((n for n in self.nodes if n.hypothesis.effects == effects), None)
+
+    def components(self, least: float = LEAST_DRAWN) -> list[Component]:
+        """Hypotheses, each with and without a discrepancy, and their probabilities; sum one."""
+        found = []
+        for node, weight in zip(self.nodes, self._weights[1], strict=False):
+            share = node.share_without
+            for evidence, part in ((node.without, share), (node.beside, 1.0 - share)):
+                if weight * part > least:
+                    found.append(Component(node, evidence.at, float(weight * part)))
+        total = sum(c.weight for c in found)
+        return [replace(c, weight=c.weight / total) for c in found]
+
+    def draws(self, seed: int, count: int = DRAWS) -> list[Draws]:
+        """Draws of hypothesis, discrepancy, hyperparameters and coordinates.
+
+        Coordinates are proposed from Laplace's approximation, widened, and weighted by the density
+        of the full model, so that bounds and curvature count; the probability of each component
+        stays that of its evidence.
+
+        References: Geweke, Econometrica 57, 1989 (importance sampling from widened proposals).
+        """
+        rng = np.random.default_rng(seed)
+        found: list[Draws] = []
+        for one in self.components():
+            found += _draws_of(one, self.terms, int(np.ceil(count * one.weight)), rng)
+        return found
+
+    def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
+        """Marginals of the soil parameters that are free within the case's priors, by path.
+
+        factor: By which intervals are widened about their mean.
+        """
+        own = self.draws(seed)
+        found = {}
+        for c in self.problem.soil:
+            values, weights = [], []
+            for part in own:
+                paths = [other.path for other in part.node.fit.coordinates]
+                at = paths.index(c.path)
+                values.append(values_at([part.node.fit.coordinates[at]], part.x[:, [at]])[:, 0])
+                weights.append(part.weight)
+            found[c.path] = _marginal(
+                np.concatenate(values), np.concatenate(weights), c.unit, factor
+            )
+        return found
+
+    def log_density(self, node: Node, left_out: NDArray[np.bool_]) -> float:
+        r"""ln p of readings given all others, by a hypothesis: the difference of two evidences.
+
+        .. math:: \ln p(y_o \mid y_r, h) = \ln p(y \mid h) - \ln p(y_r \mid h)
+
+        References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
+        """
+        with_ = node.linear.evaluate(node.at).value
+        rest = node.linear.without(node.outliers | left_out).evaluate(node.at).value
+        return -0.5 * (with_ - rest)
+
+
+def _by_catalogue(
+    effects: Names, free_law: bool, lowest: Mapping[tuple[Names, bool], float]
+) -> float:
+    """Share of a hypothesis that counts for its effects.
+
+    With free laws that is all where the catalogue's laws explain more than a part of them does.
+    """
+    if not free_law:
+        return 1.0
+    parts = [v for (names, free), v in lowest.items() if not free and set(names) < set(effects)]
+    own = lowest.get((effects, False), np.inf)
+    return 1.0 if own <= min(parts, default=np.inf) else constants.OTHER_LAW_RIGHT
+
+
+def _draws_of(
+    one: Component, terms: GaussianTerms, count: int, rng: np.random.Generator
+) -> list[Draws]:
+    """Draws of one component; their weights sum to its probability."""
+    parts = min(HYPER_DRAWS, max(1, count // (FEWEST + FEWEST // 2)))
+    curvature = one.node.linear.evaluate(one.at).curvature
+    low, high = np.asarray(terms.bounds()).T
+    found = []
+    for _ in range(parts):
+        at = one.at
+        if parts > 1:
+            spread = rng.standard_normal(len(at.log)) / np.sqrt(np.maximum(curvature, 0.5))
+            at = replace(at, log=np.clip(at.log + spread, low, high))
+        try:
+            drawn = _coordinates(one.node, terms, at, max(FEWEST, count // parts), rng)
+        except np.linalg.LinAlgError:
+            drawn = _coordinates(one.node, terms, one.at, max(FEWEST, count // parts), rng)
+        x, log = drawn
+        weight = np.exp(log - np.logaddexp.reduce(log))
+        found.append(Draws(one.node, at, x, weight * one.weight / parts))
+    return found
+
+
+def _coordinates(
+    node: Node, terms: GaussianTerms, at: Hyperparameters, count: int, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Coordinates (k, p) at hyperparameters, and the logarithms of their weights (k,)."""
+    fit, model = node.fit, node.linear
+    found = model.evaluate(at)
+    low = np.asarray([c.lower for c in fit.coordinates])
+    high = np.asarray([c.upper for c in fit.coordinates])
+    mean = np.clip(fit.x + found.step, low, high)
+    p, nu = len(mean), PROPOSAL_DEGREES
+    factor = PROPOSAL_WIDTH * np.linalg.cholesky(found.covariance + 1e-14 * np.eye(p))
+    wanted = PROPOSALS * count
+    kept: list[Floats] = []
+    for _ in range(REDRAWN):
+        need = wanted - sum(map(len, kept))
+        if need <= 0:
+            break
+        z = rng.standard_normal((6 * need + 8, p))
+        z /= np.sqrt(rng.chisquare(nu, len(z)) / nu)[:, None]
+        x = mean + z @ factor.T
+        kept.append(x[((x >= low) & (x <= high)).all(axis=1)][:need])
+    missing = wanted - sum(map(len, kept))
+    if missing > 0:
+        kept.append(np.clip(mean + rng.standard_normal((missing, p)) @ factor.T, low, high))
+    x = np.concatenate(kept)
+    (y,) = predict_many([PredictionRequest(fit.case, fit.coordinates, x, terms.readings)])
+    if isinstance(y, InputError):
+        return x, np.zeros(len(x))
+    residual = np.asarray(terms.readings.measured - y)
+    answered = np.asarray(np.isfinite(residual).all(axis=1))
+    white = terms.whiten(at, node.outliers) @ np.where(answered[:, None], residual, 0.0).T
+    log = -0.5 * (white**2).sum(axis=0) - 0.5 * (fit.soil_tests.deviation(x) ** 2).sum(axis=1)
+    for i, c in enumerate(fit.coordinates):
+        if np.isfinite(c.std):
+            log = log - 0.5 * (x[:, i] / c.std) ** 2
+        elif c.effect:
+            log = log + log_density_of_size(x[:, i], c.lower < 0.0 < c.upper)
+    z = np.linalg.solve(factor, (x - mean).T)
+    log = log + 0.5 * (nu + p) * np.log1p((z**2).sum(axis=0) / nu)
+    return x, np.where(answered, log, -np.inf) if answered.any() else np.zeros(len(x))
+
+
+def _marginal(values: Floats, weights: Floats, unit: str, factor: float) -> Marginal:
+    """Mean and central 90 % interval of weighted values (k,)."""
+    order = np.argsort(values)
+    share = weights[order] / weights.sum()
+    middle = np.cumsum(share) - 0.5 * share
+    low, high = np.interp([0.05, 0.95], middle, values[order])
+    mean = float(weights @ values / weights.sum())
+    return Marginal(
+        mean, mean + factor * (float(low) - mean), mean + factor * (float(high) - mean), unit
+    )
