@@ -253,10 +253,23 @@ class Posterior:
         References: Geweke, Econometrica 57, 1989 (importance sampling from widened proposals).
         """
         rng = np.random.default_rng(seed)
-        found: list[Draws] = []
-        for one in self.components():
-            found += _draws_of(one, self.terms, int(np.ceil(count * one.weight)), rng)
-        return found
+        proposed = [
+            own for one in self.components() for own in _proposals(one, self.terms, count, rng)
+        ]
+        requests = [
+            PredictionRequest(
+                own.node.fit.case,
+                own.node.fit.coordinates,
+                own.x,
+                self.terms.readings,
+                replace(
+                    own.node.fit.linearisation.sinkage_at(own.x - own.node.fit.x), nearest=True
+                ),
+            )
+            for own in proposed
+        ]
+        predicted = predict_many(requests)
+        return [_weighted(o, self.terms, y) for o, y in zip(proposed, predicted, strict=True)]
 
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
         """Marginals of the soil parameters that are free within the case's priors, by path.
@@ -303,10 +316,22 @@ def _by_catalogue(
     return 1.0 if own <= min(parts, default=np.inf) else constants.OTHER_LAW_RIGHT
 
 
-def _draws_of(
-    one: Component, terms: GaussianTerms, count: int, rng: np.random.Generator
-) -> list[Draws]:
-    """Draws of one component; their weights sum to its probability."""
+@dataclass(frozen=True, eq=False)
+class _Proposal:
+    """Coordinates (k, p) that were proposed, ln of their density, and their probability."""
+
+    node: Node
+    at: Hyperparameters
+    x: Floats
+    log_density: Floats
+    weight: float
+
+
+def _proposals(
+    one: Component, terms: GaussianTerms, total: int, rng: np.random.Generator
+) -> list[_Proposal]:
+    """Proposals for one component, at hyperparameters that are drawn by Laplace's approximation."""
+    count = int(np.ceil(total * one.weight))
     parts = min(HYPER_DRAWS, max(1, count // (FEWEST + FEWEST // 2)))
     curvature = one.node.linear.evaluate(one.at).curvature
     low, high = np.asarray(terms.bounds()).T
@@ -317,27 +342,24 @@ def _draws_of(
             spread = rng.standard_normal(len(at.log)) / np.sqrt(np.maximum(curvature, 0.5))
             at = replace(at, log=np.clip(at.log + spread, low, high))
         try:
-            drawn = _coordinates(one.node, terms, at, max(FEWEST, count // parts), rng)
+            linear = one.node.linear.evaluate(at)
         except np.linalg.LinAlgError:
-            drawn = _coordinates(one.node, terms, one.at, max(FEWEST, count // parts), rng)
-        x, log = drawn
-        weight = np.exp(log - np.logaddexp.reduce(log))
-        found.append(Draws(one.node, at, x, weight * one.weight / parts))
+            at, linear = one.at, one.node.linear.evaluate(one.at)
+        wanted = PROPOSALS * max(FEWEST, count // parts)
+        x, log = _proposed(one.node, linear.step, linear.covariance, wanted, rng)
+        found.append(_Proposal(one.node, at, x, log, one.weight / parts))
     return found
 
 
-def _coordinates(
-    node: Node, terms: GaussianTerms, at: Hyperparameters, count: int, rng: np.random.Generator
+def _proposed(
+    node: Node, step: Floats, covariance: Floats, wanted: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Coordinates (k, p) at hyperparameters, and the logarithms of their weights (k,)."""
-    fit, model = node.fit, node.linear
-    found = model.evaluate(at)
-    low = np.asarray([c.lower for c in fit.coordinates])
-    high = np.asarray([c.upper for c in fit.coordinates])
-    mean = np.clip(fit.x + found.step, low, high)
-    p, nu = len(mean), PROPOSAL_DEGREES
-    factor = PROPOSAL_WIDTH * np.linalg.cholesky(found.covariance + 1e-14 * np.eye(p))
-    wanted = PROPOSALS * count
+    """Coordinates (k, p) of Student's t about the optimum, within bounds, and ln densities (k,)."""
+    coordinates, nu = node.fit.coordinates, PROPOSAL_DEGREES
+    low = np.asarray([c.lower for c in coordinates])
+    high = np.asarray([c.upper for c in coordinates])
+    mean, p = np.clip(node.fit.x + step, low, high), len(low)
+    factor = PROPOSAL_WIDTH * np.linalg.cholesky(covariance + 1e-14 * np.eye(p))
     kept: list[Floats] = []
     for _ in range(REDRAWN):
         need = wanted - sum(map(len, kept))
@@ -351,21 +373,30 @@ def _coordinates(
     if missing > 0:
         kept.append(np.clip(mean + rng.standard_normal((missing, p)) @ factor.T, low, high))
     x = np.concatenate(kept)
-    (y,) = predict_many([PredictionRequest(fit.case, fit.coordinates, x, terms.readings)])
+    z = np.linalg.solve(factor, (x - mean).T)
+    return x, -0.5 * (nu + p) * np.log1p((z**2).sum(axis=0) / nu)
+
+
+def _weighted(own: _Proposal, terms: GaussianTerms, y: Floats | InputError) -> Draws:
+    """Proposals weighted by their density; equally where the model refuses all of them."""
+    fit, x = own.node.fit, own.x
+    equal = Draws(own.node, own.at, x, np.full(len(x), own.weight / len(x)))
     if isinstance(y, InputError):
-        return x, np.zeros(len(x))
+        return equal
     residual = np.asarray(terms.readings.measured - y)
     answered = np.asarray(np.isfinite(residual).all(axis=1))
-    white = terms.whiten(at, node.outliers) @ np.where(answered[:, None], residual, 0.0).T
+    if not answered.any():
+        return equal
+    white = terms.whiten(own.at, own.node.outliers) @ np.where(answered[:, None], residual, 0.0).T
     log = -0.5 * (white**2).sum(axis=0) - 0.5 * (fit.soil_tests.deviation(x) ** 2).sum(axis=1)
     for i, c in enumerate(fit.coordinates):
         if np.isfinite(c.std):
             log = log - 0.5 * (x[:, i] / c.std) ** 2
         elif c.effect:
             log = log + log_density_of_size(x[:, i], c.lower < 0.0 < c.upper)
-    z = np.linalg.solve(factor, (x - mean).T)
-    log = log + 0.5 * (nu + p) * np.log1p((z**2).sum(axis=0) / nu)
-    return x, np.where(answered, log, -np.inf) if answered.any() else np.zeros(len(x))
+    log = np.where(answered, log - own.log_density, -np.inf)
+    weight = np.exp(log - np.logaddexp.reduce(log))
+    return Draws(own.node, own.at, x, own.weight * weight)
 
 
 def _marginal(values: Floats, weights: Floats, unit: str, factor: float) -> Marginal:
