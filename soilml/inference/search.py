@@ -165,7 +165,7 @@ class Search:
         starts = [{c.path: c.prior.fraction(c.nominal) for c in problem.soil}]
         starts += [dict.fromkeys((c.path for c in problem.soil), x) for x in SOIL_STARTS]
         jobs = [Job(SOIL_ALONE, start, self.terms.first(), none) for start in starts]
-        answers = self._fit(jobs, COARSE)
+        answers = self.fit(jobs, COARSE)
         fits = [fit for fit in answers if not isinstance(fit, InputError)]
         if not fits:
             raise next(error for error in answers if isinstance(error, InputError))
@@ -203,7 +203,7 @@ class Search:
         if np.median(np.bincount(readings.run[readings.row])) < constants.AUTOCORRELATED_RUN:
             return
         for rho in list(constants.AUTOCORRELATIONS)[1:]:
-            new = self._node(
+            new = self.node(
                 node.hypothesis, node.fit, replace(node.at, autocorrelation=rho), node.outliers
             )
             if new.value < self.nodes[node.hypothesis].value:
@@ -216,7 +216,7 @@ class Search:
         is not needed. They are predicted from the soil alone under noise and scatter.
         """
         at, linear = soil.without.at, plain.linearisation
-        (fit,) = self._fit([Job(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
+        (fit,) = self.fit([Job(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
         if isinstance(fit, InputError):
             return
         model = linear_model(self.terms, fit, soil.outliers)
@@ -239,7 +239,7 @@ class Search:
 
     # ---- fits
 
-    def _fit(
+    def fit(
         self, jobs: Sequence[Job], tolerance: Tolerance = COARSE
     ) -> list[Solution | InputError]:
         """Fits that share each call of the model; the error of one that the model refuses."""
@@ -268,7 +268,7 @@ class Search:
             return current_size(self.problem.case, coordinate.path, own)
         return constants.START_SIZE if coordinate.upper > 0.0 else -constants.START_SIZE
 
-    def _node(
+    def node(
         self, hypothesis: Hypothesis, fit: Solution, at: Hyperparameters, outliers: Booleans
     ) -> Node:
         """A fit with the hyperparameters of its largest evidence, with and without discrepancy."""
@@ -292,16 +292,16 @@ class Search:
         found: dict[Hypothesis, Node] = {}
         for turn in range(constants.FITS_IN_TURN):
             again = []
-            fits = self._fit(jobs, COARSE if turn == 0 else FINE)
+            fits = self.fit(jobs, COARSE if turn == 0 else FINE)
             for job, fit in zip(jobs, fits, strict=True):
                 if isinstance(fit, InputError) or not np.isfinite(fit.prediction).all():
                     continue
                 try:
-                    node = self._node(job.hypothesis, fit, job.at, job.outliers)
+                    node = self.node(job.hypothesis, fit, job.at, job.outliers)
                     if node.value < lowest + margin:
                         outliers = self._outliers(node)
                         if (outliers != job.outliers).any():
-                            node = self._node(job.hypothesis, fit, node.at, outliers)
+                            node = self.node(job.hypothesis, fit, node.at, outliers)
                 except np.linalg.LinAlgError:
                     continue
                 known = found.get(job.hypothesis)

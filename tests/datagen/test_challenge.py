@@ -157,9 +157,9 @@ def test_draws_of_a_regression_have_the_known_mean_and_spread():
 
 
 def test_a_report_without_a_gap_leaves_its_probability_to_none():
-    quiet = GapReport("no-gap", "", None, probabilities={"grousers": 0.1}, p_gap=0.4)
+    quiet = GapReport("no-gap", "", None, probabilities={"grousers": 0.1}, gap_probability=0.4)
     assert gap_probabilities(quiet)[NONE] == pytest.approx(0.9)
-    seen = replace(quiet, status="unknown", p_gap=1e-4)
+    seen = replace(quiet, status="unknown", gap_probability=0.9999)
     assert gap_probabilities(seen)[UNKNOWN] > 0.89
     crowded = replace(seen, probabilities=dict.fromkeys(("grousers", "rate", "slope"), 0.9))
     assert sum(gap_probabilities(crowded).values()) == pytest.approx(1.0)
