@@ -318,7 +318,7 @@ def _build_report(
         model=replace(updated_case(written, left, learned), suspected=marked),
         cause_set=decision.listed,
         probabilities={n: posterior.probability(n) for n in posterior.effects()},
-        best_unclaimed=() if decision.claimed or not decision.listed else decision.listed[0],
+        best_unclaimed=listed[0].effects if listed and not decision.claimed else (),
         reasons=reasons(decision, obstacles, conflicts or replicates),
         gap=figures,
         gap_beside_remainder=beside_remainder,

@@ -79,6 +79,9 @@ PRESSED = 0.02
 
 # ---- the answer
 
+#: Discrepancy, root mean square in the noise of a reading, that is no gap: with noise it makes
+#: residuals five per cent larger than noise alone.
+NEGLIGIBLE_DISCREPANCY = 0.3
 #: Probability that an effect of the catalogue is the right description of a cause that it explains.
 IN_CATALOGUE = 0.97
 #: Share of the explanations by another law than the catalogue's that are right: of an effect whose

@@ -148,9 +148,9 @@ class Posterior:
         """What whitens noise and scatter; outliers weigh nothing."""
         return self.terms.whiten(self.noise, self.outliers)
 
-    def discrepancy(self, node: Node) -> Floats:
+    def discrepancy(self, node: Node, at: Hyperparameters | None = None) -> Floats:
         """Mean (m,) of the smooth discrepancy beside a node, in the unit of the readings."""
-        terms, at = self.terms, node.at
+        terms, at = self.terms, at or node.at
         found = node.linear.evaluate(at)
         own = found.used[np.isin(terms.group[found.used], np.arange(terms.channels))]
         weights = found.weights[np.isin(found.used, own)] * np.sqrt(terms.variance(at)[own])
@@ -205,9 +205,18 @@ class Posterior:
 
     @cached_property
     def no_gap(self) -> float:
-        """Probability that the soil alone, within its priors, explains the rows."""
-        own = self.soil
-        return self.node_weight(own) * own.share_without
+        """Probability that the soil alone, within its priors, explains the rows.
+
+        Beside no discrepancy, or beside one that is far below the noise in every channel.
+        """
+        own, terms = self.soil, self.terms
+        share = own.share_without
+        size = np.abs(self.discrepancy(own, own.beside.at)) / terms.std(own.beside.at)
+        channel = terms.readings.channel
+        squares = [np.mean(size[channel == i] ** 2) for i in range(terms.channels)]
+        if np.sqrt(max(squares, default=0.0)) < constants.NEGLIGIBLE_DISCREPANCY:
+            share = 1.0
+        return self.node_weight(own) * share
 
     def within(self, effects: Collection[str]) -> float:
         """Probability that these effects are present, within the catalogue."""

@@ -141,13 +141,12 @@ class Search:
         """
         self._fit_soil()
         for number in range(constants.ROUNDS):
-            self.progress((1.0 + number) / (1.0 + constants.ROUNDS))
+            self.progress((1.0 + number) / (2.0 + constants.ROUNDS))
             jobs = self._proposed(first=number == 0)
             if not jobs:
                 break
             self._tried |= {job.hypothesis for job in jobs}
             self._settle(jobs, self.lowest)
-        self.progress(1.0)
         return self
 
     @property
@@ -411,7 +410,7 @@ class Search:
                 value += rest + self.problem.penalty(hypothesis)
                 if hypothesis not in found or value < found[hypothesis].value:
                     found[hypothesis] = Prediction(value, start, at, node.outliers)
-        return found | self._opened(node, start)
+        return found | self._by_catalogue(node, start) | self._opened(node, start)
 
     def _moves(
         self, node: Node
@@ -461,6 +460,16 @@ class Search:
             self.untestable = untestable
         self.signatures[node.hypothesis.effects] = found
         return found
+
+    def _by_catalogue(self, node: Node, start: Mapping[str, float]) -> dict[Hypothesis, Prediction]:
+        """The hypothesis by the catalogue's laws, where that with free ones is a node.
+
+        Whether the catalogue's laws explain too decides how far free ones count for an effect.
+        """
+        if not node.hypothesis.free_law:
+            return {}
+        own = replace(node.hypothesis, free_law=False)
+        return {own: Prediction(node.value, start, node.at, node.outliers)}
 
     def _opened(self, node: Node, start: Mapping[str, float]) -> dict[Hypothesis, Prediction]:
         """The hypothesis with the priors of its soil opened, where that can matter.

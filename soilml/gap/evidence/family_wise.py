@@ -32,4 +32,5 @@ def family_wise_p(z: float, count: int) -> float:
     """
     from scipy.special import ndtr
 
-    return float(-np.expm1(count * np.log1p(-2.0 * ndtr(-abs(z)))))
+    p = -np.expm1(count * np.log1p(-2.0 * ndtr(-abs(z))))
+    return max(float(p), float(np.finfo(float).tiny))

@@ -75,7 +75,7 @@ def headline(report: GapReport) -> str:
             which = " that no effect explains better than a smooth error"
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
-            sure = f"probability of a gap {format_probability(report.gap_probability)}"
+            sure = f"probability {format_probability(report.gap_probability)}"
             size = f"mean squared residual {_before(report)}; noise alone gives 1"
             if "train" in report.gap and report.gap["train"].before < LIKE_NOISE:
                 size = "residuals form a pattern that noise does not"

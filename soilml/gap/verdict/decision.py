@@ -17,8 +17,8 @@ from soilml.inference.search import Node
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Probability of no gap from which none is stated: more likely than not.
-NO_GAP = 0.5
+#: Probability of no gap up to which a gap is stated: that is what has to be shown.
+NO_GAP = 0.3
 #: Probability, causes outside the catalogue included, from which a single explanation is named.
 NAMED_PROBABILITY = 0.9
 #: Probability that no effect is present from which none is claimed, and from which no class is.
@@ -79,7 +79,9 @@ class Decision:
 
 
 def ranked_sets(posterior: Posterior) -> list[Names]:
-    """Sets of effects, the likeliest first; the first one has the effects likelier than not.
+    """Sets of effects by the probability that they are present, alone or with others.
+
+    The first one has all effects that are likelier than not.
 
     References: Barbieri and Berger, Optimal predictive model selection, Annals of Statistics 32,
     2004: of single models, that of these effects predicts best under usual conditions.
@@ -89,10 +91,9 @@ def ranked_sets(posterior: Posterior) -> list[Names]:
     if not sets:
         return []
     p = {names: posterior.probability(*names) for names in sets}
-    best = sets[0]
-    if max(p.values()) > 0.5:
-        best = max(sets, key=lambda names: (p[names] > 0.5) * len(names) + p[names])
-    return [best, *(names for names in sets if names != best)]
+    best = max(sets, key=lambda names: (p[names] > 0.5) * len(names) + p[names])
+    rest = sorted((names for names in sets if names != best), key=lambda names: -p[names])
+    return [best, *rest]
 
 
 def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, ...]:
@@ -210,7 +211,8 @@ def suspects(
     """Explanations with their odds against all others, the first one that is shown first."""
     ranked = ranked_sets(posterior)
     first = decision.listed[:1] or tuple(ranked[:1])
-    rest = [n for n in ranked if n not in first and posterior.within(n) > LEAST_SUSPECTED]
+    rest = [n for n in ranked if posterior.within(n) > LEAST_SUSPECTED]
+    rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
         gain, node = gains.get(names), posterior.node_of(names)

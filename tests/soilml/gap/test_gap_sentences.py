@@ -99,7 +99,7 @@ def test_a_gap_of_the_size_of_noise_is_a_pattern():
     small = {"train": GapReduction(1.02, 1.0, {}, 90, "all rows fitted")}
     assert said("unknown", gap=small, gap_probability=0.9935) == (
         "There is a gap that no effect explains better than a smooth error (residuals form a "
-        "pattern that noise does not; probability of a gap > 0.99)."
+        "pattern that noise does not; probability 0.99)."
     )
 
 
@@ -173,7 +173,7 @@ def test_an_implausibly_large_fault_is_named_in_the_headline():
     fault = Remark("implausible-fault", "...", ("drawbar-offset",))
     assert said("unknown", reasons=(fault,)) == (
         "There is a gap, which only an implausibly large drawbar-offset explains (mean squared "
-        "residual 8.80; noise alone gives 1; p = 0.12)."
+        "residual 8.80; noise alone gives 1; probability 0.12)."
     )
 
 

@@ -265,7 +265,7 @@ def test_the_page_contains_the_figures_of_the_report():
         *("23.147 ± 0.074", "27.327 ± 0.074", "+4.179°", "0.4040 ± 0.0013 rad"),  # the soil
         *("61203", "61284", "more effects than needed"),
         "7.25 σ",
-        "p = 0.86",
+        "a smooth discrepancy is left beside this explanation: 0.14",
         *("0.137 N m", "1.60", "at slip 0.14 under 71 N"),  # the discrepancy
         "> 0.99",
         "0.87 × the declared noise",
