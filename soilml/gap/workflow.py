@@ -27,7 +27,7 @@ from soilml.gap.checks import (
 )
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
-from soilml.gap.evidence.held_out import PredictiveGain, held_out_folds, predictive_gain
+from soilml.gap.evidence.held_out import predictive_gains
 from soilml.gap.evidence.holdout_split import HoldoutSplit, split_holdout
 from soilml.gap.evidence.order_trend import order_trends
 from soilml.gap.report.results import GapReport
@@ -36,13 +36,12 @@ from soilml.gap.verdict.agreement import (
     hidden_effect,
     misfit_remarks,
     noise_agreement,
-    pressed_priors,
+    opened_priors,
     trend_remarks,
 )
 from soilml.gap.verdict.cause_of_remainder import described_cause
 from soilml.gap.verdict.decision import (
     NO_GAP,
-    OUTSIDE_PRIORS,
     decide,
     predictive_suspect,
     ranked_sets,
@@ -83,9 +82,8 @@ from soilml.gap.verdict.remainder import (
     discrepancy_map,
     remaining_discrepancy,
 )
-from soilml.inference.posterior import Names, Posterior, infer
+from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
-from soilml.inference.search import Node
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
@@ -276,10 +274,10 @@ def _build_report(
     seed: int,
 ) -> GapReport:
     """Decide the status, then compute the entries of the report."""
-    gains = _gains(posterior, seed)
+    gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
     quiet = posterior.no_gap > NO_GAP
     alone, _ = plain_fits(posterior, None)
-    opened = _opened(posterior)
+    opened = opened_priors(posterior)
     obstacles = (*opened, *checks.naming_obstacles)
     agreement = noise_agreement(case, readings, posterior.problem.soil, posterior, alone)
     trends = order_trends(posterior, seed)
@@ -371,34 +369,6 @@ def _build_report(
         remainder_cause=described_cause(posterior, explained, seed),
         next_runs=tuple(next_runs(posterior, rivals)),
     )
-
-
-def _gains(posterior: Posterior, seed: int) -> dict[Names, PredictiveGain]:
-    """How the likeliest sets of effects predict rows kept back, beside the soil alone."""
-    parts = held_out_folds(posterior.terms.readings, seed)
-    found = {}
-    for names in ranked_sets(posterior)[:SCORED]:
-        node = posterior.node_of(names)
-        gain = None if node is None else predictive_gain(posterior, node, parts)
-        if gain is not None:
-            found[names] = gain
-    return found
-
-
-def _opened(posterior: Posterior) -> tuple[Remark, ...]:
-    """That the likeliest explanation lies outside the priors of the soil, which forbids a name."""
-    best: Node = posterior.best
-    if not best.hypothesis.wide_priors:
-        return ()
-    pressed = pressed_priors(posterior.soil.fit)
-    why = "Within them, a large remainder is left"
-    if pressed:
-        why = f"The fit reached {'; '.join(pressed.values())}"
-    text = f"the priors of the soil were opened. {why}"
-    if best.hypothesis.effects:
-        return (Remark("prior-opened", text, tuple(pressed)),)
-    text += ". The soil alone then agrees with the rows"
-    return (Remark(OUTSIDE_PRIORS, text, tuple(pressed)),)
 
 
 def _check_size(table: Table) -> None:

@@ -139,7 +139,7 @@ class Conditional:
 
 
 @dataclass(frozen=True, eq=False)
-class LinearModel:
+class LinearisedFit:
     """Readings near a fit: Jacobian, residual, and the priors of the coordinates.
 
     held (p,): Coordinates at a bound, which stay there.
@@ -162,7 +162,7 @@ class LinearModel:
     cost: float
     _products: dict[float, tuple[Floats, Floats, float]] = field(default_factory=dict)
 
-    def without(self, outliers: Booleans) -> LinearModel:
+    def without(self, outliers: Booleans) -> LinearisedFit:
         """The same model of other readings."""
         return replace(self, outliers=outliers, _products={})
 
@@ -416,7 +416,7 @@ def linear_model(
     fit: Solution,
     outliers: Booleans,
     extra: Sequence[tuple[Coordinate, Floats]] = (),
-) -> LinearModel:
+) -> LinearisedFit:
     """A fit's neighbourhood, with further coordinates at zero and their columns (m,) of J."""
     coordinates = [*fit.coordinates, *(c for c, _ in extra)]
     jacobian = np.column_stack([fit.derivatives, *(column[:, None] for _, column in extra)])
@@ -437,7 +437,7 @@ def linear_model(
     held = (x <= lower + AT_BOUND) | (x >= upper - AT_BOUND)
     held[len(fit.x) :] = False
     residual = fit.measured - fit.prediction
-    return LinearModel(
+    return LinearisedFit(
         terms=terms,
         outliers=outliers,
         coordinates=coordinates,
@@ -455,7 +455,7 @@ def linear_model(
     )
 
 
-def of_priors(model: LinearModel, found: Evaluation) -> float:
+def of_priors(model: LinearisedFit, found: Evaluation) -> float:
     """-2 ln of the factors by which exact priors along each axis differ from their stand-ins."""
     diagonal = np.diag(found.covariance)
     return sum(

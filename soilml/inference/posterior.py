@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -19,8 +19,8 @@ from soilml.fitting.predictions import PredictionRequest, predict_many
 from soilml.inference import constants
 from soilml.inference.evidence import log_density_of_size
 from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
-from soilml.inference.problem import SOIL_ALONE, InferenceProblem
-from soilml.inference.search import Node, Search
+from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
+from soilml.inference.search import Explanation, Search
 from soilml.quantities import Z_90
 from soilml.remarks import Remark
 
@@ -35,6 +35,8 @@ LEAST_DRAWN = 0.003
 DRAWS, HYPER_DRAWS, FEWEST, PROPOSALS = 600, 6, 8, 2
 #: Factor on the standard deviations of proposals, which are of Student's t with so many degrees.
 PROPOSAL_WIDTH, PROPOSAL_DEGREES = 1.15, 5.0
+#: Largest change of other channels, in sigma and relative to that of one, that counts as none.
+UNCHANGED = 0.01
 #: Rounds in which proposals outside of the bounds are drawn again, before they are clipped.
 REDRAWN = 12
 
@@ -55,7 +57,7 @@ def infer(
 class Component:
     """A hypothesis, with a discrepancy or without one, and its probability."""
 
-    node: Node
+    node: Explanation
     at: Hyperparameters
     weight: float
 
@@ -67,7 +69,7 @@ class Draws:
     The weights of all draws of a posterior sum to one.
     """
 
-    node: Node
+    node: Explanation
     at: Hyperparameters
     x: Floats
     weight: Floats
@@ -114,17 +116,17 @@ class Posterior:
         return self.search.refused
 
     @cached_property
-    def nodes(self) -> tuple[Node, ...]:
+    def nodes(self) -> tuple[Explanation, ...]:
         """Fitted hypotheses, the likeliest first."""
         return tuple(sorted(self.search.nodes.values(), key=lambda node: node.value))
 
     @property
-    def best(self) -> Node:
+    def best(self) -> Explanation:
         """The likeliest hypothesis."""
         return self.nodes[0]
 
     @property
-    def soil(self) -> Node:
+    def soil(self) -> Explanation:
         """The soil alone, within the priors of the case."""
         return self.search.nodes[SOIL_ALONE]
 
@@ -148,7 +150,7 @@ class Posterior:
         """What whitens noise and scatter; outliers weigh nothing."""
         return self.terms.whiten(self.noise, self.outliers)
 
-    def discrepancy(self, node: Node, at: Hyperparameters | None = None) -> Floats:
+    def discrepancy(self, node: Explanation, at: Hyperparameters | None = None) -> Floats:
         """Mean (m,) of the smooth discrepancy beside a node, in the unit of the readings."""
         terms, at = self.terms, at or node.at
         found = node.linear.evaluate(at)
@@ -179,14 +181,53 @@ class Posterior:
         values = np.asarray([value for _, value in items])
         weights = np.exp(-0.5 * (values - values.min()))
         weights /= weights.sum()
-        lowest: dict[tuple[Names, bool], float] = {}
-        for h, value in items:
-            key = h.effects, h.free_law
-            lowest[key] = min(value, lowest.get(key, np.inf))
-        shares = [_by_catalogue(h.effects, h.free_law, lowest) for h, _ in items]
+        shares = [constants.OTHER_LAW_RIGHT if self.by_other_law(h) else 1.0 for h, _ in items]
         return [h.effects for h, _ in items], weights, np.asarray(shares)
 
-    def node_weight(self, node: Node) -> float:
+    @cached_property
+    def _by_law(self) -> dict[tuple[Names, bool], float]:
+        """The lowest value of each set of effects, with the catalogue's laws and with free ones."""
+        values: dict[tuple[Names, bool], float] = {}
+        for h, own in [
+            *((h, p.value) for h, p in self.search.predicted.items()),
+            *((n.hypothesis, n.value) for n in self.nodes[::-1]),
+        ]:
+            if h in self.search.nodes or len(h.effects) == 1:
+                key = h.effects, h.free_law
+                values[key] = min(own, values.get(key, np.inf))
+        return values
+
+    @cached_property
+    def only_channel(self) -> dict[str, str]:
+        """The channel of each effect that changes one of the measured channels alone, by name."""
+        readings, found = self.terms.readings, {}
+        for s in self.signatures:
+            change = np.abs(s.column / readings.std)
+            largest = readings.channel[int(np.argmax(change))]
+            others = change[readings.channel != largest]
+            if others.max(initial=0.0) < UNCHANGED * change.max():
+                found[s.name] = readings.channels[largest]
+        return found
+
+    def by_other_law(self, hypothesis: Hypothesis) -> bool:
+        """Whether a hypothesis explains only by another law than the catalogue's.
+
+        The catalogue's laws explain no more than a part of its effects does, and the free ones are
+        far from them, or its effects change one channel alone: any force, and any error of that
+        channel, is such a law.
+        """
+        if not hypothesis.free_law:
+            return False
+        names, values = hypothesis.effects, self._by_law
+        parts = [v for (n, free), v in values.items() if not free and set(n) < set(names)]
+        if values.get((names, False), np.inf) <= min(parts, default=np.inf):
+            return False
+        node = self.search.nodes.get(hypothesis)
+        several = len(self.terms.readings.channels) > 1
+        one_channel = several and all(name in self.only_channel for name in names)
+        return node is None or one_channel or shape_deviation(node) > constants.FAR_LAW
+
+    def node_weight(self, node: Explanation) -> float:
         """Probability of a fitted hypothesis."""
         return float(self._weights[1][self.nodes.index(node)])
 
@@ -237,7 +278,7 @@ class Posterior:
         names = {name for own in self.sets for name in own}
         return sorted(names, key=lambda name: (-self.within([name]), name))
 
-    def node_of(self, effects: Names) -> Node | None:
+    def node_of(self, effects: Names) -> Explanation | None:
         """The likeliest fitted hypothesis of exactly these effects."""
         return next((n for n in self.nodes if n.hypothesis.effects == effects), None)
 
@@ -299,7 +340,7 @@ class Posterior:
             )
         return found
 
-    def log_density(self, node: Node, left_out: NDArray[np.bool_]) -> float:
+    def log_density(self, node: Explanation, left_out: NDArray[np.bool_]) -> float:
         r"""ln p of readings given all others, by a hypothesis: the difference of two evidences.
 
         .. math:: \ln p(y_o \mid y_r, h) = \ln p(y \mid h) - \ln p(y_r \mid h)
@@ -311,25 +352,18 @@ class Posterior:
         return -0.5 * (with_ - rest)
 
 
-def _by_catalogue(
-    effects: Names, free_law: bool, lowest: Mapping[tuple[Names, bool], float]
-) -> float:
-    """Share of a hypothesis that counts for its effects.
-
-    With free laws that is all where the catalogue's laws explain more than a part of them does.
-    """
-    if not free_law:
-        return 1.0
-    parts = [v for (names, free), v in lowest.items() if not free and set(names) < set(effects)]
-    own = lowest.get((effects, False), np.inf)
-    return 1.0 if own <= min(parts, default=np.inf) else constants.OTHER_LAW_RIGHT
+def shape_deviation(node: Explanation) -> float:
+    """Squared distance of the shapes from the catalogue's laws, in prior variances."""
+    fit = node.fit
+    shapes = [i for i, c in enumerate(fit.coordinates) if c.effect and c.is_shape]
+    return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes]))
 
 
 @dataclass(frozen=True, eq=False)
 class _Proposal:
     """Coordinates (k, p) that were proposed, ln of their density, and their probability."""
 
-    node: Node
+    node: Explanation
     at: Hyperparameters
     x: Floats
     log_density: Floats
@@ -361,7 +395,7 @@ def _proposals(
 
 
 def _proposed(
-    node: Node, step: Floats, covariance: Floats, wanted: int, rng: np.random.Generator
+    node: Explanation, step: Floats, covariance: Floats, wanted: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
     """Coordinates (k, p) of Student's t about the optimum, within bounds, and ln densities (k,)."""
     coordinates, nu = node.fit.coordinates, PROPOSAL_DEGREES

@@ -23,7 +23,7 @@ from soilml.fitting.effect_signatures import Signature, current_size, effect_sig
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.inference import constants
-from soilml.inference.evidence import Evidence, LinearModel, linear_model, of_priors
+from soilml.inference.evidence import Evidence, LinearisedFit, linear_model, of_priors
 from soilml.inference.gaussian_terms import (
     DISCREPANCY,
     SCATTER,
@@ -61,7 +61,7 @@ MOST_OUTLIERS = 12
 
 
 @dataclass(eq=False)
-class Node:
+class Explanation:
     """A hypothesis that was fitted.
 
     value: -2 ln of its posterior probability, up to a constant that all share.
@@ -71,7 +71,7 @@ class Node:
 
     hypothesis: Hypothesis
     fit: Solution
-    linear: LinearModel
+    linear: LinearisedFit
     beside: Evidence
     without: Evidence
     value: float
@@ -112,7 +112,7 @@ class Prediction:
 
 
 @dataclass(frozen=True)
-class Job:
+class StartedFit:
     """A fit to be made: hypothesis, coordinates to start from by path, and hyperparameters."""
 
     hypothesis: Hypothesis
@@ -128,7 +128,7 @@ class Search:
 
     problem: InferenceProblem
     progress: Callable[[float], None] = lambda _: None
-    nodes: dict[Hypothesis, Node] = field(default_factory=dict)
+    nodes: dict[Hypothesis, Explanation] = field(default_factory=dict)
     predicted: dict[Hypothesis, Prediction] = field(default_factory=dict)
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
@@ -140,7 +140,7 @@ class Search:
         Raises `InputError` where the model cannot carry the loads of the rows.
         """
         self._fit_soil()
-        for number in range(constants.ROUNDS):
+        for number in range(0 if self.refused else constants.ROUNDS):
             self.progress((1.0 + number) / (2.0 + constants.ROUNDS))
             jobs = self._proposed(first=number == 0)
             if not jobs:
@@ -163,14 +163,13 @@ class Search:
         self.terms = gaussian_terms(readings, problem.case, np.zeros((len(readings), 2)))
         starts = [{c.path: c.prior.fraction(c.nominal) for c in problem.soil}]
         starts += [dict.fromkeys((c.path for c in problem.soil), x) for x in SOIL_STARTS]
-        jobs = [Job(SOIL_ALONE, start, self.terms.first(), none) for start in starts]
+        jobs = [StartedFit(SOIL_ALONE, start, self.terms.first(), none) for start in starts]
         answers = self.fit(jobs, COARSE)
         fits = [fit for fit in answers if not isinstance(fit, InputError)]
         if not fits:
             raise next(error for error in answers if isinstance(error, InputError))
         carried = [fit for fit in fits if np.isfinite(fit.prediction).all()]
         if not carried:
-            self.nodes = {}
             self.refused = min(fits, key=lambda fit: fit.objective)
             return
         best = min(carried, key=lambda fit: fit.objective)
@@ -184,7 +183,9 @@ class Search:
         )
         kept = [f for f in carried if f.objective < best.objective + OTHER_OPTIMUM]
         first = self.terms.first()
-        jobs = [Job(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept]
+        jobs = [
+            StartedFit(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept
+        ]
         self._settle(jobs, float("inf"))
         if not self.nodes:
             raise InputError("the model cannot be fitted to these rows")
@@ -196,7 +197,7 @@ class Search:
 
     refused: Solution | None = None
 
-    def _choose_autocorrelation(self, node: Node) -> None:
+    def _choose_autocorrelation(self, node: Explanation) -> None:
         """The autocorrelation of the largest evidence, where runs are long enough to tell."""
         readings = self.problem.readings
         if np.median(np.bincount(readings.run[readings.row])) < constants.AUTOCORRELATED_RUN:
@@ -208,14 +209,14 @@ class Search:
             if new.value < self.nodes[node.hypothesis].value:
                 self.nodes[node.hypothesis] = new
 
-    def _fit_hidden(self, soil: Node, plain: Solution) -> None:
+    def _fit_hidden(self, soil: Explanation, plain: Solution) -> None:
         """Fit the likeliest single effects without a discrepancy, which can hide them.
 
         A large discrepancy is a local optimum: beside it, an effect that explains nearly everything
         is not needed. They are predicted from the soil alone under noise and scatter.
         """
         at, linear = soil.without.at, plain.linearisation
-        (fit,) = self.fit([Job(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
+        (fit,) = self.fit([StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
         if isinstance(fit, InputError):
             return
         model = linear_model(self.terms, fit, soil.outliers)
@@ -227,11 +228,11 @@ class Search:
             ((own.value, h, own) for h, own in found.items() if len(h.effects) == 1),
             key=lambda item: item[:2],
         )
-        jobs: list[Job] = []
+        jobs: list[StartedFit] = []
         for _, h, own in singles[: 2 * constants.HIDDEN]:
             start = {path: 0.5 + INWARD * (x - 0.5) for path, x in own.start.items()}
             if not any(job.hypothesis.effects == h.effects for job in jobs) or len(jobs) < 3:
-                jobs.append(Job(h, start, own.at, soil.outliers))
+                jobs.append(StartedFit(h, start, own.at, soil.outliers))
             if len(jobs) == constants.HIDDEN:
                 break
         self._settle(jobs, float("inf"), NEAR_HIDDEN)
@@ -239,7 +240,7 @@ class Search:
     # ---- fits
 
     def fit(
-        self, jobs: Sequence[Job], tolerance: Tolerance = COARSE
+        self, jobs: Sequence[StartedFit], tolerance: Tolerance = COARSE
     ) -> list[Solution | InputError]:
         """Fits that share each call of the model; the error of one that the model refuses."""
         works = []
@@ -269,13 +270,13 @@ class Search:
 
     def node(
         self, hypothesis: Hypothesis, fit: Solution, at: Hyperparameters, outliers: Booleans
-    ) -> Node:
+    ) -> Explanation:
         """A fit with the hyperparameters of its largest evidence, with and without discrepancy."""
         linear = linear_model(self.terms, fit, outliers)
         beside, without = (
             linear.evidence(linear.best(replace(at, present=present))) for present in (True, False)
         )
-        node = Node(hypothesis, fit, linear, beside, without, 0.0, outliers)
+        node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
         prior = constants.DISCREPANCY_PRIOR
         log = np.logaddexp(
             np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
@@ -283,12 +284,14 @@ class Search:
         node.value = float(-2.0 * log) + self.problem.penalty(hypothesis)
         return node
 
-    def _settle(self, jobs: Sequence[Job], lowest: float, margin: float = constants.NEAR) -> None:
+    def _settle(
+        self, jobs: Sequence[StartedFit], lowest: float, margin: float = constants.NEAR
+    ) -> None:
         """Fit, estimate hyperparameters, and repeat while these move and the node is near.
 
         lowest: The value of the best node so far.
         """
-        found: dict[Hypothesis, Node] = {}
+        found: dict[Hypothesis, Explanation] = {}
         for turn in range(constants.FITS_IN_TURN):
             again = []
             fits = self.fit(jobs, COARSE if turn == 0 else FINE)
@@ -312,7 +315,7 @@ class Search:
                 moved = moved or bool((node.outliers != job.outliers).any())
                 if node.value < lowest + margin and (moved or turn == 0):
                     start, near = fit.start_values(), fit.linearisation
-                    again.append(Job(job.hypothesis, start, target, node.outliers, near))
+                    again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
             jobs = again
             if not jobs:
                 break
@@ -321,7 +324,7 @@ class Search:
             if known is None or node.value < known.value:
                 self.nodes[hypothesis] = node
 
-    def _outliers(self, node: Node) -> Booleans:
+    def _outliers(self, node: Explanation) -> Booleans:
         """Readings (m,) that stray, by their density given all others.
 
         A reading strays where a normal density with half the range of its channel, and a small
@@ -343,7 +346,7 @@ class Search:
 
     # ---- proposals
 
-    def _proposed(self, *, first: bool) -> list[Job]:
+    def _proposed(self, *, first: bool) -> list[StartedFit]:
         """The fits of the next round; in the first one the best single effects in any case."""
         lowest = self.lowest
         near = sorted(self.nodes.values(), key=lambda node: node.value)
@@ -371,9 +374,9 @@ class Search:
             singles = [own for own in open_ if len(own[1].effects) == 1]
             within = sorted({*within, *singles[: constants.FIRST_SINGLES]})
         chosen = [(h, self.predicted[h]) for _, h in within]
-        return [Job(h, own.start, own.at, own.outliers) for h, own in chosen]
+        return [StartedFit(h, own.start, own.at, own.outliers) for h, own in chosen]
 
-    def _ladder(self, node: Node) -> list[Hyperparameters]:
+    def _ladder(self, node: Explanation) -> list[Hyperparameters]:
         """Hyperparameters that an addition may lead to: less discrepancy, or less scatter."""
         beside, without = node.beside.at, node.without.at
         kinds = self.terms.of_kind(DISCREPANCY), self.terms.of_kind(SCATTER)
@@ -386,7 +389,7 @@ class Search:
         return found
 
     def _additions(
-        self, node: Node, ladder: Sequence[Hyperparameters]
+        self, node: Explanation, ladder: Sequence[Hyperparameters]
     ) -> dict[Hypothesis, Prediction]:
         """Predicted values of a node's hypothesis with one thing more, the best of a ladder."""
         p = len(node.fit.x)
@@ -413,7 +416,7 @@ class Search:
         return found | self._by_catalogue(node, start) | self._opened(node, start)
 
     def _moves(
-        self, node: Node
+        self, node: Explanation
     ) -> tuple[list[tuple[Coordinate, Floats]], list[tuple[Hypothesis, list[int], int]]]:
         """Further coordinates with their columns, and hypotheses with the numbers of theirs.
 
@@ -450,7 +453,7 @@ class Search:
                 moves.append((replace(h, free_law=True), [*range(first, p + len(extra))], 0))
         return extra, moves
 
-    def _signatures(self, node: Node) -> list[Signature]:
+    def _signatures(self, node: Explanation) -> list[Signature]:
         """How the readings change with each effect that may act beside those of a node."""
         estimate = node.fit.linearisation.sinkage_at(np.zeros((1, len(node.fit.x))))
         others = self.problem.effects_beside(node.hypothesis.effects)
@@ -461,7 +464,9 @@ class Search:
         self.signatures[node.hypothesis.effects] = found
         return found
 
-    def _by_catalogue(self, node: Node, start: Mapping[str, float]) -> dict[Hypothesis, Prediction]:
+    def _by_catalogue(
+        self, node: Explanation, start: Mapping[str, float]
+    ) -> dict[Hypothesis, Prediction]:
         """The hypothesis by the catalogue's laws, where that with free ones is a node.
 
         Whether the catalogue's laws explain too decides how far free ones count for an effect.
@@ -471,7 +476,9 @@ class Search:
         own = replace(node.hypothesis, free_law=False)
         return {own: Prediction(node.value, start, node.at, node.outliers)}
 
-    def _opened(self, node: Node, start: Mapping[str, float]) -> dict[Hypothesis, Prediction]:
+    def _opened(
+        self, node: Explanation, start: Mapping[str, float]
+    ) -> dict[Hypothesis, Prediction]:
         """The hypothesis with the priors of its soil opened, where that can matter.
 
         The fit presses against one of them, or a large discrepancy is left.

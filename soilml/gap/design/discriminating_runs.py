@@ -26,7 +26,7 @@ from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.report.results import NextRun
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
@@ -45,7 +45,7 @@ LEAST_SQUARES_TOLERANCE = 1e-10
 Difference = tuple[Floats, Floats]
 
 
-def next_runs(posterior: Posterior, explanations: Sequence[Node]) -> list[NextRun]:
+def next_runs(posterior: Posterior, explanations: Sequence[Explanation]) -> list[NextRun]:
     """Runs and checks ranked by how well they discriminate the first explanation from the others.
 
     The discrimination is the expected increase, in sigma, of the misfit of a rival that adapts all
@@ -101,7 +101,7 @@ class _ExpectedRun:
         return replace(self.readings, at=with_default_covariates(self.readings.at, fit.case))
 
 
-def _in_words(node: Node) -> str:
+def _in_words(node: Explanation) -> str:
     return "+".join(node.hypothesis.effects) or "soil alone"
 
 

@@ -13,8 +13,8 @@ from soilml.errors import InputError
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
-from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.posterior import Names, Posterior
+from soilml.inference.search import Explanation
 
 #: The parts that are held out, by their keys in a report.
 RUNS, REGION, SLIPS = "held_out_runs", "held_out_region", "held_out_slips"
@@ -120,7 +120,7 @@ def predicted_by_refits(
     return means
 
 
-def predicted_beside_remainder(node: Node, folds: Folds) -> Floats:
+def predicted_beside_remainder(node: Explanation, folds: Folds) -> Floats:
     """Predictions (m,) of a part by a node beside its remainder, to first order; NaN outside."""
     mean = np.full(len(folds.fold), np.nan)
     for number in folds.predicted:
@@ -158,7 +158,7 @@ class PredictiveGain:
 
 
 def predictive_gain(
-    posterior: Posterior, node: Node, parts: Mapping[str, Folds]
+    posterior: Posterior, node: Explanation, parts: Mapping[str, Folds]
 ) -> PredictiveGain | None:
     """Log density of the rows kept back by a node, above that of the soil alone, mean over parts.
 
@@ -185,3 +185,17 @@ def predictive_gain(
     variances = [len(d) * float(np.var(d, ddof=1)) for d in by_fold if len(d) > 1]
     error = float(np.sqrt(sum(variances))) / len(by_fold) if variances else None
     return PredictiveGain(float(np.mean([d.sum() for d in by_fold])), error)
+
+
+def predictive_gains(
+    posterior: Posterior, sets: Sequence[Names], seed: int
+) -> dict[Names, PredictiveGain]:
+    """How some sets of effects predict rows kept back, beside the soil alone."""
+    parts = held_out_folds(posterior.terms.readings, seed)
+    found = {}
+    for names in sets:
+        node = posterior.node_of(names)
+        gain = None if node is None else predictive_gain(posterior, node, parts)
+        if gain is not None:
+            found[names] = gain
+    return found

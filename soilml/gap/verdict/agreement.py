@@ -22,6 +22,7 @@ from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.gap.evidence.order_trend import TREND_LEVEL
 from soilml.gap.report.results import NoiseAgreement, SoilTrend
+from soilml.gap.verdict.decision import OUTSIDE_PRIORS
 from soilml.inference.constants import PRESSED, SCATTER_UNITS
 from soilml.inference.posterior import Posterior
 from soilml.numerics.subspaces import project_out
@@ -103,6 +104,22 @@ def pressed_priors(fit: Solution) -> dict[str, str]:
             value = format_quantity(bound, c.unit)
             found[c.path] = f"{c.name.replace('_', ' ')} at {value}, the {end} end of its prior"
     return found
+
+
+def opened_priors(posterior: Posterior) -> tuple[Remark, ...]:
+    """That the likeliest explanation lies outside the priors of the soil, which forbids a name."""
+    best = posterior.best
+    if not best.hypothesis.wide_priors:
+        return ()
+    pressed = pressed_priors(posterior.soil.fit)
+    why = "Within them, a large remainder is left"
+    if pressed:
+        why = f"The fit reached {'; '.join(pressed.values())}"
+    text = f"the priors of the soil were opened. {why}"
+    if best.hypothesis.effects:
+        return (Remark("prior-opened", text, tuple(pressed)),)
+    text += ". The soil alone then agrees with the rows"
+    return (Remark(OUTSIDE_PRIORS, text, tuple(pressed)),)
 
 
 def trend_remarks(trends: Sequence[SoilTrend]) -> list[Remark]:

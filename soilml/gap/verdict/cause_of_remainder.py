@@ -13,10 +13,10 @@ from soilml.gap.evidence.held_out import held_out_folds
 from soilml.gap.evidence.stage_changes import stage_changes
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.inference.constants import IN_CATALOGUE, UNKNOWN_CAUSE, UNKNOWN_SCALE
-from soilml.inference.evidence import LinearModel
+from soilml.inference.evidence import LinearisedFit
 from soilml.inference.gaussian_terms import FIXED, Hyperparameters
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
 
@@ -60,7 +60,7 @@ class StageHypothesis:
     amplitude: float = 0.0
 
 
-def described_cause(posterior: Posterior, node: Node, seed: int) -> RemainderCause | None:
+def described_cause(posterior: Posterior, node: Explanation, seed: int) -> RemainderCause | None:
     r"""The stage of the cause of the remainder beside a fit; None where the readings do not tell.
 
     Each change g of a stage, and each change of one channel, is multiplied by a smooth function h
@@ -137,7 +137,9 @@ def _log_mean(values: Sequence[float]) -> float:
     return float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
 
 
-def _predictive_gain(posterior: Posterior, node: Node, best: StageHypothesis, seed: int) -> float:
+def _predictive_gain(
+    posterior: Posterior, node: Explanation, best: StageHypothesis, seed: int
+) -> float:
     """Log density of rows kept back with the change, above that without; nil without such rows."""
     parts = held_out_folds(posterior.terms.readings, seed)
     assert best.at is not None
@@ -152,13 +154,13 @@ def _predictive_gain(posterior: Posterior, node: Node, best: StageHypothesis, se
     return float(np.mean(sums)) if sums else 0.0
 
 
-def _log_density(model: LinearModel, at: Hyperparameters, out: NDArray[np.bool_]) -> float:
+def _log_density(model: LinearisedFit, at: Hyperparameters, out: NDArray[np.bool_]) -> float:
     """Log density of the readings that are kept back, given the others."""
     rest = model.without(model.outliers | out)
     return -0.5 * (model.evaluate(at).value - rest.evaluate(at).value)
 
 
-def _with_change(model: LinearModel, one: StageHypothesis) -> LinearModel:
+def _with_change(model: LinearisedFit, one: StageHypothesis) -> LinearisedFit:
     """The model with a change of a stage, at its likeliest amplitude."""
     terms = model.terms
     columns = np.column_stack([terms.columns, one.amplitude * one.columns])
@@ -168,7 +170,9 @@ def _with_change(model: LinearModel, one: StageHypothesis) -> LinearModel:
     )
 
 
-def _changed_channels(posterior: Posterior, node: Node, best: StageHypothesis) -> tuple[str, ...]:
+def _changed_channels(
+    posterior: Posterior, node: Explanation, best: StageHypothesis
+) -> tuple[str, ...]:
     """Channels that the change moves by more than `NOTICED`, root mean square in their noise."""
     assert best.at is not None
     model = _with_change(node.linear, best)
@@ -183,7 +187,7 @@ def _changed_channels(posterior: Posterior, node: Node, best: StageHypothesis) -
     )
 
 
-def hypotheses(posterior: Posterior, node: Node) -> list[StageHypothesis]:
+def hypotheses(posterior: Posterior, node: Explanation) -> list[StageHypothesis]:
     """All changes of stages and of single channels, by what they may depend on."""
     readings, usual, fit = posterior.terms.readings, posterior.terms.usual, node.fit
     variables = _variables(posterior, node)
@@ -206,7 +210,7 @@ def hypotheses(posterior: Posterior, node: Node) -> list[StageHypothesis]:
     return found
 
 
-def _variables(posterior: Posterior, node: Node) -> dict[str, Floats]:
+def _variables(posterior: Posterior, node: Explanation) -> dict[str, Floats]:
     """Columns (m, k) of a unit process of each variable that varies in the readings."""
     readings, fit = posterior.terms.readings, node.fit
     slip, load = readings.slip / SLIP_LENGTH, np.log(readings.load) / LOG_LENGTH
@@ -224,7 +228,7 @@ def _variables(posterior: Posterior, node: Node) -> dict[str, Floats]:
     return {name: own for name, own in found.items() if own.shape[1] > 1}
 
 
-def weighed(posterior: Posterior, node: Node) -> tuple[float, list[StageHypothesis]]:
+def weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[StageHypothesis]]:
     """The evidence that no stage is needed, and all hypotheses with theirs.
 
     Each change is considered beside the discrepancy of the fit, a smaller one, and none.
@@ -263,7 +267,7 @@ def weighed(posterior: Posterior, node: Node) -> tuple[float, list[StageHypothes
     return none, weighed_
 
 
-def _evidence(model: LinearModel, products: Floats) -> Floats:
+def _evidence(model: LinearisedFit, products: Floats) -> Floats:
     """-2 ln p (b,) with the coordinates integrated out, from products (b, p + 1, p + 1)."""
     p, free = len(model.x), ~model.held
     curvature = products[:, :p, :p] + np.diag(model.precision) + model.information

@@ -13,7 +13,7 @@ from soilml.gap.report.results import Suspect
 from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.inference.constants import LARGEST_SIZE
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 
@@ -74,7 +74,7 @@ class Decision:
     status: str
     claimed: tuple[Names, ...] = ()
     listed: tuple[Names, ...] = ()
-    shown: Node | None = None
+    shown: Explanation | None = None
     reason: Remark | None = None
 
 
@@ -158,7 +158,7 @@ def _is_other_soil(posterior: Posterior) -> bool:
     return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
 
 
-def _doubt(posterior: Posterior, node: Node, gain: PredictiveGain | None) -> Remark | None:
+def _doubt(posterior: Posterior, node: Explanation, gain: PredictiveGain | None) -> Remark | None:
     """Why an explanation is not claimed, whatever its probability is."""
     names = node.hypothesis.effects
     text = " + ".join(names)
@@ -173,17 +173,9 @@ def _doubt(posterior: Posterior, node: Node, gain: PredictiveGain | None) -> Rem
         left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
         text = NOT_CATALOGUED.format(text, left.replace("_", " "))
         return Remark("not-catalogued", text, (*names, column(left)))
-    if node.hypothesis.free_law and _needs_other_law(posterior, names):
+    if posterior.by_other_law(node.hypothesis):
         return Remark("other-law", OTHER_LAW.format(text), names)
     return None
-
-
-def _needs_other_law(posterior: Posterior, names: Names) -> bool:
-    """Whether the catalogue's law of these effects explains no more than the soil alone does."""
-    values = {(n.hypothesis.effects, n.hypothesis.free_law): n.value for n in posterior.nodes[::-1]}
-    own = values.get((names, False), np.inf)
-    parts = [v for (other, free), v in values.items() if not free and set(other) < set(names)]
-    return own > min(parts, default=np.inf)
 
 
 def implausible_faults(fit: Solution) -> tuple[str, ...]:
@@ -267,7 +259,7 @@ def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]
     return names if gain is not None and gain.is_better else ()
 
 
-def law_matters(posterior: Posterior, node: Node) -> bool:
+def law_matters(posterior: Posterior, node: Explanation) -> bool:
     """Whether the free law and the catalogue's differ in the measured range by more than matters.
 
     They differ if, in some channel, the root mean square difference of their predictions exceeds

@@ -14,7 +14,7 @@ from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.constants import SCATTER_UNITS
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal
@@ -89,7 +89,7 @@ def repeats_that_disagree(posterior: Posterior, fit: Solution) -> list[Remark]:
 
 
 def unpredicted_region(
-    posterior: Posterior, soil: Node, name: str, out: NDArray[np.bool_]
+    posterior: Posterior, soil: Explanation, name: str, out: NDArray[np.bool_]
 ) -> list[Remark]:
     """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
     at = soil.without.at

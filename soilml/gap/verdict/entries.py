@@ -32,7 +32,7 @@ from soilml.gap.verdict.fit_notes import (
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.constants import NEAR, SCATTER_UNITS
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
 from soilml.report.numbers import LEAST_STATED, format_log_density
@@ -115,7 +115,7 @@ def conditions_of_suspects(
 
 def competing_explanations(
     posterior: Posterior, decision: Decision, listed: Sequence[Suspect]
-) -> list[Node]:
+) -> list[Explanation]:
     """The explanations to distinguish, the first one from the others: those that a report lists.
 
     They are those of a class; else the named one, or the first suspect, and the suspects after it
@@ -140,8 +140,8 @@ def competing_explanations(
 def analysis_notes(
     posterior: Posterior,
     alone: Solution,
-    written: Node,
-    listed: Sequence[Node],
+    written: Explanation,
+    listed: Sequence[Explanation],
     place: Callable[[int], str],
 ) -> list[Remark]:
     """Notes on outliers, estimates at a bound, sizes, noise and run-to-run variation.
@@ -277,7 +277,7 @@ def _size(fit: Solution, effect: str) -> float:
     return 0.0
 
 
-def signature_similarity(posterior: Posterior, node: Node) -> SignatureSimilarity:
+def signature_similarity(posterior: Posterior, node: Explanation) -> SignatureSimilarity:
     """Similarity of the catalogue's signatures beside the discrepancy of a node, on its soil."""
     problem, readings = posterior.problem, posterior.terms.readings
     whiten = posterior.terms.whiten(node.at, node.outliers)

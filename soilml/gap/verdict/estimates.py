@@ -14,14 +14,14 @@ from soilml.fitting.least_squares import Solution
 from soilml.gap.report.results import EstimatedValue
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.numerics.prior import Prior
 from soilml.report.numbers import significant
 
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
 
 
-def stds_of(node: Node) -> dict[str, float]:
+def stds_of(node: Explanation) -> dict[str, float]:
     """Standard deviations of the parameters of a hypothesis, by path, beside its remainder."""
     covariance = node.linear.evaluate(node.at).covariance
     rates = np.abs(rates_at(node.fit.coordinates, node.fit.x))
@@ -30,7 +30,9 @@ def stds_of(node: Node) -> dict[str, float]:
 
 
 def updated_case(
-    node: Node, discrepancy: dict[str, float] | None = None, remainder: Remainder | None = None
+    node: Explanation,
+    discrepancy: dict[str, float] | None = None,
+    remainder: Remainder | None = None,
 ) -> Case:
     """The fitted case: soil and effects at their optimum, with the priors and noise of the input.
 
@@ -87,7 +89,7 @@ def soil_after(posterior: Posterior, seed: int) -> dict[str, EstimatedValue]:
     }
 
 
-def effect_estimates(node: Node, effect: str) -> dict[str, EstimatedValue]:
+def effect_estimates(node: Explanation, effect: str) -> dict[str, EstimatedValue]:
     """The parameters of one effect of a hypothesis, by name."""
     values, stds = node.fit.values(), stds_of(node)
     return {

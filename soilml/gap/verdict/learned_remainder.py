@@ -14,7 +14,7 @@ from soilml.config.remainder import MOST_POINTS, Remainder, RemainderPart
 from soilml.fitting.covariance import USUAL
 from soilml.gap.verdict.remainder import LEAST_AMPLITUDE
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.quantities import column
 
@@ -27,7 +27,7 @@ LEAST_INFORMATION = 0.01
 DECIMALS = 5
 
 
-def learned_remainder(posterior: Posterior, node: Node) -> Remainder | None:
+def learned_remainder(posterior: Posterior, node: Explanation) -> Remainder | None:
     r"""Posterior of the remainder given the fit, at the amplitudes that its evidence supports.
 
     With columns C of the functions at the readings, residuals r and the covariance V of noise and
@@ -85,7 +85,7 @@ def without_learned_discrepancy(case: Case) -> Case:
     return replace(case, discrepancy=left)
 
 
-def _blank_parts(posterior: Posterior, node: Node) -> list[tuple[RemainderPart, Floats]]:
+def _blank_parts(posterior: Posterior, node: Explanation) -> list[tuple[RemainderPart, Floats]]:
     """Range and points of each channel and gear with a remainder, and columns (m, k) of it."""
     terms, case, found = posterior.terms, posterior.problem.case, []
     readings, amplitude, std = terms.readings, terms.amplitude(node.at), terms.std(node.at)

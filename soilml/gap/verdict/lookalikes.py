@@ -16,8 +16,6 @@ VISIBLE, UNSEEN = 6.0, 2.0
 #: Share of the largest contribution to the other soil from which a parameter is stated.
 NOTABLE = 0.3
 PULL = "drawbar_pull"
-#: Largest change of the other channels, in sigma and relative to that of pull, that counts as none.
-NEGLIGIBLE = 0.01
 
 
 def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
@@ -63,7 +61,7 @@ def like_another_force(posterior: Posterior, names: Sequence[str]) -> list[Remar
     """
     if len(posterior.terms.readings.channels) == 1:
         return []
-    channel = _only_channels(posterior)
+    channel = posterior.only_channel
     alone = [
         name
         for name in names
@@ -78,15 +76,3 @@ def like_another_force(posterior: Posterior, names: Sequence[str]) -> list[Remar
         )
         for name in alone
     ]
-
-
-def _only_channels(posterior: Posterior) -> dict[str, str]:
-    """The channel of each effect that changes one of the measured channels alone, by its name."""
-    readings = posterior.terms.readings
-    found = {}
-    for s in posterior.signatures:
-        change = np.abs(s.column / readings.std)
-        own = readings.channel == readings.channel[int(np.argmax(change))]
-        if change[~own].max(initial=0.0) < NEGLIGIBLE * change.max():
-            found[s.name] = readings.channels[readings.channel[int(np.argmax(change))]]
-    return found

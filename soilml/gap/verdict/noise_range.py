@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.remarks import Remark
 
 #: Factors on the estimated noise and scatter that are tried: published figures are read to about
@@ -38,7 +38,7 @@ def _likeliest(posterior: Posterior, factor: float) -> Names:
     terms = posterior.terms
     of_noise = np.arange(terms.groups + terms.channels) >= terms.channels
 
-    def value(node: Node) -> float:
+    def value(node: Explanation) -> float:
         at = replace(node.at, log=node.at.log + np.log(factor) * of_noise)
         return node.linear.evaluate(at).value + posterior.problem.penalty(node.hypothesis)
 

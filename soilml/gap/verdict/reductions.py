@@ -24,7 +24,7 @@ from soilml.gap.evidence.held_out import (
 from soilml.gap.report.results import BeforeAfter, GapReduction
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import channel_name, decimal
@@ -55,7 +55,7 @@ def gap_reduction(
     return GapReduction(float(old.mean()), float(new.mean()), channels, len(readings), description)
 
 
-def plain_fits(posterior: Posterior, shown: Node | None) -> tuple[Solution, Solution]:
+def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solution, Solution]:
     """The soil alone and the explanation shown, fitted under noise and scatter, without remainder.
 
     The explanation starts from its optimum beside a remainder, and from the soil alone with the
@@ -85,7 +85,7 @@ def plain_fits(posterior: Posterior, shown: Node | None) -> tuple[Solution, Solu
 
 
 def gap_reductions(
-    posterior: Posterior, shown: Node | None, fits: tuple[Solution, Solution], seed: int
+    posterior: Posterior, shown: Explanation | None, fits: tuple[Solution, Solution], seed: int
 ) -> tuple[dict[str, GapReduction], dict[str, GapReduction]]:
     """Figures of the fitted rows and of rows kept back, without and with the smooth remainder.
 
@@ -115,7 +115,7 @@ def gap_reductions(
     return figures, beside
 
 
-def _beside(node: Node, folds: Folds) -> Floats:
+def _beside(node: Explanation, folds: Folds) -> Floats:
     return predicted_beside_remainder(node, folds)
 
 

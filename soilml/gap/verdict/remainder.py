@@ -11,7 +11,7 @@ from soilml.gap.evidence.regions import regions
 from soilml.gap.report.results import RegionScore, RemainingDiscrepancy
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Node
+from soilml.inference.search import Explanation
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal
 from soilml.report.terminal import shown_unit
@@ -23,7 +23,7 @@ MOST_LOG_VARIANCE = 0.5
 
 
 def remaining_discrepancy(
-    posterior: Posterior, before: Node, after: Node
+    posterior: Posterior, before: Explanation, after: Explanation
 ) -> dict[str, RemainingDiscrepancy]:
     """Root mean square discrepancy of each channel beside two hypotheses, by column."""
     readings, std = posterior.terms.readings, posterior.std
@@ -65,7 +65,7 @@ def _largest(values: Floats, slip: Floats, load: Floats, unit: str) -> str:
     )
 
 
-def discrepancy_amplitudes(posterior: Posterior, node: Node) -> dict[str, float]:
+def discrepancy_amplitudes(posterior: Posterior, node: Explanation) -> dict[str, float]:
     """Standard deviation of the discrepancy of each channel, by column, in the column's unit.
 
     Root mean square over its probability and that of its amplitude, with the factor of intervals;

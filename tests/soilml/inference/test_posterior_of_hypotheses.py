@@ -16,7 +16,7 @@ from soilml.inference.problem import (
     effect_penalties,
     exclude_each_other,
 )
-from soilml.inference.search import Job
+from soilml.inference.search import StartedFit
 from soilml.physics.effects import EFFECTS
 
 FEW = {n: EFFECTS[n] for n in ("slip-sinkage", "bulldozing", "exit-angle", "torque-gain")}
@@ -64,7 +64,7 @@ def test_every_counted_hypothesis_is_an_optimum_under_its_own_hyperparameters(n1
              for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)}
             for _ in range(3)
         ]  # fmt: skip
-        jobs = [Job(node.hypothesis, start, node.at, node.outliers) for start in starts]
+        jobs = [StartedFit(node.hypothesis, start, node.at, node.outliers) for start in starts]
         for fit in own.search.fit(jobs):
             again = own.search.node(node.hypothesis, fit, node.at, node.outliers)
             assert again.value > node.value - 1.5
