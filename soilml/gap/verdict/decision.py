@@ -17,8 +17,8 @@ from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Probability of no gap up to which a gap is stated: that is what has to be shown.
-NO_GAP = 0.3
+#: Probability of no gap from which none is stated: more likely than not.
+NO_GAP = 0.5
 #: Probability, causes outside the catalogue included, from which a single explanation is named.
 NAMED_PROBABILITY = 0.9
 #: Probability that no effect is present from which none is claimed, and from which no class is.
@@ -57,6 +57,10 @@ NOT_PREDICTIVE = (
 OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
     "one that the catalogue lacks"
+)
+UNCHECKED_FAULT = (
+    "{} explains the gap, but what looks like a fault of a sensor or of the rig may be a law that "
+    "the catalogue lacks: check it, and state the check with --checked"
 )
 NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
 
@@ -140,6 +144,9 @@ def decide(
         return replace(suspected, reason=reason)
     if none > UNCERTAIN:
         return replace(suspected, reason=NOT_DECISIVE)
+    if chance >= NAMED_PROBABILITY and (unchecked := _unchecked_faults(posterior, best)):
+        text = UNCHECKED_FAULT.format(" + ".join(unchecked))
+        return replace(suspected, reason=Remark("unchecked-fault", text, unchecked))
     if chance >= NAMED_PROBABILITY:
         if node.share_without < 0.5:
             return Decision("partly-named", (best,), listed[:1], node)
@@ -176,6 +183,17 @@ def _doubt(posterior: Posterior, node: Explanation, gain: PredictiveGain | None)
     if posterior.by_other_law(node.hypothesis):
         return Remark("other-law", OTHER_LAW.format(text), names)
     return None
+
+
+def _unchecked_faults(posterior: Posterior, names: Names) -> tuple[str, ...]:
+    """The faults of sensors and rig among effects, of which no check says how large they can be.
+
+    An offset of one channel imitates what no catalogue has, such as a crust on the soil: rows alone
+    do not show a fault, a check of the sensor does.
+    """
+    problem = posterior.problem
+    kinds = {name: problem.effects[name].about.kind for name in names}
+    return tuple(n for n in names if kinds[n] in ("sensor", "rig") and n not in problem.calibration)
 
 
 def implausible_faults(fit: Solution) -> tuple[str, ...]:
