@@ -161,10 +161,11 @@ class LinearisedFit:
     information: Floats
     cost: float
     _products: dict[float, tuple[Floats, Floats, float]] = field(default_factory=dict)
+    _taken: dict[tuple[float, bytes], tuple[Floats, Floats, float]] = field(default_factory=dict)
 
     def without(self, outliers: Booleans) -> LinearisedFit:
         """The same model of other readings."""
-        return replace(self, outliers=outliers, _products={})
+        return replace(self, outliers=outliers, _products={}, _taken={})
 
     def products(self, autocorrelation: float) -> tuple[Floats, Floats, float]:
         """Gram matrices (channels, q + p + 1, ...) of [U, J, r]; counts; ln|V_e| at scale 1."""
@@ -183,6 +184,19 @@ class LinearisedFit:
             self._products[autocorrelation] = gram, white.counts, white.log_determinant
         return self._products[autocorrelation]
 
+    def _ordered(
+        self, autocorrelation: float, used: Integers, order: Integers
+    ) -> tuple[Floats, Floats, float]:
+        """Gram matrices of the used columns and of [J, r] in an order; see `products`."""
+        key = autocorrelation, used.tobytes()
+        if key not in self._taken:
+            gram, counts, log_determinant = self.products(autocorrelation)
+            p = len(self.x)
+            q = gram.shape[1] - p - 1
+            take = np.concatenate([used, q + order, [q + p]])
+            self._taken[key] = gram[:, take[:, None], take], counts, log_determinant
+        return self._taken[key]
+
     def evaluate(self, at: Hyperparameters) -> Evaluation:
         """The model at some hyperparameters."""
         _, _, found = self._evaluated(at, in_full=True)
@@ -200,13 +214,12 @@ class LinearisedFit:
         from scipy.linalg import solve_triangular
 
         terms, p, first = self.terms, len(self.x), self.terms.groups
-        gram, counts, log_determinant = self.products(at.autocorrelation)
-        q, variance = gram.shape[1] - p - 1, terms.variance(at)
+        variance = terms.variance(at)
         used = np.flatnonzero(variance > 0.0)
         order = np.concatenate([np.flatnonzero(~self.held), np.flatnonzero(self.held)])
-        take = np.concatenate([used, q + order, [q + p]])
+        gram, counts, log_determinant = self._ordered(at.autocorrelation, used, order)
         weight = np.exp(-2.0 * at.log[first:])
-        total = np.einsum("c,cij->ij", weight, gram)[np.ix_(take, take)]
+        total = np.tensordot(weight, gram, axes=1)
         k = len(used)
         free = k + int(np.count_nonzero(~self.held))
         scale = np.concatenate([np.sqrt(variance[used]), np.ones(p)])
@@ -238,12 +251,10 @@ class LinearisedFit:
         np.add.at(gradient, terms.group[used][of_terms], change[of_terms])
         left = np.append(-scale * beta, 1.0)
         spread = scale[:, None] * inverse * scale
-        for c in range(terms.channels):
-            own = gram[c][np.ix_(take, take)]
-            squares = weight[c] * (left @ own @ left)
-            degrees = weight[c] * np.sum(spread * own[:-1, :-1])
-            gradient[first + c] += 2.0 * (counts[c] - degrees - squares)
-            curvature[first + c] += 2.0 * max(counts[c] - degrees, LEAST_DEGREES)
+        squares = weight * ((gram @ left) @ left)
+        degrees = weight * np.tensordot(gram[:, :-1, :-1], spread, axes=2)
+        gradient[first:] += 2.0 * (counts - degrees - squares)
+        curvature[first:] += 2.0 * np.maximum(counts - degrees, LEAST_DEGREES)
         if not in_full:
             return value, gradient, None
         shrunk = (np.eye(k) - inverse[:k, :k]) ** 2

@@ -166,7 +166,7 @@ def _with_change(model: LinearisedFit, one: StageHypothesis) -> LinearisedFit:
     columns = np.column_stack([terms.columns, one.amplitude * one.columns])
     group = np.append(terms.group, np.full(one.columns.shape[1], FIXED))
     return replace(
-        model, terms=replace(terms, columns=columns, group=group, _kept={}), _products={}
+        model, terms=replace(terms, columns=columns, group=group, _kept={}), _products={}, _taken={}
     )
 
 
@@ -238,7 +238,7 @@ def weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[StageH
     patterns = [at, replace(at, log=at.log + less), replace(at, present=False)]
     model, p = node.linear, len(node.fit.x)
     columns = np.column_stack([model.jacobian, *(one.columns for one in found)])
-    wide = replace(model, jacobian=columns, x=np.zeros(columns.shape[1]), _products={})
+    wide = replace(model, jacobian=columns, x=np.zeros(columns.shape[1]), _products={}, _taken={})
     starts = p + np.cumsum([0, *(one.columns.shape[1] for one in found)])
     values = np.full((len(found), len(patterns), len(AMPLITUDES)), np.inf)
     none = np.inf

@@ -24,7 +24,7 @@ from soilml.gap.evidence.held_out import (
 from soilml.gap.report.results import BeforeAfter, GapReduction
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
+from soilml.inference.search import SOIL_STARTS, Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import channel_name, decimal
@@ -67,9 +67,15 @@ def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solutio
     def problem(fit: Solution) -> LeastSquaresProblem:
         return LeastSquaresProblem(fit.case, fit.coordinates, readings, posterior.whiten)
 
-    (alone,) = descend_together([problem(soil)], [soil.x], [soil.linearisation])
-    if isinstance(alone, InputError):
-        alone = soil.whitened_by(posterior.whiten)
+    elsewhere = [np.asarray([c.prior.fraction(c.nominal) for c in soil.coordinates])]
+    elsewhere += [np.full(len(soil.x), x) for x in SOIL_STARTS]
+    known = [soil.linearisation, *(None for _ in elsewhere)]
+    begun = descend_together([problem(soil)] * len(known), [soil.x, *elsewhere], known)
+    carried = [
+        f for f in begun if not isinstance(f, InputError) and np.isfinite(f.prediction).all()
+    ]
+    stays = soil.whitened_by(posterior.whiten)
+    alone = min(carried, key=lambda fit: fit.objective, default=stays)
     if shown is None or not shown.hypothesis.effects:
         return alone, alone
     own, values = problem(shown.fit), alone.values()
@@ -78,8 +84,7 @@ def plain_fits(posterior: Posterior, shown: Explanation | None) -> tuple[Solutio
         for c in shown.fit.coordinates
     ]
     starts = [shown.fit.x, np.asarray(absent)]
-    known = [shown.fit.linearisation, None]
-    found = descend_together([own, own], starts, known)
+    found = descend_together([own, own], starts, [shown.fit.linearisation, None])
     solved = [fit for fit in found if not isinstance(fit, InputError)]
     return alone, min([*solved, alone], key=lambda fit: fit.objective)
 

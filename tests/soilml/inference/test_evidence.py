@@ -102,7 +102,9 @@ def test_readings_left_out_have_their_conditional_density():
 
 def test_a_long_step_counts_only_once_it_was_fitted():
     found, at = model()
-    far = replace(found, residual=found.residual + 40.0 * found.jacobian[:, 1], _products={})
+    far = replace(
+        found, residual=found.residual + 40.0 * found.jacobian[:, 1], _products={}, _taken={}
+    )
     own = far.evidence(at)
     assert own.promised > 100.0
     assert own.trusted == pytest.approx(own.value + own.promised - 4.0)
