@@ -32,6 +32,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/gap/evidence/repeats.py": {"scipy"},
     "soilml/gap/evidence/family_wise.py": {"scipy"},
     "soilml/inference/evidence.py": {"scipy"},
+    "soilml/inference/priors.py": {"scipy"},
     "soilml/inference/gaussian_terms.py": {"scipy"},
     "soilml/rover_design/search.py": {"scipy"},
     "soilml/soil_maps/local_soils.py": {"scipy"},

@@ -8,7 +8,7 @@ any scatter. The best are fitted, in turn with their hyperparameters, until noth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,11 +19,14 @@ from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.damped_descents import COARSE, FINE, Asking, Tolerance, descent, in_step
-from soilml.fitting.effect_signatures import Signature, current_size, effect_signatures
+from soilml.fitting.effect_signatures import Signature, current_size
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.inference import constants
-from soilml.inference.evidence import Evidence, LinearisedFit, linear_model, of_priors
+from soilml.inference.additions import additions
+from soilml.inference.conditional import leave_one_out
+from soilml.inference.evidence import linear_model
+from soilml.inference.explanation import Explanation, Prediction, StartedFit
 from soilml.inference.gaussian_terms import (
     DISCREPANCY,
     SCATTER,
@@ -45,81 +48,17 @@ OTHER_OPTIMUM = 50.0
 EXTENDED = 6
 #: Evidence within which fits without a discrepancy, which may hide their effects, are kept.
 NEAR_HIDDEN = 40.0
-#: Share of the distance from the middle of its prior at which a soil parameter starts again, and
-#: distance from the ends of an opened one: a start at a bound would stay there.
-INWARD, OFF_BOUNDS = 0.8, 0.02
+#: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
+#: a bound would stay there.
+INWARD = 0.8
 #: Steps of the ladder: of the logarithm of the discrepancy, and the logarithm of hardly any
 #: scatter; scatter above the third counts as some.
 LESS_DISCREPANCY, LITTLE_SCATTER, SOME_SCATTER = 1.0, -1.5, -0.7
-#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
-LARGE_DISCREPANCY = 3.0
 #: Amplitudes and scatter below the first (the logarithm below the second) count less where they
 #: change.
 SMALL, USUAL, OF_SMALL = 0.3, -0.5, 0.2
 #: Readings that are taken as outliers in one estimate, at most.
 MOST_OUTLIERS = 12
-
-
-@dataclass(eq=False)
-class Explanation:
-    """A hypothesis that was fitted.
-
-    value: -2 ln of its posterior probability, up to a constant that all share.
-    beside, without: Evidence with a discrepancy, and without one.
-    outliers (m,): Readings that stray by this hypothesis.
-    """
-
-    hypothesis: Hypothesis
-    fit: Solution
-    linear: LinearisedFit
-    beside: Evidence
-    without: Evidence
-    value: float
-    outliers: Booleans
-    extended: bool = False
-
-    @property
-    def best(self) -> Evidence:
-        """The evidence of the likelier of both."""
-        return min(self.beside, self.without, key=lambda own: own.trusted)
-
-    @property
-    def promising(self) -> Evidence:
-        """That of the likelier one if steps are as good as they promise: where to fit next."""
-        return min(self.beside, self.without, key=lambda own: own.value)
-
-    @property
-    def share_without(self) -> float:
-        """Probability that there is no discrepancy, given the hypothesis."""
-        logs = np.log([1.0 - constants.DISCREPANCY_PRIOR, constants.DISCREPANCY_PRIOR])
-        logs = logs - 0.5 * np.asarray([self.without.trusted, self.beside.trusted])
-        return float(np.exp(logs[0] - np.logaddexp(*logs)))
-
-    @property
-    def at(self) -> Hyperparameters:
-        """The hyperparameters of the likelier of both."""
-        return self.best.at
-
-
-@dataclass(frozen=True)
-class Prediction:
-    """The predicted value of a hypothesis, and where its fit starts."""
-
-    value: float
-    start: Mapping[str, float]
-    at: Hyperparameters
-    outliers: Booleans
-
-
-@dataclass(frozen=True)
-class StartedFit:
-    """A fit to be made: hypothesis, coordinates to start from by path, and hyperparameters."""
-
-    hypothesis: Hypothesis
-    start: Mapping[str, float]
-    at: Hyperparameters
-    outliers: Booleans
-    near: Linearisation | None = None
 
 
 @dataclass(eq=False)
@@ -223,7 +162,7 @@ class Search:
         at = model.best(at)
         half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
         alone = replace(soil, fit=fit, linear=model)
-        found = self._additions(alone, [at, replace(at, log=half)])
+        found = additions(self, alone, [at, replace(at, log=half)])
         singles = sorted(
             ((own.value, h, own) for h, own in found.items() if len(h.effects) == 1),
             key=lambda item: item[:2],
@@ -333,7 +272,7 @@ class Search:
         strays, width = node.outliers.copy(), self.terms.largest_outlier
         odds = np.log(constants.OUTLIER_PRIOR / (1.0 - constants.OUTLIER_PRIOR))
         for _ in range(MOST_OUTLIERS):
-            error, variance = node.linear.without(strays).leave_one_out(node.at)
+            error, variance = leave_one_out(node.linear.without(strays), node.at)
             wide = variance + width**2
             usual = -0.5 * (error**2 / variance + np.log(variance))
             far = -0.5 * (error**2 / wide + np.log(wide)) + odds
@@ -355,7 +294,7 @@ class Search:
             if node.extended:
                 continue
             node.extended = True
-            for hypothesis, own in self._additions(node, self._ladder(node)).items():
+            for hypothesis, own in additions(self, node, self._ladder(node)).items():
                 known = self.predicted.get(hypothesis)
                 if known is None or own.value < known.value:
                     self.predicted[hypothesis] = own
@@ -387,124 +326,6 @@ class Search:
                 still = np.where(kinds[1], np.minimum(at.log, LITTLE_SCATTER), at.log)
                 found.append(replace(at, log=still))
         return found
-
-    def _additions(
-        self, node: Explanation, ladder: Sequence[Hyperparameters]
-    ) -> dict[Hypothesis, Prediction]:
-        """Predicted values of a node's hypothesis with one thing more, the best of a ladder."""
-        p = len(node.fit.x)
-        extra, moves = self._moves(node)
-        model = linear_model(self.terms, node.fit, node.outliers, extra)
-        start = node.fit.start_values()
-        found: dict[Hypothesis, Prediction] = {}
-        prior = constants.DISCREPANCY_PRIOR
-        for at in ladder:
-            try:
-                products, constant = model.reduced(at)
-                own = node.linear.evaluate(at)
-                rest = node.linear.beside(at, own.curvature) + of_priors(node.linear, own)
-            except np.linalg.LinAlgError:
-                continue
-            rest -= 2.0 * float(np.log(prior if at.present else 1.0 - prior))
-            for hypothesis, columns, sign in moves:
-                value, step = model.evidence_with(products, constant, [*range(p), *columns], p)
-                if sign and step[p] * sign <= 0.0:
-                    continue
-                value += rest + self.problem.penalty(hypothesis)
-                if hypothesis not in found or value < found[hypothesis].value:
-                    found[hypothesis] = Prediction(value, start, at, node.outliers)
-        return found | self._by_catalogue(node, start) | self._opened(node, start)
-
-    def _moves(
-        self, node: Explanation
-    ) -> tuple[list[tuple[Coordinate, Floats]], list[tuple[Hypothesis, list[int], int]]]:
-        """Further coordinates with their columns, and hypotheses with the numbers of theirs.
-
-        The third entry of a move is the sign that the size of its effect must have, or 0.
-        """
-        h, fit, problem = node.hypothesis, node.fit, self.problem
-        s, w = problem.readings.log_slip_and_load
-        terms = {"slip_power": s, "by_slip": problem.readings.slip, "by_load": w}
-        extra: list[tuple[Coordinate, Floats]] = []
-        moves: list[tuple[Hypothesis, list[int], int]] = []
-        p = len(fit.x)
-        if len(h.effects) < constants.MOST_EFFECTS:
-            for signature in self._signatures(node):
-                shapes = problem.shapes(signature.name)
-                names, first = tuple(sorted((*h.effects, signature.name))), p + len(extra)
-                extra.append((problem.size(signature.name), signature.column))
-                extra += [(c, signature.column * terms[c.name]) for c in shapes]
-                free = [*range(first, first + 1 + len(shapes))]
-                if not h.free_law or not h.effects:
-                    moves.append(
-                        (replace(h, effects=names, free_law=False), [first], signature.sign)
-                    )
-                if shapes and (h.free_law or not h.effects):
-                    moves.append((replace(h, effects=names, free_law=True), free, signature.sign))
-                elif h.free_law:
-                    moves.append((replace(h, effects=names), [first], signature.sign))
-        if h.effects and not h.free_law:
-            first = p + len(extra)
-            for i, own in enumerate(fit.coordinates):
-                if own.effect:
-                    column = fit.derivatives[:, i] * fit.x[i]
-                    extra += [(c, column * terms[c.name]) for c in problem.shapes(own.effect)]
-            if p + len(extra) > first:
-                moves.append((replace(h, free_law=True), [*range(first, p + len(extra))], 0))
-        return extra, moves
-
-    def _signatures(self, node: Explanation) -> list[Signature]:
-        """How the readings change with each effect that may act beside those of a node."""
-        estimate = node.fit.linearisation.sinkage_at(np.zeros((1, len(node.fit.x))))
-        others = self.problem.effects_beside(node.hypothesis.effects)
-        case, readings = node.fit.fitted(), self.problem.readings
-        found, untestable = effect_signatures(case, readings, others, estimate)
-        if node.hypothesis == SOIL_ALONE:
-            self.untestable = untestable
-        self.signatures[node.hypothesis.effects] = found
-        return found
-
-    def _by_catalogue(
-        self, node: Explanation, start: Mapping[str, float]
-    ) -> dict[Hypothesis, Prediction]:
-        """The hypothesis by the catalogue's laws, where that with free ones is a node.
-
-        Whether the catalogue's laws explain too decides how far free ones count for an effect.
-        """
-        if not node.hypothesis.free_law:
-            return {}
-        own = replace(node.hypothesis, free_law=False)
-        return {own: Prediction(node.value, start, node.at, node.outliers)}
-
-    def _opened(
-        self, node: Explanation, start: Mapping[str, float]
-    ) -> dict[Hypothesis, Prediction]:
-        """The hypothesis with the priors of its soil opened, where that can matter.
-
-        The fit presses against one of them, or a large discrepancy is left.
-        """
-        h, problem = node.hypothesis, self.problem
-        if h.wide_priors or problem.wide_soil == problem.soil:
-            return {}
-        ends = [
-            min(x - c.lower, c.upper - x)
-            for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)
-            if not c.effect
-        ]
-        large = self.terms.amplitude(node.at).max(initial=0.0) > LARGE_DISCREPANCY
-        if min(ends, default=1.0) >= constants.PRESSED and not large:
-            return {}
-        values = node.fit.values()
-        opened = {
-            c.path: float(
-                np.clip(
-                    c.prior.fraction(values.get(c.path, c.nominal)), OFF_BOUNDS, 1.0 - OFF_BOUNDS
-                )
-            )
-            for c in problem.wide_soil
-        }
-        wide = replace(h, wide_priors=True)
-        return {wide: Prediction(node.value, {**start, **opened}, node.at, node.outliers)}
 
 
 def _careful(

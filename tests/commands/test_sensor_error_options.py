@@ -129,11 +129,11 @@ def test_a_declared_bias_is_a_checked_sensor_for_gap(folder, monkeypatch):
     (folder / "runs.csv").write_text("run,slip,load_N,torque_Nm\na,0.1,60,1.5\na,0.4,60,3.0\n")
     given = {}
 
-    def stop(case, soil, readings, **options):
-        given.update(options)
+    def stop(problem, progress):
+        given["calibration"] = problem.calibration
         raise InputError("enough")
 
-    monkeypatch.setattr(workflow, "analyse", stop)
+    monkeypatch.setattr(workflow, "infer", stop)
     monkeypatch.setattr(workflow, "check_readings", lambda *_: DataCheckResult((), (), ()))
     command = ["gap", "biased.toml", "runs.csv", "--out", "found", "--checked", "torque-gain=0.01"]
     assert main(command) == 2

@@ -24,9 +24,9 @@ from soilml.gap.design.planned_readings import readings_like, with_default_covar
 from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.design.run_options import RunOption, run_options
 from soilml.gap.report.results import NextRun
+from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column

@@ -13,8 +13,9 @@ from soilml.errors import InputError
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
+from soilml.inference.conditional import conditional
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Explanation
 
 #: The parts that are held out, by their keys in a report.
 RUNS, REGION, SLIPS = "held_out_runs", "held_out_region", "held_out_slips"
@@ -125,7 +126,7 @@ def predicted_beside_remainder(node: Explanation, folds: Folds) -> Floats:
     mean = np.full(len(folds.fold), np.nan)
     for number in folds.predicted:
         out = folds.fold == number
-        given = node.linear.without(node.outliers | out).conditional(node.at)
+        given = conditional(node.linear.without(node.outliers | out), node.at)
         mean[out] = (node.fit.prediction + given.expected)[out]
     return mean
 

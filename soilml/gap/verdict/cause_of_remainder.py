@@ -12,11 +12,12 @@ from soilml.arrays import Floats
 from soilml.gap.evidence.held_out import held_out_folds
 from soilml.gap.evidence.stage_changes import stage_changes
 from soilml.gap.report.remainder_cause import RemainderCause
+from soilml.inference.conditional import conditional
 from soilml.inference.constants import IN_CATALOGUE, UNKNOWN_CAUSE, UNKNOWN_SCALE
 from soilml.inference.evidence import LinearisedFit
+from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import FIXED, Hyperparameters
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
 
@@ -176,7 +177,7 @@ def _changed_channels(
     """Channels that the change moves by more than `NOTICED`, root mean square in their noise."""
     assert best.at is not None
     model = _with_change(node.linear, best)
-    found, k = model.conditional(best.at), best.columns.shape[1]
+    found, k = conditional(model, best.at), best.columns.shape[1]
     own = slice(-len(model.x) - k, -len(model.x))
     moved = found.columns[:, own] @ found.mean[own] / posterior.std
     readings = posterior.terms.readings

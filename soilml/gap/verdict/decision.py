@@ -12,8 +12,8 @@ from soilml.gap.evidence.held_out import PredictiveGain
 from soilml.gap.report.results import Suspect
 from soilml.gap.report.sentences import NOT_DECISIVE
 from soilml.inference.constants import LARGEST_SIZE
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 

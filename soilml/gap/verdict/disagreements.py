@@ -11,10 +11,11 @@ from soilml.fitting.readings import Readings
 from soilml.gap.evidence.held_out import held_out_region
 from soilml.gap.evidence.repeats import chi_square_tail, repeat_disagreement
 from soilml.identification.fit import disagreeing_soil_tests
+from soilml.inference.conditional import conditional
 from soilml.inference.constants import SCATTER_UNITS
+from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal
@@ -93,7 +94,7 @@ def unpredicted_region(
 ) -> list[Remark]:
     """The region that a fit to the other rows fails to predict, uncertainty of the fit included."""
     at = soil.without.at
-    found = soil.linear.without(soil.outliers | out).conditional(at)
+    found = conditional(soil.linear.without(soil.outliers | out), at)
     own = out & ~soil.outliers
     columns = found.columns[own]
     matrix = np.diag(found.noise[own] ** 2) + columns @ found.covariance @ columns.T

@@ -31,8 +31,8 @@ from soilml.gap.verdict.fit_notes import (
 )
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.constants import NEAR, SCATTER_UNITS
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Explanation
 from soilml.quantities import column
 from soilml.remarks import Remark, texts
 from soilml.report.numbers import LEAST_STATED, format_log_density

@@ -13,8 +13,8 @@ from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
 from soilml.gap.report.results import EstimatedValue
 from soilml.inference.constants import INTERVAL_FACTOR
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
 from soilml.numerics.prior import Prior
 from soilml.report.numbers import significant
 

@@ -13,8 +13,8 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import MOST_POINTS, Remainder, RemainderPart
 from soilml.fitting.covariance import USUAL
 from soilml.gap.verdict.remainder import LEAST_AMPLITUDE
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.quantities import column
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
-from soilml.inference.search import Explanation
 from soilml.remarks import Remark
 
 #: Factors on the estimated noise and scatter that are tried: published figures are read to about

@@ -22,9 +22,10 @@ from soilml.gap.evidence.held_out import (
     predicted_by_refits,
 )
 from soilml.gap.report.results import BeforeAfter, GapReduction
+from soilml.inference.explanation import Explanation
 from soilml.inference.gaussian_terms import scatter_columns, terms_like
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import SOIL_STARTS, Explanation
+from soilml.inference.search import SOIL_STARTS
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import channel_name, decimal

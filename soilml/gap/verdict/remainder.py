@@ -10,8 +10,8 @@ from soilml.gap.evidence.family_wise import family_wise_p, scores
 from soilml.gap.evidence.regions import regions
 from soilml.gap.report.results import RegionScore, RemainingDiscrepancy
 from soilml.inference.constants import INTERVAL_FACTOR
+from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
-from soilml.inference.search import Explanation
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal
 from soilml.report.terminal import shown_unit

@@ -11,8 +11,10 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.damped_descents import levenberg_marquardt
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
-from soilml.inference.evidence import linear_model, prior_of_hyperparameters
+from soilml.inference.conditional import conditional, leave_one_out
+from soilml.inference.evidence import linear_model
 from soilml.inference.gaussian_terms import gaussian_terms, scatter_columns
+from soilml.inference.priors import prior_of_hyperparameters
 from soilml.physics.effects import EFFECTS
 
 DECLARED = MODEL + '[discrepancy]\ntorque_Nm = "2 %"\n'
@@ -84,7 +86,7 @@ def test_each_reading_is_predicted_from_all_others(case):
     found, at = model(*case)
     matrix, residual = dense(found, at)
     inverse = np.linalg.inv(matrix)
-    error, variance = found.leave_one_out(at)
+    error, variance = leave_one_out(found, at)
     np.testing.assert_allclose(variance, 1.0 / np.diag(inverse), rtol=1e-6)
     np.testing.assert_allclose(error, inverse @ residual / np.diag(inverse), rtol=1e-5, atol=1e-9)
 
@@ -94,7 +96,7 @@ def test_readings_left_out_have_their_conditional_density():
     out = found.terms.readings.run[found.terms.readings.row] == 1
     matrix, residual = dense(found, at)
     gain = np.linalg.solve(matrix[np.ix_(~out, ~out)], matrix[np.ix_(~out, out)]).T
-    given = found.without(out).conditional(at)
+    given = conditional(found.without(out), at)
     np.testing.assert_allclose(given.expected[out], gain @ residual[~out], rtol=1e-5, atol=1e-8)
     left = matrix[np.ix_(out, out)] - gain @ matrix[np.ix_(~out, out)]
     np.testing.assert_allclose(given.variance[out], np.diag(left), rtol=1e-6)

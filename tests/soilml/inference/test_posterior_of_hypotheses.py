@@ -8,6 +8,7 @@ from gap_sets import MODEL, case_of, driven
 
 from soilml.fitting.coordinates import free_soil_parameters
 from soilml.fitting.readings import stack_readings
+from soilml.inference.explanation import StartedFit
 from soilml.inference.posterior import infer
 from soilml.inference.problem import (
     SOIL_ALONE,
@@ -16,7 +17,6 @@ from soilml.inference.problem import (
     effect_penalties,
     exclude_each_other,
 )
-from soilml.inference.search import StartedFit
 from soilml.physics.effects import EFFECTS
 
 FEW = {n: EFFECTS[n] for n in ("slip-sinkage", "bulldozing", "exit-angle", "torque-gain")}
