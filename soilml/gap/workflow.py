@@ -75,6 +75,7 @@ from soilml.gap.verdict.reductions import (
     grown_channels,
     plain_fits,
     predict_held_out,
+    unexplained_figures,
     without_grown,
 )
 from soilml.gap.verdict.remainder import (
@@ -285,6 +286,7 @@ def _build_report(
     if quiet:
         conflicts = [*drift, *misfit_remarks(agreement, case, posterior, alone)]
         conflicts += disagreements(posterior)
+        conflicts += unexplained_figures(gap_reductions(posterior, None, (alone, alone), seed)[0])
         if held_out is not None and len(held_out):
             conflicts += unpredicted_rows(posterior, held_out, split.description)
     decision = decide(posterior, gains, obstacles, conflicts)

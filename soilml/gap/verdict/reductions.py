@@ -33,6 +33,9 @@ from soilml.report.numbers import channel_name, decimal
 FITTED = "train"  # Key of the figures of the fitted rows
 #: Ratio from which a channel's figure is said to grow, where it is above that of noise alone.
 NOTABLE_GROWTH = 1.1
+#: Mean squared residual of rows kept back that scatter of a few runs seldom leaves: of two runs,
+#: once in fifty times.
+UNEXPLAINED = 4.0
 
 
 def gap_reduction(
@@ -164,6 +167,22 @@ def grown_channels(figures: dict[str, GapReduction], addition: str) -> list[Rema
     each = [f"{text[:1].upper()}{text[1:]}" for _, text in grown]
     text = ". ".join([f"{begin}channel grows", *each])
     return [Remark("channel-grows", text, tuple(dict.fromkeys(n for n, _ in grown)), "note")]
+
+
+def unexplained_figures(figures: dict[str, GapReduction]) -> list[Remark]:
+    """A remark on each part of the rows that the soil alone, fitted to the others, leaves.
+
+    A verdict without a gap would contradict such a figure beside it.
+    """
+    return [
+        Remark(
+            "region-not-predicted",
+            f"{g.description}: mean squared residual {decimal(g.before, 2)} (1 is expected)",
+            (name,),
+        )
+        for name, g in figures.items()
+        if name != FITTED and g.before > UNEXPLAINED
+    ]
 
 
 def predict_held_out(
