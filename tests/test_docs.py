@@ -25,6 +25,10 @@ RUN = (
     "docs/how-to/soil-map.md",
     "docs/how-to/train.md",
     "docs/papers/comin2017.md",
+    "docs/papers/nagatani2009.md",
+    "docs/papers/nagatani_climbing.md",
+    "docs/papers/slip_models.md",
+    "docs/papers/wang2018.md",
     "docs/reference/tables.md",
     "exported/README.md",
 )

@@ -21,6 +21,16 @@ SETS = ("wheel", "kls1_wheel", "any_wheel", "wheel_small", "any_wheel_small")
 HOSTILE = (np.nan, np.inf, -np.inf, 0.0, -1.0, 1e-38, -1e-38, 1e38, -1e38, 3e38, 1e9, -1e9, 1e-20)
 #: Random calls of each file, with hostile numbers in several inputs at once.
 MIXTURES = 100
+#: Files of which a quick test has the graph of another kind.
+ALIKE = ("kls1_wheel", "wheel_small", "any_wheel_small", "wheel_mlp", "slip_torque_known",
+         "slip_vibration_known", "slip_torque_paper", "slip_vibration_paper")  # fmt: skip
+
+
+def files(names):
+    """Names of files; those of the same kind as another one are left to `make test-long`."""
+    return [pytest.param(n, marks=[pytest.mark.long] * (n in ALIKE), id=n) for n in names]
+
+
 GOOD = {
     "slip": [0.1, 0.2, 0.3, 0.5],
     "torque": [1.6, 2.3, 2.7, 3.2],
@@ -102,14 +112,14 @@ def context_of(metadata):
     return json.loads(metadata["set"])["context"] if "set" in metadata else {}
 
 
-@pytest.mark.parametrize("file", RELEASED, ids=lambda file: file.stem)
-def test_all_outputs_are_finite_for_all_inputs(file):
-    session = session_of(str(file))
+@pytest.mark.parametrize("name", files([file.stem for file in RELEASED]))
+def test_all_outputs_are_finite_for_all_inputs(name):
+    session = session_of(str(ROOT / "exported" / f"{name}.onnx"))
     metadata = session.get_modelmeta().custom_metadata_map
     check_finite(session, context_of(metadata), seed=1)
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize("name", files(SETS))
 def test_all_outputs_of_a_step_of_fixed_shapes_are_finite(name):
     model = onnx.load(str(ROOT / "exported" / f"{name}.onnx"))
     metadata = {entry.key: entry.value for entry in model.metadata_props}

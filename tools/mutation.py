@@ -38,7 +38,11 @@ from scipy.stats import binomtest
 ROOT = Path(__file__).parents[1]
 #: Source folders, their tests below `tests`, and what is left out: drawing, and other rooms.
 ROOMS = {
-    "physics": ("soilml/physics", "soilml/physics commands/test_contract.py soilml/traction", ""),
+    "physics": (
+        "soilml/physics",
+        "soilml/physics commands/test_contract.py soilml/traction soilml/config/test_simulator.py",
+        "",
+    ),
     "fitting": ("soilml/fitting", "soilml/fitting", ""),
     "identification": ("soilml/identification", "soilml/identification", "/plot"),
     "onboard": (

@@ -135,18 +135,3 @@ def test_a_log_of_another_wheel_is_refused(folder, capsys, monkeypatch):
         ["identify", "model.toml", "other.csv"],
     ):
         refused(folder, command, capsys, monkeypatch, "line 2, column wheel_radius_m: 0.1 given")
-
-
-def test_a_missing_library_names_the_extra(folder, capsys, monkeypatch):
-    import builtins
-
-    real = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name.split(".")[0] == "pyarrow":
-            raise ImportError(f"No module named {name!r}", name=name)
-        return real(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
-    command = ["identify", "model.toml", "good.parquet"]
-    refused(folder, command, capsys, monkeypatch, "pip install 'soilml[ground]'")

@@ -1,12 +1,10 @@
 """Bad model files, recipes and specs: one line that names the place, and nothing left behind."""
 
-import onnx
 import pytest
 from conftest import MODEL
 
 from soilml.cli import main
 from soilml.onboard import Estimator
-from soilml.onboard.model_file import metadata_checksum
 
 SPEC = '[[regressor]]\ntype = "linear"\n'
 EFFECT = '[[effect]]\nname = "slip-sinkage"\nn1 = 0.1\n'
@@ -59,31 +57,6 @@ def test_specs(tmp_path, capsys, small_data, what):
     out = tmp_path / "o.onnx"
     refused(["train", str(tmp_path / "spec.toml"), str(small_data), str(out)], capsys, said)
     assert [p.name for p in tmp_path.iterdir()] == ["spec.toml"]
-
-
-@pytest.mark.parametrize(
-    ("key", "value"),
-    [
-        ("gear", "[]"),
-        ("gear", '{"radius": "wide"}'),
-        ("gear", "[" * 100_000),
-        ("recipe", "3"),
-        ("recipe", '{"effect": [1]}'),
-        ("graph_bytes", "9" * 5000),
-    ],
-)
-def test_model_files_signed_again(tmp_path, capsys, small_model, key, value):
-    model = onnx.load(small_model)
-    metadata = {e.key: e.value for e in model.metadata_props} | {key: value}
-    metadata["metadata_sha256"] = metadata_checksum(metadata)
-    for entry in model.metadata_props:
-        entry.value = metadata[entry.key]
-    (tmp_path / "m.onnx").write_bytes(model.SerializeToString(deterministic=True))
-    (tmp_path / "runs.csv").write_text(
-        "run,slip,load_N,torque_Nm,wheel_radius_m\na,0.1,60,1.5,0.15\n"
-    )
-    command = ["estimate", str(tmp_path / "m.onnx"), str(tmp_path / "runs.csv")]
-    refused(command, capsys, "m.onnx")
 
 
 @pytest.mark.filterwarnings("error")

@@ -41,11 +41,3 @@ def test_a_file_alone_is_described_in_one_line(folder, capsys):
     assert main(["estimate", ANY_WHEEL]) == 0
     said = one_line(capsys.readouterr().out)
     assert "radius 0.04 to 0.5 m" in said and "0 to 1 cohesion_max" in said
-
-
-@pytest.mark.parametrize("file", [WHEEL, ANY_WHEEL])
-def test_the_case_of_the_files_own_wheel_is_accepted(folder, capsys, file):
-    assert main(["estimate", file, "runs.csv", "--by", "run", "--case", "model.toml"]) == 0
-    assert "gear" not in capsys.readouterr().err
-    assert main(["estimate", file, "--case", "model.toml"]) == 0
-    assert "radius 0.15 m" in capsys.readouterr().out

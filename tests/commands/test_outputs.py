@@ -148,17 +148,6 @@ def test_every_argument_that_names_an_input_file_is_declared_as_one():
             assert (action.type is InputFile) == expected, f"{name} {action.dest}"
 
 
-@pytest.mark.parametrize(
-    "words", [["gap", "model.toml", "runs.csv", "--out", ""], ["generate", "wheel", ""]]
-)
-def test_an_empty_name_is_no_folder(folder, capsys, words):
-    """A shell gives it for a variable that is not set."""
-    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.is_file()}
-    assert main(words) == 2
-    assert "is empty; needed is a" in capsys.readouterr().err
-    assert {p.name: p.read_bytes() for p in folder.iterdir() if p.is_file()} == before
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
 @pytest.mark.parametrize("command", ["--version", "identify --help", "identify no.toml no.csv"])
 @pytest.mark.parametrize("stream", ["stdout", "stderr"])

@@ -43,7 +43,6 @@ def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, cap
         (["--slip", "0,50"], "--slip is 50; needed is 1 - v/(r omega)"),
         (["--stiffness", "1e6", "--offset"], "has no stress at the surface"),
         (["--stiffness", "1e5:1e6:200", "--legs", "3:6:4"], "800 walks; at most 400"),
-        (["--legs", "4,5", "--foot", "none,LTF,SRF"], "a picture shows the turns of 8 or fewer"),
     ],
 )
 def test_bad_requests_are_refused_in_one_line(options, expected, tmp_path, capsys):

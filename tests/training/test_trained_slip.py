@@ -124,21 +124,3 @@ def test_the_command_fuses_files_and_goes_on_without_a_channel(trained, tmp_path
     log.write_text("run,load_N,torque_Nm\na,60,3.2\n")
     assert main(command) == 2
     assert "column drawbar_pull_N is missing" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ('targets = ["slips"]\n' + MACHINE, "'slips' cannot be estimated"),
-        ('targets = ["slip"]\n' + MACHINE, "'slip' is also read by the features"),
-        (TORQUE + OF_PULL, "'drawbar_pull' is none of the spec's: torque/load, load"),
-        (BOTH + OF_TORQUE, "no regressor reads 'drawbar_pull'"),
-        (TORQUE + MACHINE + "features = []\n", "needed is a list of names"),
-        (TORQUE + MACHINE + 'features = ["load", "load"]\n', "a name is repeated"),
-    ],
-)
-def test_mistakes_in_a_spec_are_named(tmp_path, text, said):
-    (tmp_path / "s.toml").write_text(text)
-    with pytest.raises(InputError, match=said) as caught:
-        read_spec(tmp_path / "s.toml")
-    assert "\n" not in str(caught.value)

@@ -1,16 +1,16 @@
 """Model files as they are opened: names, sizes, and files that refer to others."""
 
-import hashlib
 import os
 
 import onnx
 import pytest
 from onnx.external_data_helper import set_external_data
+from signed_files import signed
 
 import soilml.onboard.model_file as model_file
 from soilml import Estimator
 from soilml.errors import ModelFileError
-from soilml.onboard.model_file import metadata_checksum, refers_to_files, serialise_metadata
+from soilml.onboard.model_file import refers_to_files
 from soilml.onboard.set_contract import INTERFACE
 
 
@@ -35,27 +35,15 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path, monkeypatch):
     assert "has 4 MB; a model file has at most 3 MB" in message(tmp_path / "m.onnx")
 
 
-def signed_again(model):
-    """The bytes of a model with the checksums of what it is now."""
-    metadata = {entry.key: entry.value for entry in model.metadata_props}
-    del model.metadata_props[:]
-    graph = model.SerializeToString(deterministic=True)
-    metadata["graph_sha256"] = hashlib.sha256(graph).hexdigest()
-    metadata["metadata_sha256"] = metadata_checksum(metadata)
-    return graph + serialise_metadata(metadata)
-
-
 def test_weights_in_another_file_are_refused(small_model, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     model = onnx.load(small_model)
     tensor = max(model.graph.initializer, key=lambda tensor: len(tensor.raw_data))
     (tmp_path / "weights").write_bytes(tensor.raw_data)
-    assert not refers_to_files(signed_again(onnx.load(small_model)))
+    assert not refers_to_files(small_model.read_bytes())
     set_external_data(tensor, "weights")
     tensor.ClearField("raw_data")
-    content = signed_again(model)
-    assert refers_to_files(content)
-    (tmp_path / "m.onnx").write_bytes(content)
+    assert refers_to_files(signed(model, tmp_path / "m.onnx").read_bytes())
     with pytest.raises(ModelFileError, match="weights in other files"):
         Estimator.load("m.onnx")
 
@@ -93,11 +81,8 @@ def test_tensors_are_found_wherever_the_format_has_them():
     ("interface", "refused"), [("1", False), ("4", False), ("5", False), ("6", True), ("5b", True)]
 )
 def test_a_file_of_a_later_interface_is_refused(small_model, tmp_path, interface, refused):
-    model = onnx.load(small_model)
-    (entry,) = (e for e in model.metadata_props if e.key == "soilml_interface")
-    assert entry.value == INTERFACE == "5"
-    entry.value = interface
-    (tmp_path / "m.onnx").write_bytes(signed_again(model))
+    assert Estimator.load(small_model).metadata["soilml_interface"] == INTERFACE == "5"
+    signed(small_model, tmp_path / "m.onnx", soilml_interface=interface)
     if refused:
         with pytest.raises(ModelFileError, match=f"has interface {interface}; this version of"):
             Estimator.load(tmp_path / "m.onnx")

@@ -3,7 +3,6 @@
 import os
 import signal
 import socket
-import sys
 import time
 from pathlib import Path
 
@@ -69,9 +68,3 @@ def _workers_below(folder):
             if str(folder).encode() in words and b"soilml.serve.worker" in words:
                 found.append(entry.name)
     return found
-
-
-def test_a_missing_library_names_its_extra(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "tornado", None)
-    assert main(["serve", "--no-browser", "--port", "0"]) == 2
-    assert "pip install 'soilml[serve]'" in capsys.readouterr().err

@@ -1,8 +1,5 @@
 """Pull against slip on ground not yet driven."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -62,11 +59,3 @@ def test_steep_slopes_are_predicted_from_gentle_ones(true, ability):
     best = quantile_band(ability.steepest)
     assert best.lower - 0.005 < true.steepest < best.upper + 0.005
     assert best.upper - best.lower < 0.06
-
-
-def test_the_example_on_the_page_runs():
-    page = (Path(__file__).parents[4] / "docs/papers/nagatani_climbing.md").read_text()
-    names: dict = {}
-    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
-    best = quantile_band(names["ability"].steepest)
-    assert best.lower < names["true"].steepest < best.upper

@@ -1,8 +1,6 @@
 """Wheel-legs walking: what carries, what propels, and what stops."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -97,11 +95,3 @@ def test_invalid_cases_have_a_status_and_do_not_affect_the_others():
     assert np.isnan(walked.sinkage[-1, 5]) and np.isnan(walked.slip[-1, 5])
     alone = walk(good, SAND, turns=0.3, steps=500)
     np.testing.assert_allclose(walked.z[:, 0], alone.z[:, 0], atol=1e-7)
-
-
-def test_the_example_on_the_page_runs():
-    page = (Path(__file__).parents[4] / "docs/papers/comin2017.md").read_text()
-    names: dict = {}
-    exec(re.findall(r"```python\n(.*?)```", page, flags=re.DOTALL)[0], names)
-    assert np.all(names["result"].status == 0)
-    assert names["gait_metrics"](names["result"]).mean_slip[1] == pytest.approx(0.25)
