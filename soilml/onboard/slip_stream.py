@@ -180,16 +180,28 @@ class SlipStream:
     ) -> tuple[SlipEstimate, SlipState]:
         """The answer for a row, and the state after it.
 
-        rim_speed: Radius times rotation of each wheel (k,), m/s, negative backward.
-        torque: Read torque of each wheel (k,), N m; NaN where there is none. One beyond what any
-            soil carries is left out, with the flag `torque-set-aside`.
-        load: Load of each wheel (k,), N.
-        slope: Pitch, rad, positive uphill.
-        elapsed: Time since the row before, s.
+        Parameters
+        ----------
+        state : SlipState
+            That of the row before, or `start()`.
+        rim_speed : array_like, shape (k,)
+            Radius times rotation of each wheel, m/s, negative backward.
+        torque : array_like, shape (k,)
+            Read torque of each wheel, N m; NaN where there is none. One beyond what any soil
+            supports is left out, with the flag `torque-set-aside`.
+        load : array_like, shape (k,)
+            Load of each wheel, N.
+        slope : float
+            Pitch, rad, positive uphill.
+        elapsed : float
+            Time since the row before, s.
 
-        Raises `InputError` for another number of wheels; for what is not finite or not possible
-        (`POSSIBLE`), but for a torque; for a state that is damaged or of another file; and
-        for a row whose answer would not be finite. Go on with the state that was given.
+        Raises
+        ------
+        InputError
+            For another number of wheels; for what is not finite or not possible (`POSSIBLE`), but
+            for a torque; for a state that is damaged or of another file; and for a row whose
+            answer would not be finite. Go on with the state that was given.
         """
         self._check(state)
         given = {"rim_speed": rim_speed, "torque": torque, "load": load}
