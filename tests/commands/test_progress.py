@@ -36,7 +36,8 @@ def test_long_work_says_a_line_now_and_then(clock, capsys):
             clock.now += 1.0
             done(i + 1)
     lines = capsys.readouterr().err.splitlines()
-    assert lines == [f"simulating: {share} %" for share in (2, 22, 42, 62, 82)]
+    left = {2: "2 min", 22: "78 s", 42: "58 s", 62: "38 s", 82: "18 s"}
+    assert lines == [f"simulating: {done} %, about {rest} left" for done, rest in left.items()]
 
 
 def test_stages_say_that_they_begin_and_how_far_they_are(clock, capsys):
@@ -44,7 +45,10 @@ def test_stages_say_that_they_begin_and_how_far_they_are(clock, capsys):
         for i in range(30):
             clock.now += 1.0
             tell("training", i, 30)
-    assert capsys.readouterr().err.splitlines() == ["training ...", "training: 66 %"]
+    assert capsys.readouterr().err.splitlines() == [
+        "training ...",
+        "training: 66 %, about 10 s left",
+    ]
 
 
 def test_work_of_unknown_length_says_one_line(monkeypatch, capsys):
