@@ -20,8 +20,9 @@ from soilml.fitting.predictions import forces, linearise
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.gap import gap
-from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, run_effect_columns
 from soilml.gap.report.results import GapReport
+from soilml.inference.constants import SCATTER_UNITS
+from soilml.inference.gaussian_terms import scatter_columns
 from soilml.io.csv_file import read_csv
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
@@ -140,9 +141,9 @@ def gap_entry(data: SetData, seed: int) -> Answer:
     jacobian, expected = _linear_soil(case, readings)
     parts = [jacobian, discrepancy_process(readings, case.discrepancy, Discrepancy()).columns]
     found = report.variance_components
-    for i, (name, unit) in enumerate(RUN_EFFECT_UNITS.items()):
+    for i, (name, unit) in enumerate(SCATTER_UNITS.items()):
         if size := found.get(f"{name}_std", 0.0) / unit:
-            column = size * run_effect_columns(case, readings)[:, i]
+            column = size * scatter_columns(case, readings)[:, i]
             of_run = readings.run[readings.row]
             parts.append(
                 np.where(of_run[:, None] == np.arange(len(readings.runs)), column[:, None], 0)
@@ -156,26 +157,16 @@ def gap_entry(data: SetData, seed: int) -> Answer:
 
 
 def gap_probabilities(report: GapReport) -> dict[str, float]:
-    r"""Probabilities of causes, of which one is right, by a report of the gap workflow.
+    """Probabilities of causes, of which one is right, by a report of the gap workflow.
 
     Those of the catalogue are the report's, scaled down where their sum exceeds what it leaves to
-    other causes. The rest is shared by `none`, with the probability
-
-    .. math:: \left(1 + \frac{1}{-e p \ln p}\right)^{-1}
-
-    that the p value of the soil alone allows at least, and by `unknown`. All of it is for `none`
-    where the report sees no gap.
-
-    References: Sellke, Bayarri and Berger, Calibration of p values for testing precise null
-    hypotheses, The American Statistician 55, 2001, eqs. 2 and 3; it holds for p < 1/e.
+    other causes. The rest is shared by `none`, with the probability of no gap, and by `unknown`.
+    All of it is for `none` where the report sees no gap.
     """
     total = sum(report.probabilities.values())
     shrunk = min(1.0, (1.0 - OTHER_CAUSE) / total) if total > 0.0 else 1.0
     left = 1.0 - shrunk * total
-    p = float(np.clip(report.p_gap, 1e-12, 1.0 / np.e))
-    none = 1.0 / (1.0 + 1.0 / (-np.e * p * np.log(p)))
-    if report.status == "no-gap":
-        none = 1.0
+    none = 1.0 if report.status == "no-gap" else 1.0 - report.gap_probability
     rest = {NONE: left * none, UNKNOWN: left * (1.0 - none)}
     return {n: shrunk * p for n, p in report.probabilities.items()} | rest
 

@@ -168,7 +168,7 @@ def _said(report: GapReport) -> Row:
         "cause_set": [sorted(names) for names in report.cause_set],
         "probabilities": dict(report.probabilities),
         "suspects": [sorted(s.effects) for s in report.suspects],
-        "p_gap": report.p_gap,
+        "gap_probability": report.gap_probability,
         "reasons": texts(report.reasons),
         "gap": {k: (s.before, s.after) for k, s in report.gap.items()},
         "beside_remainder": {

@@ -12,7 +12,8 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings, stack_readings
-from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, run_effect_columns
+from soilml.inference.constants import SCATTER_UNITS
+from soilml.inference.gaussian_terms import scatter_columns
 from soilml.io.table import Table
 from soilml.numerics.subspaces import project_out
 from soilml.physics.effects import EFFECTS, Effect
@@ -95,11 +96,11 @@ def _covariance(case: Case, truth: dict[str, Any], readings: Readings) -> np.nda
     if scatter["modulus_fraction"] > 0.0:
         units = np.asarray(
             [
-                scatter["friction_angle_rad"] / RUN_EFFECT_UNITS["friction_angle"],
-                scatter["modulus_fraction"] / RUN_EFFECT_UNITS["bearing"],
+                scatter["friction_angle_rad"] / SCATTER_UNITS["friction_angle"],
+                scatter["modulus_fraction"] / SCATTER_UNITS["bearing"],
             ]
         )
-        by_run = run_effect_columns(case, readings) * units
+        by_run = scatter_columns(case, readings) * units
         run = readings.run[readings.row]
         covariance += (run[:, None] == run) * (by_run @ by_run.T)
     share = truth["plan"]["discrepancy"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,17 +11,7 @@ from conftest import THREE_CHANNEL_MODEL
 
 from datagen.blind_sets import draw_blind_set, plan_matrix
 from soilml.config.case import Case, read_case
-from soilml.fitting.coordinates import select_free
-from soilml.fitting.readings import stack_readings
 from soilml.gap import gap
-from soilml.gap.evidence.covariance import (
-    RUN_EFFECT_UNITS,
-    VarianceComponents,
-    assemble_covariance,
-    run_effect_columns,
-)
-from soilml.gap.evidence.problem import FitProblem
-from soilml.gap.search.explanation import CandidateRequest, fit_candidates
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
@@ -66,37 +55,6 @@ def driven(case, effects=(), *, loads=LOADS, slips=8, noise=1.0, soils=None, see
         columns[column(name)] = true + noise * std * rng.standard_normal(true.size)
     names = {"speed": "speed_m_s", "pass_number": "pass", "slip_angle": "slip_angle_rad"}
     return Table(columns | {names[name]: values for name, values in known.items()})
-
-
-def fit_problem(case, table, run_effects=(0.0, 0.0)) -> FitProblem:
-    """A problem on these rows with the declared noise and this run-to-run variation, in units."""
-    readings = stack_readings(case, table)
-    columns = run_effect_columns(case, readings)
-    known = VarianceComponents(
-        np.ones(len(readings.channels)),
-        run_effects[0] * RUN_EFFECT_UNITS["friction_angle"],
-        run_effects[1] * RUN_EFFECT_UNITS["bearing"],
-        0.0,
-        1e6,
-    )
-    coordinates = tuple(select_free(case, None))
-    effects = {name: e for name, e in EFFECTS.items() if e.applies_to(case.model.gear)}
-    return FitProblem(
-        case, coordinates, readings, assemble_covariance(readings, columns, known), effects, {}
-    )
-
-
-def with_readings(fit, reading):
-    """The same point of a fit beside other readings; its residuals stay as they are."""
-    readings = replace(fit.problem.readings, measured=reading)
-    return replace(fit, problem=replace(fit.problem, readings=readings))
-
-
-def candidate(problem, names, start):
-    """Effects fitted by their catalogue laws beside a discrepancy, from start coordinates."""
-    none = np.zeros(len(problem.readings.channels))
-    (found,) = fit_candidates(problem, [CandidateRequest(tuple(names), start, none)])
-    return found
 
 
 #: The first of its kind in the list of plans, whatever becomes of it: tier, cause, size, noise

@@ -42,13 +42,15 @@ def test_slip_sinkage_by_another_law_is_found_and_predicts_heavier_loads(stories
 
 def test_bulldozing_and_a_slope_look_alike_until_the_wheel_runs_in_reverse(stories):
     first, second = stories[0][1:3]
-    assert first.report["status"] == "class"
-    assert {("bulldozing",), ("slope",)} <= {tuple(c) for c in first.report["cause_set"]}
+    assert first.report["status"] in ("class", "named")
+    assert ["bulldozing"] in first.report["cause_set"]
+    assert [s["effects"] for s in first.report["suspects"]][:2] == [["bulldozing"], ["slope"]]
     assert "reverse" in {run["kind"] for run in first.report["next_runs"]}
     assert second.report["cause_set"] == [["bulldozing"]]
-    first_suspect, next_one = second.report["suspects"][:2]
+    first_suspect = second.report["suspects"][0]
     assert first_suspect["effects"] == ["bulldozing"]
-    assert first_suspect["probability"] > 0.8 > 0.1 > next_one["probability"]
+    assert first_suspect["probability"] >= first.report["suspects"][0]["probability"]
+    assert "slope" not in str(second.report["suspects"][1:])
 
 
 def test_a_sensor_that_is_off_is_not_named_as_physics(stories):

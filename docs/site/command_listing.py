@@ -12,8 +12,8 @@ MARK = "<!-- commands -->"
 
 
 def helps() -> dict[str, str]:
-    """The help text of each command, as in a terminal of 100 columns."""
-    os.environ["COLUMNS"] = "100"
+    """The help text of each command, as in a terminal of 92 columns."""
+    os.environ["COLUMNS"] = "92"
     found = {}
     for command in COMMANDS:
         choices = next(a.choices for a in parser(command)._actions if a.choices)

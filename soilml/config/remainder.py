@@ -36,6 +36,9 @@ TOLERANCE = 1e-6
 #: Rows of an analysis that the remainder remembers, and hexadecimal digits of each: those with the
 #: smallest digests, so that a large enough part of the rows has some of them too.
 MOST_MARKS, MARK_DIGITS = 32, 8
+#: Correlation lengths outside the range within which what was learned fades. Of 0.25, 0.5, 1 and
+#: infinitely many, the longer the better under heavier loads; one that ends is nevertheless needed.
+FADING_LENGTH = 2.0
 KEYS = ("column", "gear", "amplitude", "usual", "slip_length", "log_load_length", "slip", "load")
 
 
@@ -51,11 +54,14 @@ class RemainderPart:
     :math:`k(x, x') = e^{-|x - x'|^2 / 2}`. Mean and variance at any slip and load, given soil and
     effects of the model:
 
-    .. math:: E[\delta] = a \psi^T \mu, \quad
-        \operatorname{var}[\delta] = a^2 (1 - |F^T \psi|^2) + (b^2 - a^2)(1 - e^{-d^2 / 2})
+    .. math:: E[\delta] = q a \psi^T \mu, \quad
+        \operatorname{var}[\delta] = q^2 a^2 (1 - |F^T \psi|^2) + b^2 (1 - q^2), \quad
+        q = e^{-d^2 / (2 \lambda^2)}
 
-    d is the distance from the range of the analysis, in correlation lengths, and b the larger of a
-    and a model's usual error: far outside, the mean is zero and the standard deviation b.
+    Outside the range of the analysis, psi is that at the nearest point of it, and q makes the
+    remainder fade with the distance d from the range, in correlation lengths: to a mean of zero,
+    and to the standard deviation b, the larger of a and a model's usual error. What a process says
+    beyond its readings is its own shape, which rings; what is known of a model there is nothing.
 
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.25 and
     2.26; Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001, section 4.2. Valid for smooth
@@ -115,11 +121,12 @@ class RemainderPart:
 
     def mean_and_std(self, slip: Floats, load: Floats) -> tuple[Floats, Floats]:
         """Mean and standard deviation (n,) at slips and loads (n,), in the column's unit."""
-        psi = self.functions(slip, load)
+        slip, load = np.asarray(slip, np.float64), np.asarray(load, np.float64)
+        psi, share = self.functions(*self._within(slip, load)), self._share(slip, load)
         told = ((psi @ self._matrix("known")) ** 2).sum(axis=1)
-        variance = self.amplitude**2 * np.maximum(1.0 - told, 0.0)
+        variance = (share * self.amplitude) ** 2 * np.maximum(1.0 - told, 0.0)
         std = np.sqrt(variance + self._std_beyond(slip, load) ** 2)
-        return self.amplitude * psi @ np.asarray(self.mean), std
+        return np.asarray(share * self.amplitude * (psi @ np.asarray(self.mean))), std
 
     def columns(self, slip: Floats, load: Floats, *, fitted_anew: bool) -> Floats:
         r"""Columns C (n, q), with C C^T the covariance (n, n) of the remainder at these rows.
@@ -132,6 +139,8 @@ class RemainderPart:
 
     def _own_columns(self, slip: Floats, load: Floats, *, fitted_anew: bool) -> Floats:
         """The columns of the process itself, without what it has beyond its range."""
+        share = self._share(slip, load)
+        slip, load = self._within(slip, load)
         psi = self.functions(slip, load)
         inner = np.eye(len(self.mean)) - self._matrix("known") @ self._matrix("known").T
         if fitted_anew:
@@ -142,7 +151,7 @@ class RemainderPart:
         z, at = self.scaled(*np.asarray(self.points).T), self.scaled(slip, load)
         at_rows, at_points = np.split(process_columns(np.concatenate([at, z])), [len(at)])
         left = at_rows - psi @ np.linalg.solve(self.factor, at_points)
-        return self.amplitude * np.column_stack([within, left])
+        return np.asarray(self.amplitude * share[:, None] * np.column_stack([within, left]))
 
     def error_functions(
         self, slip: tuple[float, float], load: tuple[float, float]
@@ -157,25 +166,25 @@ class RemainderPart:
             return process_columns(self.scaled(slip, load))
 
         inside = SmoothFunctions.of(own, lengths, slip, load)
-        if self.usual <= self.amplitude:
-            return inside
         outside = SmoothFunctions.of(unit, lengths, slip, load)
         return SmoothFunctions.joined([inside, outside.times(self._std_beyond)])
 
     def _matrix(self, name: str) -> Floats:
         return np.asarray(getattr(self, name), dtype=np.float64).reshape(len(self.mean), -1)
 
-    def _std_beyond(self, slip: Floats, load: Floats) -> Floats:
-        """Standard deviation (n,) beside the process's own, which grows outside the range."""
-        more = max(self.usual**2 - self.amplitude**2, 0.0)
-        low, high = (self.scaled(*(np.asarray([v]) for v in end)) for end in self._corners)
-        at = self.scaled(slip, load)
-        distance = np.maximum(np.maximum(low - at, at - high), 0.0)
-        return np.asarray(np.sqrt(more * -np.expm1(-0.5 * (distance**2).sum(axis=1))))
+    def _within(self, slip: Floats, load: Floats) -> tuple[Floats, Floats]:
+        """The nearest slips and loads (n,) of the range."""
+        return np.clip(slip, *self.slip), np.clip(load, *self.load)
 
-    @property
-    def _corners(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        return (self.slip[0], self.load[0]), (self.slip[1], self.load[1])
+    def _share(self, slip: Floats, load: Floats) -> Floats:
+        """Share (n,) of what was learned that is left at slips and loads (n,): 1 in the range."""
+        apart = self.scaled(slip, load) - self.scaled(*self._within(slip, load))
+        return np.asarray(np.exp(-0.5 * (apart**2).sum(axis=1) / FADING_LENGTH**2))
+
+    def _std_beyond(self, slip: Floats, load: Floats) -> Floats:
+        """Standard deviation (n,) of what was not learned: zero in the range."""
+        lost = np.maximum(1.0 - self._share(slip, load) ** 2, 0.0)
+        return np.asarray(max(self.usual, self.amplitude) * np.sqrt(lost))
 
 
 #: Where `Case.without_remainder_of` leaves one out.
@@ -233,9 +242,9 @@ class Remainder:
         >>> part = RemainderPart(
         ...     "torque_Nm", "", 0.2, 0.1, 0.3, 0.6, (0.2, 0.2), (60.0, 60.0),
         ...     ((0.2, 60.0),), (1.5,), ((0.8,),), ((0.0,),))
-        >>> mean, std = Remainder((part,)).mean_and_std("torque", [0.2, 5.0], 60.0)
+        >>> mean, std = Remainder((part,)).mean_and_std("torque", [0.2, 0.5, 5.0], 60.0)
         >>> print(mean.round(3), std.round(3))
-        [0.3 0. ] [0.12 0.2 ]
+        [0.3   0.265 0.   ] [0.12  0.142 0.2  ]
         """
         slip, load = np.broadcast_arrays(np.asarray(slip, float), np.asarray(load, float))
         mean, variance = np.zeros(slip.shape), np.zeros(slip.shape)

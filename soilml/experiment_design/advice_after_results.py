@@ -77,7 +77,7 @@ def advice_of_file(
     slips, loads and sensors are those of its training. None where the recipe has what a case lacks:
     sensor bias, vibration, speed, or slip as a target.
     """
-    trained = _trained_for(estimator)
+    trained = trained_case(estimator)
     if trained is None:
         return None
     case, ranges = trained
@@ -127,8 +127,8 @@ def _quick(
     )
 
 
-def _trained_for(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
-    """The case and the candidate grid of a model file; None where no case can represent it."""
+def trained_case(estimator: Estimator) -> tuple[Case, CandidateGrid] | None:
+    """Case and candidate grid of a file for one wheel; None where no case can represent it."""
     read = {*estimator.inputs}
     if estimator.per_row or not {"slip", "load"} < read <= {"slip", "load", *CHANNELS}:
         return None

@@ -16,6 +16,7 @@ from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import fixed_parameters, free_soil_parameters
 from soilml.fitting.faulty_readings import sound_rows
 from soilml.fitting.operating_points import with_rover_columns
+from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
@@ -26,82 +27,81 @@ from soilml.gap.checks import (
 )
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
+from soilml.gap.evidence.held_out import predictive_gains
 from soilml.gap.evidence.holdout_split import HoldoutSplit, split_holdout
 from soilml.gap.evidence.order_trend import order_trends
-from soilml.gap.report.results import GapReport, NoiseAgreement
+from soilml.gap.report.results import GapReport
 from soilml.gap.report.sentences import headline, report_lines, unsupported_conclusions
-from soilml.gap.search.analysis import analyse
-from soilml.gap.search.passes import Analysis
-from soilml.gap.search.prediction import predictive_gains
 from soilml.gap.verdict.agreement import (
     hidden_effect,
     misfit_remarks,
     noise_agreement,
+    opened_priors,
     trend_remarks,
 )
 from soilml.gap.verdict.cause_of_remainder import described_cause
 from soilml.gap.verdict.decision import (
-    NOTHING_IS_BETTER,
-    Decision,
-    cause_set,
+    NO_GAP,
     decide,
-    is_left_open,
     predictive_suspect,
+    ranked_sets,
     reasons,
-    unclaimed_effects,
-    with_refused_outside,
+    suspects,
 )
-from soilml.gap.verdict.disagreements import disagreements, repeats_that_disagree
+from soilml.gap.verdict.disagreements import (
+    disagreements,
+    repeats_that_disagree,
+    unpredicted_rows,
+)
 from soilml.gap.verdict.entries import (
     analysis_notes,
     candidate_summaries,
     competing_explanations,
     conditions_of_suspects,
     named_effects,
+    outlier_names,
     prediction_notes,
     readings_and_predictions,
+    repeat_notes,
     signature_similarity,
-    soil_beside_discrepancy,
-    soil_marginal,
-    suspects,
     variance_component_entries,
 )
-from soilml.gap.verdict.estimates import (
-    among_candidates,
-    by_undetected_effects,
-    soil_estimates,
-    updated_case,
-)
+from soilml.gap.verdict.estimates import soil_after, soil_before, updated_case
 from soilml.gap.verdict.learned_remainder import learned_remainder, without_learned_discrepancy
 from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
 from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
     grown_channels,
-    plain_fit,
+    plain_fits,
     predict_held_out,
+    unexplained_figures,
     without_grown,
 )
 from soilml.gap.verdict.remainder import (
     discrepancy_amplitudes,
     discrepancy_map,
     remaining_discrepancy,
-    residual_trend,
-    with_uncertain_discrepancy,
 )
-from soilml.gap.verdict.returned_model import returned_model
+from soilml.inference.posterior import Posterior, infer
+from soilml.inference.problem import InferenceProblem
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.operating_point import FROM_ORDER
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
+from soilml.row_status import Status
 
-#: Readings that an analysis may have. Its matrices are of this size squared, and many are held at
-#: a time: 1.1 GB in all.
+#: Readings that an analysis may have: its columns are as long, and there are some for each run.
 MOST_READINGS = 3600
-#: Readings up to which their matrices are so small that several threads only wait for each other.
+#: Readings up to which matrices are so small that several threads only wait for each other.
 ONE_THREAD = 1000
+#: Explanations that are scored on rows kept back, the likeliest first.
+SCORED = 4
+#: Share of outliers above which they form a pattern, so that the data cannot be analysed, and
+#: outliers that the reason states.
+MAX_OUTLIER_FRACTION, OUTLIERS_STATED = 0.1, 3
 
 
 @solvable("the gap analysis")
@@ -119,9 +119,8 @@ def gap(
 ) -> GapReport:
     """Find where a model disagrees with measured rows, and the effect that the model lacks.
 
-    The soil alone is fitted by generalised least squares. Where a family-wise score test rejects
-    that fit, the effects of the catalogue are fitted jointly with the soil, and the report states
-    which of them the data do not reject.
+    One posterior weighs the soil alone and sets of effects of the catalogue, each beside a smooth
+    discrepancy or without one, by their evidence. The report states which the data do not reject.
 
     Parameters
     ----------
@@ -207,29 +206,22 @@ def gap(
 
     from threadpoolctl import threadpool_limits
 
+    problem = InferenceProblem(
+        case=case,
+        soil=tuple(soil),
+        readings=readings,
+        effects=effects,
+        calibration=checked_sensors(case.bias) | dict(calibration or {}),
+    )
     with threadpool_limits(1 if len(readings) <= ONE_THREAD else None):
-        analysis = analyse(
-            case,
-            soil,
-            readings,
-            effects=effects,
-            calibration=checked_sensors(case.bias) | dict(calibration or {}),
-            seed=seed,
-            place=split.analysed.place,
-            progress=progress or (lambda _: None),
-        )
-        if analysis.error:
-            return _bad_data_report(case, (analysis.error,), checks.notes, seed)
+        posterior = infer(problem, progress or (lambda _: None))
+        if error := _unusable(posterior, split.analysed.place):
+            return _bad_data_report(case, (error,), checks.notes, seed)
         held_out = None
         if split.held_out is not None:
             held_out = stack_readings(case, split.held_out).with_default_std(repeat_noise)
             held_out = held_out.subset(np.isfinite(held_out.std))
-        gains = predictive_gains(analysis.predictions)
-        analysis = replace(
-            analysis, result=with_refused_outside(analysis.problem, analysis.result, gains)
-        )
-        agreement = noise_agreement(case, readings, soil, analysis)
-        report = _build_report(case, analysis, checks, split, held_out, agreement, seed=seed)
+        report = _build_report(case, posterior, checks, split, held_out, readings, seed=seed)
         if report.model.remainder not in (None, case.remainder):
             learned = report.model.remainder.of_rows(split.analysed)
             report = replace(report, model=replace(report.model, remainder=learned))
@@ -238,9 +230,9 @@ def gap(
     report = replace(report, sentence=headline(report), lines=lines)
     fixed = fixed_parameters(case, soil)
     conclusions = unsupported_conclusions(report, checks.naming_obstacles, fixed)
-    conclusions += like_another_soil(analysis.problem, analysis.result)
+    conclusions += like_another_soil(posterior, posterior.soil.fit)
     first = report.cause_set[0] if report.cause_set else report.best_unclaimed
-    conclusions += like_another_force(analysis.problem, analysis.result, first)
+    conclusions += like_another_force(posterior, first)
     return replace(report, not_claimed=tuple(conclusions))
 
 
@@ -252,139 +244,133 @@ def _bad_data_report(
     return replace(report, sentence=headline(report), lines=report_lines(report))
 
 
+def _unusable(posterior: Posterior, place: Callable[[int], str]) -> Remark | None:
+    """Why the rows cannot be analysed: loads that nothing carries, or too many outliers."""
+    if posterior.refused is not None:
+        fit = posterior.refused
+        readings = fit.problem.readings
+        row = int(readings.row[np.flatnonzero(~np.isfinite(fit.prediction))[0]])
+        status = Status(int(forces(fit.fitted(), readings.at).status[row]))
+        text = f"the model cannot carry the load of {place(row)}"
+        if status not in (Status.TOO_HEAVY, Status.NOT_CONVERGED):
+            text = f"{place(row)}: {status.reason}"
+        return Remark("no-equilibrium", text)
+    if np.mean(posterior.outliers) <= MAX_OUTLIER_FRACTION:
+        return None
+    names = outlier_names(posterior, place)
+    more = len(names) - OUTLIERS_STATED
+    text = f"{len(names)} readings are outliers: check the sensors first: "
+    text += ", ".join(names[:OUTLIERS_STATED]) + (f" and {more} more" if more > 0 else "")
+    return Remark("many-outliers", text, names)
+
+
 def _build_report(
     case: Case,
-    analysis: Analysis,
+    posterior: Posterior,
     checks: DataCheckResult,
     split: HoldoutSplit,
     held_out: Readings | None,
-    agreement: NoiseAgreement | None,
+    readings: Readings,
     *,
     seed: int,
 ) -> GapReport:
     """Decide the status, then compute the entries of the report."""
-    problem, result = analysis.problem, analysis.result
-    opened = () if analysis.opened is None else (analysis.opened,)
+    gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
+    quiet = posterior.no_gap > NO_GAP
+    alone, _ = plain_fits(posterior, None)
+    opened = opened_priors(posterior)
     obstacles = (*opened, *checks.naming_obstacles)
-    smooth_gap = result.has_gap and not is_left_open(result)
-    trends = order_trends(problem, result.soil, seed)
-    drift, conflicts = trend_remarks(trends), []
-    if not smooth_gap:
-        conflicts = [*drift, *misfit_remarks(agreement, case, analysis)]
-        conflicts += disagreements(problem, result.soil)
-    if result.has_gap and not (smooth_gap or conflicts):
-        conflicts = [NOTHING_IS_BETTER]
-    decision = decide(problem, result, obstacles, conflicts)
-    excluded = _changed_by_outliers(analysis, decision, obstacles)
-    before, beside = soil_marginal(analysis), soil_beside_discrepancy(analysis)
-    shown = decision.shown.best if decision.shown else before
-    suspected = predictive_suspect(decision, predictive_gains(analysis.predictions))
-    explained = shown if decision.claimed else beside
-    plain = plain_fit(problem, result.soil, decision.shown) if decision.shown else result.soil
-    figures, beside_remainder = gap_reductions(analysis, decision.shown, plain, seed)
+    agreement = noise_agreement(case, readings, posterior.problem.soil, posterior, alone)
+    trends = order_trends(posterior, seed)
+    drift, conflicts = trend_remarks(trends), list[Remark]()
+    if quiet:
+        conflicts = [*drift, *misfit_remarks(agreement, case, posterior, alone)]
+        conflicts += disagreements(posterior)
+        conflicts += unexplained_figures(gap_reductions(posterior, None, (alone, alone), seed)[0])
+        if held_out is not None and len(held_out):
+            conflicts += unpredicted_rows(posterior, held_out, split.description)
+    decision = decide(posterior, gains, obstacles, conflicts)
+    if decision.status == "undecided" and not quiet:
+        conflicts = list(opened)
+    shown = decision.shown
+    fits = plain_fits(posterior, shown)
+    figures, beside_remainder = gap_reductions(posterior, shown, fits, seed)
     if held_out is not None and len(held_out):
-        figures[split.name] = predict_held_out(
-            problem, result.soil, plain, held_out, split.description
-        )
-    addition = " + ".join(decision.shown.names) if decision.shown else ""
+        figures[split.name] = predict_held_out(posterior, fits, held_out, split.description)
+    addition = " + ".join(shown.hypothesis.effects) if shown else ""
     figures, not_reduced = without_grown(figures, addition)
     beside_remainder, _ = without_grown(beside_remainder, addition)
-    replicates = repeats_that_disagree(problem, shown.fit) if smooth_gap else []
-    if smooth_gap:
-        options = (shown, beside) if suspected else (explained,)
-        taken = bool(decision.claimed and not suspected)
-        own, written = returned_model(problem, result.soil, options, taken)
-        suspected = suspected if set(suspected) <= {*written.fit.effects} else ()
-        learned = learned_remainder(own, written)
-        left = discrepancy_amplitudes(problem, written)
-        intervals = with_uncertain_discrepancy(problem, written)
-        spread = among_candidates(intervals, result.candidates, result.posterior)
-    else:
-        left, learned, written = None, None, explained
-        intervals = with_uncertain_discrepancy(problem, written)
-        spread = by_undetected_effects(problem, result.soil, result.soil_test.signatures)
+    smooth_gap = decision.status not in ("no-gap", "undecided")
+    suspected = predictive_suspect(decision, gains)
+    written = posterior.soil
+    if shown is not None and (decision.claimed or suspected):
+        written = shown
+    replicates = repeats_that_disagree(posterior, written.fit) if smooth_gap else []
+    left = discrepancy_amplitudes(posterior, written) if smooth_gap else None
+    learned = learned_remainder(posterior, written) if smooth_gap else None
     marked = tuple(n for n in suspected if n not in effect_names(case))  # what the case had stays
-    listed = suspects(analysis, decision.claimed) if smooth_gap else []
-    sizes = result.posterior.oversized & {s.effects for s in listed}
-    doubted = [c.fit for c in result.candidates if c.names in sizes]
+    listed = suspects(posterior, decision, gains) if smooth_gap else []
+    doubted = [node for s in listed if s.times_usual and (node := posterior.node_of(s.effects))]
+    explained = shown if decision.claimed and shown is not None else posterior.soil
     report = GapReport(
         status=decision.status,
         sentence="",
-        model=replace(updated_case(intervals, left, learned), suspected=marked),
-        cause_set=cause_set(decision, result),
-        probabilities={n: result.posterior.probability(n) for n in result.posterior.effects()},
-        best_unclaimed=unclaimed_effects(decision, result),
+        model=replace(updated_case(written, left, learned), suspected=marked),
+        cause_set=decision.listed,
+        probabilities={n: posterior.probability(n) for n in posterior.effects()},
+        best_unclaimed=listed[0].effects if listed and not decision.claimed else (),
         reasons=reasons(decision, obstacles, conflicts or replicates),
         gap=figures,
         gap_beside_remainder=beside_remainder,
-        soil_before=soil_estimates(result.soil),
-        soil_after=soil_estimates(intervals, spread),
-        candidates=tuple(candidate_summaries(analysis, claimed=bool(decision.claimed))),
-        untestable=dict(result.untestable),
+        soil_before=soil_before(alone),
+        soil_after=soil_after(posterior, seed),
+        candidates=tuple(candidate_summaries(posterior, decision)),
+        untestable=dict(posterior.untestable),
         notes=(
-            *excluded,
             *checks.notes,
-            *prediction_notes(() if decision.claimed else suspected, analysis, not_reduced),
-            *analysis_notes(analysis, written.fit, [shown.fit, *doubted], replicates),
+            *prediction_notes(() if decision.claimed else suspected, gains, not_reduced),
+            *analysis_notes(
+                posterior,
+                alone,
+                written,
+                [explained, *([shown] if shown else []), *doubted],
+                split.analysed.place,
+            ),
+            *repeat_notes(replicates),
             *grown_channels(figures, addition),
             *(drift if smooth_gap else ()),
-            *(hidden_effect(problem, result) if decision.status == "no-gap" else ()),
+            *(hidden_effect(posterior, alone) if decision.status == "no-gap" else ()),
         ),
-        variance_components=variance_component_entries(analysis),
+        variance_components=variance_component_entries(posterior),
         misfit=agreement,
         trends=tuple(trends),
-        p_gap=result.soil_test.p_value,
-        p_residual=result.final_test.p_value,
+        gap_probability=1.0 - posterior.no_gap,
+        remainder_probability=1.0 - (shown or posterior.soil).share_without,
         seed=seed,
-        curves=readings_and_predictions(analysis, plain),
+        curves=readings_and_predictions(posterior, *fits),
     )
-    if decision.claimed:
-        claimed = decision.claimed
-        if not set(claimed[0].names) <= {*intervals.effects}:  # of a class, and not returned
-            intervals = with_uncertain_discrepancy(problem, shown)
-        similarity = signature_similarity(problem, claimed[0].fit, claimed[0].amplitude)
+    if decision.claimed and shown is not None:
+        similarity = signature_similarity(posterior, shown)
         report = replace(
             report,
-            effects=tuple(named_effects(claimed, intervals, similarity, result.posterior)),
-            mimic_radius=similarity.largest_cosine(claimed[0].names),
+            effects=tuple(named_effects(posterior, decision, similarity)),
+            mimic_radius=similarity.largest_cosine(shown.hypothesis.effects),
         )
     if not smooth_gap:
         return report
-    left_by = shown if decision.shown else beside
-    conditions = conditions_of_suspects(analysis, obstacles)
-    if decision.status == "suspected" and decision.shown:
-        conditions = (*conditions, noise_range(analysis, decision.shown))
+    conditions = conditions_of_suspects(posterior, obstacles)
+    if decision.status == "suspected" and shown is not None:
+        conditions = (*conditions, noise_range(posterior, shown.hypothesis.effects))
+    rivals = competing_explanations(posterior, decision, listed)
     return replace(
         report,
         suspects=tuple(listed),
         conditions=conditions,
-        where=tuple(discrepancy_map(problem, result.soil, seed)),
-        residual_trend=residual_trend(problem, left_by.fit),
-        discrepancy=remaining_discrepancy(problem, beside, left_by),
-        remainder_cause=described_cause(problem, explained, seed),
-        next_runs=tuple(next_runs(problem, competing_explanations(analysis, decision.claimed))),
+        where=tuple(discrepancy_map(posterior, alone)),
+        discrepancy=remaining_discrepancy(posterior, posterior.soil, shown or posterior.soil),
+        remainder_cause=described_cause(posterior, explained, seed),
+        next_runs=tuple(next_runs(posterior, rivals)),
     )
-
-
-def _changed_by_outliers(
-    analysis: Analysis, decision: Decision, obstacles: Sequence[Remark]
-) -> list[Remark]:
-    """A remark where another verdict follows from all readings than without the outliers."""
-    if analysis.of_all is None:
-        return []
-    whole = analysis.of_all
-    result = with_refused_outside(whole.problem, whole.result, {})
-    smooth = result.has_gap and not is_left_open(result)
-    conflicts = [] if smooth else disagreements(whole.problem, result.soil)
-    other = decide(whole.problem, result, obstacles, conflicts)
-    named = [" + ".join(d.shown.names) if d.shown else "no effect" for d in (decision, other)]
-    if (other.status == "no-gap") == (decision.status == "no-gap") and named[0] == named[1]:
-        return []
-    text = (
-        f"the verdict depends on what was excluded: {decision.status} with {named[0]} without it, "
-        f"{other.status} with {named[1]} with it"
-    )
-    return [Remark("outliers-matter", text, analysis.outliers)]
 
 
 def _check_size(table: Table) -> None:
@@ -395,6 +381,5 @@ def _check_size(table: Table) -> None:
         every = -(-count // MOST_READINGS)
         raise InputError(
             f"{table.source}: {count} readings in {len(table)} rows; an analysis takes at most "
-            f"{MOST_READINGS}, because its matrices grow with the square of their number: average "
-            f"replicate rows, or keep one row, or one run, of {every}"
+            f"{MOST_READINGS}: average replicate rows, or keep one row, or one run, of {every}"
         )

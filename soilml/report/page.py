@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 #: Version of the entry `report` in the JSON files: raised where a key changes its meaning or goes.
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 _BLOCK = 1 << 20
 MOST_ROWS = 200  # Most rows of a table on a page; the JSON file has all
 

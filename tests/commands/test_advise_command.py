@@ -137,6 +137,7 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
         "estimate.run(parser.parse_args())\n"
     )
     command = [sys.executable, "-c", code, str(small_model), "runs.csv", "--by", "run"]
+    command += ["--case", "model.toml"]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr

@@ -145,7 +145,8 @@ def test_the_model_that_was_written_carries_what_was_named(done):
     assert effect.name == found["effects"][0]["name"]
     assert effect.n1 == pytest.approx(found["effects"][0]["parameters"]["n1"]["value"], rel=1e-5)
     for name, value in found["soil_after"].items():
-        assert float(getattr(case.soil, name)) == pytest.approx(value["value"], rel=1e-5)
+        away = abs(float(getattr(case.soil, name)) - value["value"])
+        assert away < 1.5 * value["std"]  # the soil by all explanations together
 
 
 def analysed(inputs, tmp_path, capsys, *arguments):

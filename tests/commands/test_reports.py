@@ -81,7 +81,7 @@ def test_a_report_is_a_page_and_a_file_with_what_was_asked_and_found(folder, kin
     assert "@media print" in html and "prefers-color-scheme: dark" in html
     assert "img" in seen.tags and "table" in seen.tags
     entry = json.loads((place / "report.json").read_text())["report"]
-    assert (entry["format"], entry["version"], entry["kind"]) == ("soilml-report", 2, kind)
+    assert (entry["format"], entry["version"], entry["kind"]) == ("soilml-report", 3, kind)
     assert entry["command"] in seen.text
     sums = {Path(f["name"]).name: f["sha256"] for f in entry["files"]}
     assert sums["runs.csv"] == hashlib.sha256(RUNS.encode()).hexdigest()

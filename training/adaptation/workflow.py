@@ -17,7 +17,7 @@ from soilml.errors import InputError
 from soilml.gap import gap
 from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
 from soilml.gap.presentation import gap_files
-from soilml.gap.search.analysis import OUTSIDE_PRIORS
+from soilml.gap.verdict.decision import OUTSIDE_PRIORS
 from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
 from soilml.io.atomic_files import create_folder, write_files

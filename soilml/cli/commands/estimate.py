@@ -127,6 +127,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
+    from soilml.experiment_design.advice_after_results import trained_case
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.bounds import ESTIMATES
@@ -164,7 +165,9 @@ def run(args: argparse.Namespace) -> int:
         return 0
     for estimator in estimators:
         check_table_wheel(estimator, table)
-    print_table_hints(table, case, presentation.trained_radius(estimators[0]))
+    trained = None if case is not None else trained_case(estimators[0])
+    hinted = case if trained is None else trained[0]
+    print_table_hints(table, hinted, presentation.trained_radius(estimators[0]))
     complete = [table_estimates.complete_rows(estimator, table) for estimator in estimators]
     usable = [rows & table.answered for rows in complete]
     if not np.any(usable):

@@ -11,6 +11,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError, raised
 from soilml.fitting.candidate_effects import effect_names
 from soilml.fitting.coordinates import rates_at
+from soilml.fitting.covariance import Whitening
 from soilml.fitting.least_squares import Solution
 from soilml.fitting.predictions import (
     Linearisation,
@@ -22,9 +23,10 @@ from soilml.fitting.readings import Readings
 from soilml.gap.design.planned_readings import readings_like, with_default_covariates
 from soilml.gap.design.run_kinds import SENSOR_CHECKS, SOIL_TESTS
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.evidence.problem import FitProblem, covariance_at
 from soilml.gap.report.results import NextRun
-from soilml.gap.search.explanation import Explanation
+from soilml.inference.explanation import Explanation
+from soilml.inference.gaussian_terms import scatter_columns, terms_like
+from soilml.inference.posterior import Posterior
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import column
@@ -43,7 +45,7 @@ LEAST_SQUARES_TOLERANCE = 1e-10
 Difference = tuple[Floats, Floats]
 
 
-def next_runs(problem: FitProblem, explanations: Sequence[Explanation]) -> list[NextRun]:
+def next_runs(posterior: Posterior, explanations: Sequence[Explanation]) -> list[NextRun]:
     """Runs and checks ranked by how well they discriminate the first explanation from the others.
 
     The discrimination is the expected increase, in sigma, of the misfit of a rival that adapts all
@@ -53,16 +55,15 @@ def next_runs(problem: FitProblem, explanations: Sequence[Explanation]) -> list[
     """
     if len(explanations) < 2:
         return []
-    fits = {"+".join(c.names): c.fit for c in explanations[:COMPARED]}
+    readings, known = posterior.terms.readings, posterior.problem.effects
+    fits = {_in_words(node): node.fit for node in explanations[:COMPARED]}
     first, *rivals = fits.values()
-    effects = [
-        problem.effects[name] for name in _effects_of(fits.values()) if name in problem.effects
-    ]
-    whiten = problem.covariance.whiten
+    effects = [known[name] for name in _effects_of(fits.values()) if name in known]
+    whiten = posterior.whiten
     present = [_difference(whiten, first.prediction, rival.linearisation) for rival in rivals]
     proposals: list[NextRun] = []
-    options = _expected(problem, fits, run_options(problem.readings, first.fitted(), effects))
-    for run, new in zip(options, _differences_each(problem, options), strict=True):
+    options = _expected(readings, fits, run_options(readings, first.fitted(), effects))
+    for run, new in zip(options, _differences_each(posterior, options), strict=True):
         if new is None:
             continue
         _, *others = run.fits.values()
@@ -77,7 +78,7 @@ def next_runs(problem: FitProblem, explanations: Sequence[Explanation]) -> list[
             rows = _rows(run.readings, dict(zip(run.fits, run.predicted, strict=True)), run.option)
             proposals.append(NextRun(run.option.kind, run.option.text, _mean_capped(sigmas), rows))
     proposals += _static_proposals(fits, present, effects)
-    compared = tuple(dict.fromkeys(c.names for c in explanations[:COMPARED]))
+    compared = tuple(dict.fromkeys(node.hypothesis.effects for node in explanations[:COMPARED]))
     useful = [
         replace(run, compared=compared)
         for run in _without_equal_rows(proposals)
@@ -100,8 +101,12 @@ class _ExpectedRun:
         return replace(self.readings, at=with_default_covariates(self.readings.at, fit.case))
 
 
+def _in_words(node: Explanation) -> str:
+    return "+".join(node.hypothesis.effects) or "soil alone"
+
+
 def _expected(
-    problem: FitProblem, fits: Mapping[str, Solution], options: Iterable[RunOption]
+    like: Readings, fits: Mapping[str, Solution], options: Iterable[RunOption]
 ) -> list[_ExpectedRun]:
     """What the explanations predict for runs; those that they refuse, and repeats, are left out."""
     asked: list[tuple[RunOption, dict[str, Solution], int]] = []
@@ -112,7 +117,7 @@ def _expected(
         for at in ways:
             for fit in changed.values():
                 whole = with_default_covariates(at, fit.case)
-                readings = Readings.of_every_row(whole, problem.readings.channels)
+                readings = Readings.of_every_row(whole, like.channels)
                 requests.append(
                     PredictionRequest(fit.case, fit.coordinates, fit.x[None, :], readings)
                 )
@@ -125,14 +130,14 @@ def _expected(
             continue
         y = np.concatenate([raised(one) for one in own]).reshape(count, len(changed), -1)
         case = next(iter(changed.values())).case
-        readings = readings_like(option.at, problem.readings, case, y[0, 0], option.kind)
+        readings = readings_like(option.at, like, case, y[0, 0], option.kind)
         if not _is_plain_repeat(readings, y):
             expected.append(_ExpectedRun(option, changed, readings, y[0]))
     return expected
 
 
 def _differences_each(
-    problem: FitProblem, runs: Sequence[_ExpectedRun]
+    posterior: Posterior, runs: Sequence[_ExpectedRun]
 ) -> list[list[Difference] | None]:
     """How the first explanation differs from the others in each run; None where one is refused."""
     requests = [
@@ -146,15 +151,18 @@ def _differences_each(
         one, *others = run.fits.values()
         own = [next(linear) for _ in others]
         try:
-            whiten = covariance_at(problem, one, run.readings).whiten
+            columns = scatter_columns(one.fitted(), run.readings)
+            terms, at = terms_like(posterior.terms, posterior.noise, run.readings, columns)
+            whiten = terms.whiten(at, np.zeros(len(run.readings), bool))
             found.append([_difference(whiten, run.predicted[0], raised(line)) for line in own])
         except (InputError, np.linalg.LinAlgError):
             found.append(None)
     return found
 
 
-def _difference(whiten: Floats, expected: Floats, rival: Linearisation) -> Difference:
-    return whiten @ (expected - rival.prediction), whiten @ rival.jacobian
+def _difference(whiten: Whitening, expected: Floats, rival: Linearisation) -> Difference:
+    change, jacobian = expected - rival.prediction, np.asarray(rival.jacobian)
+    return np.asarray(whiten @ change), np.asarray(whiten @ jacobian)
 
 
 def _effects_of(fits: Iterable[Solution]) -> list[str]:

@@ -21,7 +21,7 @@ from soilml.fitting.usable_readings import answered_rows
 from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
 from soilml.gap.design.run_kinds import check_costs
 from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.evidence.score_test import SignatureSimilarity
+from soilml.gap.evidence.similarity import SignatureSimilarity
 from soilml.gap.report.results import as_json_entry
 from soilml.io.read_table import Rows, as_table
 from soilml.parameters import declared

@@ -1,22 +1,21 @@
-"""Prediction of rows that were kept back, by refits of explanations to all other rows."""
+"""Prediction of rows that were kept back."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.fitting.covariance import Whitening
 from soilml.fitting.damped_descents import descend_together
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.marginal_likelihood import WEAK_PRECISION
-from soilml.gap.evidence.problem import FitProblem
-from soilml.numerics.prior import UNIFORM_PRECISION
+from soilml.inference.conditional import conditional
+from soilml.inference.explanation import Explanation
+from soilml.inference.posterior import Names, Posterior
 
 #: The parts that are held out, by their keys in a report.
 RUNS, REGION, SLIPS = "held_out_runs", "held_out_region", "held_out_slips"
@@ -27,6 +26,10 @@ REGION_FRACTION = 0.3
 MOST_SLIP_LEVELS = 8
 #: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
 INFEASIBLE_SQUARE = 100.0
+#: Least standard error of a gain, in nats, by which it is judged: a difference of log densities
+#: below 1 is no evidence. Kass and Raftery, Journal of the American Statistical Association 90,
+#: 1995, section 3.2, call twice such a difference below 2 "not worth more than a bare mention".
+LEAST_ERROR = 1.0
 
 
 @dataclass(frozen=True)
@@ -93,113 +96,107 @@ def held_out_region(readings: Readings) -> tuple[str, NDArray[np.bool_]] | None:
     return name, values >= edge
 
 
-@dataclass(frozen=True)
-class HeldOutPrediction:
-    """Predictions of the readings of one part, each by a fit to all readings outside its fold.
+def predicted_by_refits(
+    posterior: Posterior, fits: Sequence[Solution], parts: Mapping[str, Folds]
+) -> list[dict[str, Floats]]:
+    """Predictions (m,) of all parts by each fit, refitted without each fold; NaN outside.
 
-    `log_densities` are the logarithms of the probability density of each fold's readings, with the
-    variance of noise, scatter, remainder and parameters.
+    Under noise and scatter alone; without equilibrium, or where the model refuses the fit, NaN.
     """
-
-    mean: Floats  # (m,), NaN outside the part and without equilibrium
-    std: Floats  # (m,) of a reading, NaN outside the part
-    log_densities: tuple[float, ...] = ()
-
-    @property
-    def log_density(self) -> float:
-        """The logarithm of the density of all readings of the part."""
-        return sum(self.log_densities)
-
-
-def predict_parts(
-    problem: FitProblem, models: Sequence[tuple[Solution, Floats]], parts: Mapping[str, Folds]
-) -> list[dict[str, HeldOutPrediction]]:
-    r"""Predict all parts by each of several models, which are refitted without each fold.
-
-    .. math::
-        y_o \sim N(f_o + A (y_r - f_r),\; V_{oo} - A V_{ro} + B \Sigma B^T), \quad
-        A = V_{or} V_{rr}^{-1}, \quad B = J_o - A J_r
-
-    with the covariance V of noise, scatter and remainder, the predictions f and derivatives J of
-    the fit to the rest r, and the covariance of its coordinates. All fits share the calls of the
-    model. A fold without a fit counts as ten standard deviations away.
-
-    models: Fits to all readings, from which the refits start, with the amplitudes of the smooth
-        remainder by channel; zero for fits under noise and scatter alone.
-
-    References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.25,
-    2.26 and 2.41.
-    """
-    readings = problem.readings
+    readings = posterior.terms.readings
     problems, starts, where = [], [], []
     for name, folds in parts.items():
         for number in folds.predicted:
-            rest = folds.fold != number
-            known = problem.discrepancy.of_readings(rest, readings.run[readings.row])
-            for i, (fit, amplitude) in enumerate(models):
-                whiten = of_selected(known.whiten(amplitude), rest)
+            out = folds.fold == number
+            whiten = posterior.terms.whiten(posterior.noise, posterior.outliers | out)
+            for i, fit in enumerate(fits):
                 problems.append(LeastSquaresProblem(fit.case, fit.coordinates, readings, whiten))
                 starts.append(fit)
-                where.append((i, name, rest))
-    fits = descend_together(
-        problems, [fit.x for fit in starts], [fit.linearisation for fit in starts]
-    )
-    covariance = [problem.discrepancy.matrix(amplitude) for _, amplitude in models]
-    found = [{name: _nothing_yet(len(readings)) for name in parts} for _ in models]
-    for (i, name, rest), solved in zip(where, fits, strict=True):
-        part = found[i][name]
-        if isinstance(solved, InputError):
-            std = problem.covariance.std[~rest]
-            part.std[~rest], log_density = std, _density_of_nothing(std)
-        else:
-            part.mean[~rest], part.std[~rest], log_density = _conditional(
-                solved, readings.measured, covariance[i], rest
-            )
-        found[i][name] = replace(part, log_densities=(*part.log_densities, log_density))
+                where.append((i, name, out))
+    found = descend_together(problems, [f.x for f in starts], [f.linearisation for f in starts])
+    means = [{name: np.full(len(readings), np.nan) for name in parts} for _ in fits]
+    for (i, name, out), solved in zip(where, found, strict=True):
+        if not isinstance(solved, InputError):
+            means[i][name][out] = solved.prediction[out]
+    return means
+
+
+def predicted_beside_remainder(node: Explanation, folds: Folds) -> Floats:
+    """Predictions (m,) of a part by a node beside its remainder, to first order; NaN outside."""
+    mean = np.full(len(folds.fold), np.nan)
+    for number in folds.predicted:
+        out = folds.fold == number
+        given = conditional(node.linear.without(node.outliers | out), node.at)
+        mean[out] = (node.fit.prediction + given.expected)[out]
+    return mean
+
+
+@dataclass(frozen=True)
+class PredictiveGain:
+    """Log density of rows kept back, above that of the soil alone, and its standard error.
+
+    The error is that of a sum over folds that differ by chance; a part that is one fold adds none.
+    It is None where every part is one fold, since nothing then tells it.
+    """
+
+    value: float
+    std_error: float | None = None
+
+    @property
+    def is_better(self) -> bool:
+        """Whether the rows are predicted better than by the soil alone."""
+        return self.value > 0.0
+
+    @property
+    def is_worse(self) -> bool:
+        """Whether they are predicted worse, beyond what folds differ by chance."""
+        return self.value <= -max(self.std_error or 0.0, LEAST_ERROR)
+
+    @property
+    def is_clearly_better(self) -> bool:
+        """Whether they are predicted better, beyond what folds differ by chance."""
+        return self.value >= max(self.std_error or 0.0, LEAST_ERROR)
+
+
+def predictive_gain(
+    posterior: Posterior, node: Explanation, parts: Mapping[str, Folds]
+) -> PredictiveGain | None:
+    """Log density of the rows kept back by a node, above that of the soil alone, mean over parts.
+
+    Both beside their remainders, which are told by all readings, and so is the scatter. Where each
+    slip is predicted, its ends are among them, and the region of high slips does not count again.
+    None where nothing can be kept back.
+
+    References: Vehtari, Gelman and Gabry, Statistics and Computing 27, 2017, eq. 24 (the sampling
+    error).
+    """
+    counted = sorted(part for part in parts if part != REGION or SLIPS not in parts)
+    by_fold = [
+        np.asarray(
+            [
+                posterior.log_density(node, parts[part].fold == number)
+                - posterior.log_density(posterior.soil, parts[part].fold == number)
+                for number in parts[part].predicted
+            ]
+        )
+        for part in counted
+    ]
+    if not by_fold:
+        return None
+    variances = [len(d) * float(np.var(d, ddof=1)) for d in by_fold if len(d) > 1]
+    error = float(np.sqrt(sum(variances))) / len(by_fold) if variances else None
+    return PredictiveGain(float(np.mean([d.sum() for d in by_fold])), error)
+
+
+def predictive_gains(
+    posterior: Posterior, sets: Sequence[Names], seed: int
+) -> dict[Names, PredictiveGain]:
+    """How some sets of effects predict rows kept back, beside the soil alone."""
+    parts = held_out_folds(posterior.terms.readings, seed)
+    found = {}
+    for names in sets:
+        node = posterior.node_of(names)
+        gain = None if node is None else predictive_gain(posterior, node, parts)
+        if gain is not None:
+            found[names] = gain
     return found
-
-
-def of_selected(whiten: Whitening, selected: NDArray[np.bool_]) -> Whitening:
-    """What whitens selected readings out of m, for arrays (m,) and (m, k) of all of them."""
-    noise = whiten.noise  # sparse: its columns become those of the selected readings
-    parts = noise.data, np.flatnonzero(selected)[noise.indices], noise.indptr
-    return replace(whiten, noise=type(noise)(parts, shape=(noise.shape[0], len(selected))))
-
-
-def _nothing_yet(count: int) -> HeldOutPrediction:
-    return HeldOutPrediction(np.full(count, np.nan), np.full(count, np.nan))
-
-
-def _conditional(
-    fit: Solution, reading: Floats, matrix: Floats, rest: NDArray[np.bool_]
-) -> tuple[Floats, Floats, float]:
-    """Mean and standard deviation of readings that are not in the rest, and their log density."""
-    out, prediction, jacobian = ~rest, fit.prediction, fit.derivatives
-    gain = np.linalg.solve(matrix[np.ix_(rest, rest)], matrix[np.ix_(rest, out)]).T
-    left = np.nan_to_num(reading[rest] - prediction[rest])
-    mean = prediction[out] + gain @ left
-    change = jacobian[out] - gain @ jacobian[rest]
-    covariance = matrix[np.ix_(out, out)] - gain @ matrix[np.ix_(rest, out)]
-    covariance = covariance + change @ _coordinate_covariance(fit) @ change.T
-    std = np.sqrt(np.diag(covariance))
-    if not np.isfinite(mean).all():
-        return mean, std, _density_of_nothing(std)
-    factor = np.linalg.cholesky(covariance)
-    white = np.linalg.solve(factor, reading[out] - mean)
-    log_density = -0.5 * float(white @ white + np.log(2.0 * np.pi) * len(white))
-    return mean, std, log_density - float(np.log(np.diag(factor)).sum())
-
-
-def _coordinate_covariance(fit: Solution) -> Floats:
-    """Covariance (p, p) of coordinates whose priors are as wide as they are."""
-    wide = [WEAK_PRECISION if c.effect else UNIFORM_PRECISION for c in fit.coordinates]
-    wide = [own if np.isinf(c.std) else 0.0 for own, c in zip(wide, fit.coordinates, strict=True)]
-    jacobian = np.vstack([fit.jacobian, fit.soil_tests.rates(fit.x)])
-    information = jacobian.T @ jacobian + np.diag(fit.precision + np.asarray(wide))
-    return np.asarray(np.linalg.inv(information))
-
-
-def _density_of_nothing(std: Floats) -> float:
-    """Log density of readings that are not predicted: each is ten standard deviations away."""
-    each = INFEASIBLE_SQUARE + np.log(2.0 * np.pi * std**2)
-    return -0.5 * float(each.sum())

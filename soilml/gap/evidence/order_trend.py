@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.fitting.least_squares import Solution
 from soilml.fitting.readings import Readings
-from soilml.gap.evidence.covariance import RUN_EFFECT_UNITS, run_effect_columns
-from soilml.gap.evidence.directions import smooth_basis
-from soilml.gap.evidence.problem import FitProblem
-from soilml.gap.evidence.score_test import score_test
+from soilml.gap.evidence.family_wise import family_wise_p, scores
 from soilml.gap.report.results import SoilTrend
+from soilml.inference.constants import SCATTER_UNITS
+from soilml.inference.gaussian_terms import scatter_columns
+from soilml.inference.posterior import Posterior
 from soilml.numerics.subspaces import project_out
 
 #: Family-wise level of the tests, and fewest runs whose order can show a trend: of five, one order
@@ -25,48 +24,53 @@ MOST_EXPLAINED, DEGREE = 0.9, 2
 MOST_ONE_WAY = 0.7
 #: What changes in a trend, and the unit of its column among those of the run-to-run variation.
 PARAMETERS = (
-    ("friction angle", float(RUN_EFFECT_UNITS["friction_angle"])),
-    ("bearing strength", RUN_EFFECT_UNITS["bearing"]),
+    ("friction angle", SCATTER_UNITS["friction_angle"]),
+    ("bearing strength", SCATTER_UNITS["bearing"]),
 )
 
 
-def order_trends(problem: FitProblem, soil: Solution, seed: int) -> list[SoilTrend]:
+def order_trends(posterior: Posterior, seed: int) -> list[SoilTrend]:
     r"""Tests of a soil that changes evenly along the order of runs, or of a run's rows.
 
     .. math:: g_k(o) = P W (J_k o), \quad z = g_k(o) \cdot W r / |g_k(o)|
 
     with J_k the change of the readings with friction angle or bearing strength, o the centred
-    order, W the whitening by noise and scatter from run to run, and P the projection off the soil
-    and off smooth functions of slip and load. Along the runs, the p value is that of the largest
-    score among all orders of the runs, which needs no knowledge of the scatter; along the rows of
-    a run, scores are compared with those of noise. Both are family-wise, over parameters and
-    orders.
+    order, W the whitening by noise, scatter from run to run and a smooth discrepancy beside the
+    soil alone, and P the projection off the soil. Along the runs, the p value is that of the
+    largest score among all orders of the runs, which needs no knowledge of the scatter; along the
+    rows of a run, scores are compared with those of noise. Both are family-wise, over parameters
+    and orders.
 
     Empty where the order is that of slip or load, or runs are few.
 
     References: Edgington and Onghena, Randomization Tests, 2007, section 3.4; Rao, Proc. Cambridge
     Phil. Soc. 44, 1948 (score test).
     """
-    readings = problem.readings
+    readings, soil = posterior.terms.readings, posterior.soil
     among_runs, within = _orders(readings)
     tests = (among_runs is not None) + (within is not None)
     if not tests:
         return []
-    columns = run_effect_columns(soil.fitted(), readings)
-    whiten = problem.discrepancy.whiten(problem.declared_amplitude)
-    fit = soil.whitened_by(whiten)
-    explained = np.hstack([fit.jacobian, whiten @ smooth_basis(readings)])
+    columns = scatter_columns(soil.fit.fitted(), readings)
+    whiten = posterior.terms.whiten(soil.beside.at, soil.outliers)
+    residual = np.asarray(whiten @ soil.linear.residual)
+    explained = np.asarray(whiten @ soil.fit.derivatives)
     found = []
     if among_runs is not None:
         own = readings.run[readings.row][:, None] == np.arange(len(readings.runs))
         by_run = [
-            project_out(whiten @ (columns[:, k : k + 1] * own), explained)
+            project_out(np.asarray(whiten @ (columns[:, k : k + 1] * own)), explained)
             for k in range(len(PARAMETERS))
         ]
-        found += _along_runs(by_run, fit.residual, among_runs, tests, seed)
+        found += _along_runs(by_run, residual, among_runs, tests, seed)
     if within is not None:
-        trend = project_out(whiten @ (columns * within[readings.row][:, None]), explained)
-        found += _along_rows(problem, trend, fit.residual, tests, seed)
+        trend = np.asarray(whiten @ (columns * within[readings.row][:, None]))
+        z = scores(residual, trend, explained)
+        own_trend = project_out(trend, explained)
+        size = (own_trend.T @ residual) / np.maximum((own_trend**2).sum(axis=0), 1e-12)
+        for k, score in enumerate(z):
+            p = min(1.0, tests * family_wise_p(float(score), len(z)))
+            found.append(_trend("rows", k, float(score), p, float(size[k])))
     return sorted(found, key=lambda one: one.p)
 
 
@@ -81,35 +85,17 @@ def _along_runs(
     squares = np.maximum(squares, 1e-12)
     z = products / np.sqrt(squares)
     largest = np.abs(z[1:]).max(axis=1)
-    return [
-        _trend("runs", k, z[0, k], largest, products[0, k] / squares[0, k], tests)
-        for k in range(len(by_run))
-    ]
+    found = []
+    for k in range(len(by_run)):
+        at_least = float(np.sum(largest >= abs(z[0, k]) - 1e-9))
+        p = min(1.0, tests * (at_least + 1.0) / (len(largest) + 1.0))
+        found.append(_trend("runs", k, float(z[0, k]), p, float(products[0, k] / squares[0, k])))
+    return found
 
 
-def _along_rows(
-    problem: FitProblem, trend: Floats, residual: Floats, tests: int, seed: int
-) -> list[SoilTrend]:
-    """Trends with the order of the rows of each run; `trend` has the columns (m, parameters)."""
-    test = score_test(
-        residual,
-        columns=trend,
-        space=trend[:, :0],
-        signs=np.zeros(trend.shape[1]),
-        degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
-        seed=seed,
-    )
-    size = (trend.T @ residual) / np.maximum((trend**2).sum(axis=0), 1e-12)
-    return [
-        _trend("rows", k, float(np.copysign(z, size[k])), test.null_maxima, size[k], tests)
-        for k, z in enumerate(test.z)
-    ]
-
-
-def _trend(order: str, k: int, z: float, null: Floats, units: float, tests: int) -> SoilTrend:
+def _trend(order: str, k: int, z: float, p: float, units: float) -> SoilTrend:
     name, unit = PARAMETERS[k]
-    p = (float(np.sum(null >= abs(z) - 1e-9)) + 1.0) / (len(null) + 1.0)
-    return SoilTrend(order, name, float(z), min(1.0, tests * p), float(units * unit))
+    return SoilTrend(order, name, z, p, units * unit)
 
 
 def _orders(readings: Readings) -> tuple[Floats | None, Floats | None]:

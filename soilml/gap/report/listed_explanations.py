@@ -92,7 +92,7 @@ def next_run_in_words(run: NextRun) -> str:
     """The first of the next runs, which explanations it separates, and by how much."""
     sigma = "10 or more" if run.discrimination >= 10.0 else decimal(run.discrimination, 2)
     cost = "" if run.cost is None else f" at a cost of {run.cost:g}"
-    first, *rivals = [" + ".join(names) for names in run.compared]
+    first, *rivals = [" + ".join(names) or "the soil alone" for names in run.compared]
     against = rivals[0]
     if len(rivals) > 1:
         against += f" and {len(rivals) - 1} other{'s' if len(rivals) > 2 else ''}"

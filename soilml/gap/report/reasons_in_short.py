@@ -32,6 +32,7 @@ _IN_SHORT = {
 #: Those about an explanation, whose effects take the place of the braces.
 _OF_EXPLANATION = {
     "implausible-fault": "{} would be an implausibly large fault",
+    "unchecked-fault": "{} is a fault that nothing has checked",
     "implausible-size": "{} would have to be implausibly large",
     "not-predictive": "beside a smooth remainder, {} predicts rows kept back no better than the "
     "soil alone",

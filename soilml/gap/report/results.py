@@ -120,12 +120,12 @@ class GapReduction:
 
 @dataclass(frozen=True)
 class CandidateSummary:
-    """A candidate: predicted and achieved decrease of the objective, and its verdict."""
+    """A candidate: predicted and achieved decrease of -2 ln p, and its verdict."""
 
     effects: tuple[str, ...]
     predicted_gain: float
     achieved_gain: float
-    excess: float  # objective above that of the best candidate
+    excess: float  # -2 ln p above that of the best candidate
     verdict: Remark
 
 
@@ -313,14 +313,14 @@ class GapReport:
         Conclusions that the report does not support.
     variance_components : dict of float
         Estimated noise scales, run-to-run standard deviations and autocorrelation.
-    residual_trend : dict of float
-        Unexplained smooth trend by channel, in sigma.
     misfit : NoiseAgreement, optional
         Residuals of the soil alone under the declared noise, and with scatter.
     trends : tuple of SoilTrend
         Trends of the soil with the order of runs and rows, the most significant first.
-    p_gap, p_residual : float
-        Family-wise p values of the soil alone and of the best candidate.
+    gap_probability : float
+        Posterior probability that noise and scatter alone do not explain what the soil leaves.
+    remainder_probability : float
+        Posterior probability of a smooth discrepancy beside what is shown.
     """
 
     status: str
@@ -348,11 +348,10 @@ class GapReport:
     notes: tuple[Remark, ...] = ()
     not_claimed: tuple[Remark, ...] = ()
     variance_components: dict[str, float] = field(default_factory=dict)
-    residual_trend: dict[str, float] = field(default_factory=dict)
     misfit: NoiseAgreement | None = None
     trends: tuple[SoilTrend, ...] = ()
-    p_gap: float = 1.0
-    p_residual: float = 1.0
+    gap_probability: float = 0.0
+    remainder_probability: float = 0.0
     seed: int = 0
     curves: ReadingsAndPredictions | None = field(default=None, metadata=ELSEWHERE)
 

@@ -27,7 +27,6 @@ from soilml.remarks import Remark
 from soilml.report.numbers import (
     channel_name,
     decimal,
-    format_p_value,
     format_probability,
     format_residual,
 )
@@ -76,11 +75,11 @@ def headline(report: GapReport) -> str:
             which = " that no effect explains better than a smooth error"
             if faults:
                 which = f", which only an implausibly large {' + '.join(faults[0].about)} explains"
-            pattern = format_p_value(report.p_gap).replace("\N{NO-BREAK SPACE}", " ")
+            sure = f"probability {format_probability(report.gap_probability)}"
             size = f"mean squared residual {_before(report)}; noise alone gives 1"
             if "train" in report.gap and report.gap["train"].before < LIKE_NOISE:
                 size = "residuals form a pattern that noise does not"
-            return f"There is a gap{which} ({size}; {pattern})."
+            return f"There is a gap{which} ({size}; {sure})."
         case "suspected":
             first = report.suspects[0] if report.suspects else None
             names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
@@ -145,7 +144,7 @@ def _faults(report: GapReport) -> str:
 def _no_gap(report: GapReport) -> str:
     declared = " and the declared discrepancy" if report.model.discrepancy else ""
     beside = " and declared discrepancy" if report.model.discrepancy else ""
-    p = f"p = {decimal(report.p_gap, 2)}."
+    p = f"probability of a gap {format_probability(report.gap_probability)}."
     if report.misfit is None or not report.misfit.grants_scatter:
         residual = format_residual(report.gap["train"].before, 2)
         return (

@@ -9,22 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.fitting.covariance import DiscrepancyProcess
-from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.held_out import Folds, held_out_folds
-from soilml.gap.evidence.linearised_fit import AMPLITUDES, ProcessDivisions
-from soilml.gap.evidence.marginal_likelihood import TEMPERING, DiscrepancyModel, linearised
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.evidence.held_out import held_out_folds
 from soilml.gap.evidence.stage_changes import stage_changes
 from soilml.gap.report.remainder_cause import RemainderCause
-from soilml.gap.search.posterior import IN_CATALOGUE
-from soilml.numerics.prior import UNIFORM_PRECISION
+from soilml.inference.conditional import conditional
+from soilml.inference.constants import IN_CATALOGUE, UNKNOWN_CAUSE, UNKNOWN_SCALE
+from soilml.inference.evidence import LinearisedFit
+from soilml.inference.explanation import Explanation
+from soilml.inference.gaussian_terms import FIXED, Hyperparameters
+from soilml.inference.posterior import Posterior
 from soilml.numerics.smooth_process import process_columns
 from soilml.physics.operating_point import COVARIATES
 
 #: Correlation lengths of a change: in slip, in the logarithms of load and of sinkage, and of other
 #: quantities as a share of their range. Those of slip and load are those of a discrepancy.
 SLIP_LENGTH, LOG_LENGTH, SHARE_OF_RANGE = 0.3, 0.6, 0.5
+#: Amplitudes of a change that are tried, in usual ones: steps of a factor of about 1.6, which
+#: change the evidence by less than 1 near its maximum.
+AMPLITUDES = np.asarray([0.15, 0.25, 0.4, 0.6, 1.0, 1.6, 2.5, 4.0, 6.3, 10.0, 16.0, 25.0])
+#: Factor on differences of the evidence: amplitudes at their maximum overstate it.
+TEMPERING = 0.5
+#: Amplitude of a discrepancy, relative to that beside the fit, that a change may leave.
+SMALLER = 0.4
 #: Usual size of a change of one channel, as a share of its prediction.
 USUAL_GAIN = 0.05
 #: Odds of a stage against all others together, from which it is stated, and of a dependence.
@@ -39,7 +45,7 @@ SEVERAL = "several causes"
 
 
 @dataclass(frozen=True)
-class Hypothesis:
+class StageHypothesis:
     """A change at one stage that is a smooth function of one variable.
 
     columns: Changes (m, k) of the readings with k independent standard normal weights.
@@ -51,10 +57,11 @@ class Hypothesis:
     variable: str
     columns: Floats
     value: float = np.inf
-    amplitude: tuple[float, ...] = ()
+    at: Hyperparameters | None = None
+    amplitude: float = 0.0
 
 
-def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> RemainderCause | None:
+def described_cause(posterior: Posterior, node: Explanation, seed: int) -> RemainderCause | None:
     r"""The stage of the cause of the remainder beside a fit; None where the readings do not tell.
 
     Each change g of a stage, and each change of one channel, is multiplied by a smooth function h
@@ -72,34 +79,34 @@ def described_cause(problem: FitProblem, marginal: MarginalFit, seed: int) -> Re
     Computation 4(3), 1992, section 2 (the evidence); Vehtari and Ojanen, Statistics Surveys 6,
     2012, section 2 (the log score).
     """
-    fit = marginal.fit
-    if not marginal.evidence.amplitude.any() or len(problem.readings.channels) < 2:
+    readings, fit = posterior.terms.readings, node.fit
+    if not node.at.present or len(readings.channels) < 2:
         return None
-    angle = problem.readings.at.slip_angle
+    angle = readings.at.slip_angle
     if angle is not None and np.ptp(angle) > 0.0:  # no change here turns the shear stress aside
         return None
     if not np.isfinite([*fit.prediction, *fit.linearisation.log_sinkage]).all():
         return None
-    none, found = weighed(problem, marginal)
+    none, found = weighed(posterior, node)
     stage, probability = likeliest_stage(none, found)
     if not probability > STATED_ODDS / (1.0 + STATED_ODDS):
         return None
     own = [one for one in found if one.stage == stage]
     best = min(own, key=lambda one: one.value)
-    gain = _predictive_gain(problem, marginal, best, seed)
+    gain = _predictive_gain(posterior, node, best, seed)
     if not gain > 0.0:
         return None
     variable, share = _likeliest(
         {v: [one.value for one in own if one.variable == v] for v in {o.variable for o in own}}
     )
     told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
-    channels = _changed_channels(problem, fit, best)
+    channels = _changed_channels(posterior, node, best)
     probability *= IN_CATALOGUE  # as of any cause that is stated
-    beside = tuple(dict.fromkeys(c.effect for c in fit.coordinates if c.effect))
+    beside = node.hypothesis.effects
     return RemainderCause(stage, variable if told else "", channels, probability, gain, beside)
 
 
-def likeliest_stage(none: float, found: Sequence[Hypothesis]) -> tuple[str, float]:
+def likeliest_stage(none: float, found: Sequence[StageHypothesis]) -> tuple[str, float]:
     """The stage of largest probability, and that.
 
     Several causes together, which have the probability `NO_STAGE` beforehand, are no stage: where
@@ -132,60 +139,81 @@ def _log_mean(values: Sequence[float]) -> float:
 
 
 def _predictive_gain(
-    problem: FitProblem, marginal: MarginalFit, best: Hypothesis, seed: int
+    posterior: Posterior, node: Explanation, best: StageHypothesis, seed: int
 ) -> float:
     """Log density of rows kept back with the change, above that without; nil without such rows."""
-    parts = held_out_folds(problem.readings, seed)
-    if not parts:
-        return 0.0
-    fit, amplitude = marginal.fit, marginal.evidence.amplitude
-    without = log_score(problem, fit, problem.discrepancy, amplitude, parts)
-    own = np.asarray(best.amplitude)
-    having = log_score(problem, fit, with_change(problem, best), own, parts)
-    return float(np.mean([having[name] - without[name] for name in parts]))
+    parts = held_out_folds(posterior.terms.readings, seed)
+    assert best.at is not None
+    models = [(node.linear, node.at), (_with_change(node.linear, best), best.at)]
+    sums = []
+    for folds in parts.values():
+        without, having = (
+            sum(_log_density(model, at, folds.fold == k) for k in folds.predicted)
+            for model, at in models
+        )
+        sums.append(having - without)
+    return float(np.mean(sums)) if sums else 0.0
 
 
-def _changed_channels(problem: FitProblem, fit: Solution, best: Hypothesis) -> tuple[str, ...]:
-    """Channels that the change moves by more than `NOTICED`, root mean square in their noise."""
-    model, own = with_change(problem, best), np.asarray(best.amplitude)
-    size = own[-1] * best.columns
-    matrix = model.matrix(own) + fit.derivatives @ fit.derivatives.T / UNIFORM_PRECISION
-    residual = problem.readings.measured - fit.prediction
-    moved = size @ (size.T @ np.linalg.solve(matrix, residual)) / problem.covariance.std
-    channel = problem.readings.channel
-    return tuple(
-        name
-        for i, name in enumerate(problem.readings.channels)
-        if np.sqrt(np.mean(moved[channel == i] ** 2)) > NOTICED
+def _log_density(model: LinearisedFit, at: Hyperparameters, out: NDArray[np.bool_]) -> float:
+    """Log density of the readings that are kept back, given the others."""
+    rest = model.without(model.outliers | out)
+    return -0.5 * (model.evaluate(at).value - rest.evaluate(at).value)
+
+
+def _with_change(model: LinearisedFit, one: StageHypothesis) -> LinearisedFit:
+    """The model with a change of a stage, at its likeliest amplitude."""
+    terms = model.terms
+    columns = np.column_stack([terms.columns, one.amplitude * one.columns])
+    group = np.append(terms.group, np.full(one.columns.shape[1], FIXED))
+    return replace(
+        model, terms=replace(terms, columns=columns, group=group, _kept={}), _products={}, _taken={}
     )
 
 
-def hypotheses(problem: FitProblem, fit: Solution) -> list[Hypothesis]:
+def _changed_channels(
+    posterior: Posterior, node: Explanation, best: StageHypothesis
+) -> tuple[str, ...]:
+    """Channels that the change moves by more than `NOTICED`, root mean square in their noise."""
+    assert best.at is not None
+    model = _with_change(node.linear, best)
+    found, k = conditional(model, best.at), best.columns.shape[1]
+    own = slice(-len(model.x) - k, -len(model.x))
+    moved = found.columns[:, own] @ found.mean[own] / posterior.std
+    readings = posterior.terms.readings
+    return tuple(
+        name
+        for i, name in enumerate(readings.channels)
+        if np.sqrt(np.mean(moved[readings.channel == i] ** 2)) > NOTICED
+    )
+
+
+def hypotheses(posterior: Posterior, node: Explanation) -> list[StageHypothesis]:
     """All changes of stages and of single channels, by what they may depend on."""
-    readings, usual = problem.readings, problem.discrepancy.process.usual
-    variables = _variables(problem, fit)
+    readings, usual, fit = posterior.terms.readings, posterior.terms.usual, node.fit
+    variables = _variables(posterior, node)
     found = []
     for change in stage_changes(fit.fitted(), readings):
         if change.along:
-            found.append(Hypothesis(change.stage, change.what, change.along, change.columns))
+            found.append(StageHypothesis(change.stage, change.what, change.along, change.columns))
             continue
         for name, columns in variables.items():
             if change.stage != OPERATING or name in OF_OPERATION:
                 own = change.columns * columns
-                found.append(Hypothesis(change.stage, change.what, name, own))
+                found.append(StageHypothesis(change.stage, change.what, name, own))
     for i, channel in enumerate(readings.channels):
         own = readings.channel == i
         gain = np.where(own, USUAL_GAIN * fit.prediction, 0.0)
         added = np.where(own, usual[i], 0.0)
         for name, columns in variables.items():
-            found.append(Hypothesis(channel, "gain", name, gain[:, None] * columns))
-            found.append(Hypothesis(channel, "added", name, added[:, None] * columns))
+            found.append(StageHypothesis(channel, "gain", name, gain[:, None] * columns))
+            found.append(StageHypothesis(channel, "added", name, added[:, None] * columns))
     return found
 
 
-def _variables(problem: FitProblem, fit: Solution) -> dict[str, Floats]:
+def _variables(posterior: Posterior, node: Explanation) -> dict[str, Floats]:
     """Columns (m, k) of a unit process of each variable that varies in the readings."""
-    readings = problem.readings
+    readings, fit = posterior.terms.readings, node.fit
     slip, load = readings.slip / SLIP_LENGTH, np.log(readings.load) / LOG_LENGTH
     sinkage = fit.linearisation.log_sinkage[readings.row] / LOG_LENGTH
     points = {"slip": slip, "load": load, "sinkage": sinkage}
@@ -201,77 +229,63 @@ def _variables(problem: FitProblem, fit: Solution) -> dict[str, Floats]:
     return {name: own for name, own in found.items() if own.shape[1] > 1}
 
 
-def weighed(problem: FitProblem, marginal: MarginalFit) -> tuple[float, list[Hypothesis]]:
-    """The evidence that no stage is needed, and all hypotheses with theirs."""
-    base, fit, best = problem.discrepancy, marginal.fit, marginal.evidence.amplitude
-    count = len(base.process.usual)
-    patterns = [best, np.zeros(count), AMPLITUDES[np.searchsorted(AMPLITUDES, 0.4 * best)]]
-    alone = linearised(base, fit)
-    none = min(float(alone.along(p, i).min()) for p in patterns for i in range(count))
-    whiten = base.noise_whitening
-    block = whiten @ np.column_stack([fit.derivatives, fit.measured - fit.prediction])
-    found = []
-    for one in hypotheses(problem, fit):
-        own = np.asarray(whiten @ one.columns)
-        between = base.columns.T @ own
-        gram = np.block([[alone.divisions.gram, between], [between.T, own.T @ own]])
-        number = np.append(base.process.channel, np.full(own.shape[1], count))
-        local = replace(
-            alone,
-            divisions=ProcessDivisions(gram, number, alone.divisions),
-            cross=np.vstack([alone.cross, own.T @ block]),
-        )
-        trials = []
-        for p in patterns:
-            values = local.along(np.append(p, 0.0), count)
-            k = 1 + int(np.argmin(values[1:]))
-            trials.append((float(values[k]), (*p.tolist(), float(AMPLITUDES[k]))))
-        value, amplitude = min(trials)
-        found.append(replace(one, value=value, amplitude=amplitude))
-    return none, found
+def weighed(posterior: Posterior, node: Explanation) -> tuple[float, list[StageHypothesis]]:
+    """The evidence that no stage is needed, and all hypotheses with theirs.
 
-
-def with_change(problem: FitProblem, one: Hypothesis) -> DiscrepancyModel:
-    """Noise, scatter, a discrepancy of each channel, and the change, as if it were a channel."""
-    process = problem.discrepancy.process
-    number = np.full(one.columns.shape[1], len(process.usual))
-    return DiscrepancyModel(
-        problem.covariance,
-        DiscrepancyProcess(
-            np.column_stack([process.columns, one.columns]),
-            np.concatenate([process.channel, number]),
-            np.append(process.usual, 1.0),
-        ),
-    )
-
-
-def log_score(
-    problem: FitProblem,
-    fit: Solution,
-    model: DiscrepancyModel,
-    amplitude: Floats,
-    parts: Mapping[str, Folds],
-) -> dict[str, float]:
-    """Log density of rows kept back, by part; the soil is fitted to the rest to first order."""
-    tests = fit.soil_tests.rates(fit.x)
-    prior = np.diag(fit.precision + UNIFORM_PRECISION) + tests.T @ tests
-    matrix = model.matrix(amplitude) + fit.derivatives @ np.linalg.solve(prior, fit.derivatives.T)
-    precision = np.asarray(np.linalg.inv(matrix), np.float64)
-    weighted = precision @ (problem.readings.measured - fit.prediction)
-    return {
-        name: sum(_density(precision, weighted, folds.fold == k) for k in folds.predicted)
-        for name, folds in parts.items()
-    }
-
-
-def _density(precision: Floats, weighted: Floats, out: NDArray[np.bool_]) -> float:
-    r"""Log density of the residuals that are kept back, given the others, up to a constant.
-
-    .. math:: -\tfrac12 (P r)_o^T P_{oo}^{-1} (P r)_o + \tfrac12 \ln |P_{oo}|
-
-    with the precision P of all residuals r: one inverse serves all folds. References: Rasmussen and
-    Williams, Gaussian Processes for Machine Learning, 2006, eq. 5.12, for several readings.
+    Each change is considered beside the discrepancy of the fit, a smaller one, and none.
     """
-    factor = np.linalg.cholesky(precision[np.ix_(out, out)])
-    white = np.linalg.solve(factor, weighted[out])
-    return float(-0.5 * white @ white + np.log(np.diag(factor)).sum())
+    found, at = hypotheses(posterior, node), node.at
+    less = np.where(np.arange(len(at.log)) < posterior.terms.channels, np.log(SMALLER), 0.0)
+    patterns = [at, replace(at, log=at.log + less), replace(at, present=False)]
+    model, p = node.linear, len(node.fit.x)
+    columns = np.column_stack([model.jacobian, *(one.columns for one in found)])
+    wide = replace(model, jacobian=columns, x=np.zeros(columns.shape[1]), _products={}, _taken={})
+    starts = p + np.cumsum([0, *(one.columns.shape[1] for one in found)])
+    values = np.full((len(found), len(patterns), len(AMPLITUDES)), np.inf)
+    none = np.inf
+    for j, pattern in enumerate(patterns):
+        products, constant = wide.reduced(pattern)
+        constant += model.beside(pattern, model.evaluate(pattern).curvature)
+        plain = np.append(np.arange(p), -1)
+        none = min(
+            none, float(_evidence(model, products[np.ix_(plain, plain)][None])[0] + constant)
+        )
+        for i in range(len(found)):
+            own = np.arange(starts[i], starts[i + 1])
+            size, vector = np.linalg.eigh(products[np.ix_(own, own)])
+            rotated = vector.T @ products[np.ix_(own, plain)]
+            square = AMPLITUDES[:, None] ** 2
+            growth = square * np.maximum(size, 0.0)
+            shrink = square / (1.0 + growth)
+            left = products[np.ix_(plain, plain)] - (shrink[:, None, :] * rotated.T) @ rotated
+            value = _evidence(model, left) + constant + np.log1p(growth).sum(axis=1)
+            values[i, j] = value + AMPLITUDE_PENALTY
+    weighed_ = []
+    for one, each in zip(found, values, strict=True):
+        j, k = divmod(int(np.argmin(each)), len(AMPLITUDES))
+        amplitude = float(AMPLITUDES[k])
+        weighed_.append(replace(one, value=float(each[j, k]), at=patterns[j], amplitude=amplitude))
+    return none, weighed_
+
+
+def _evidence(model: LinearisedFit, products: Floats) -> Floats:
+    """-2 ln p (b,) with the coordinates integrated out, from products (b, p + 1, p + 1)."""
+    p, free = len(model.x), ~model.held
+    curvature = products[:, :p, :p] + np.diag(model.precision) + model.information
+    gradient = np.where(free, products[:, :p, p] - model.pull, 0.0)
+    moving = np.where(free[:, None] & free, curvature, np.eye(p))
+    step = np.linalg.solve(moving, gradient[..., None])[..., 0]
+    gain = (gradient * step).sum(axis=1)
+    return np.asarray(products[:, p, p] - gain + np.linalg.slogdet(curvature)[1])
+
+
+def _amplitude_penalty() -> Floats:
+    """-2 ln of the prior probability of each of `AMPLITUDES`: that of a discrepancy's."""
+    edges = np.concatenate([[0.0], np.sqrt(AMPLITUDES[1:] * AMPLITUDES[:-1]), [np.inf]])
+    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
+    mass = np.diff((1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown)
+    return np.asarray(-2.0 * np.log(mass))
+
+
+#: -2 ln of the prior probability of each of `AMPLITUDES`.
+AMPLITUDE_PENALTY = _amplitude_penalty()

@@ -1,4 +1,4 @@
-"""Decision: which status the evidence supports."""
+"""Decision: which status the posterior supports."""
 
 from __future__ import annotations
 
@@ -8,37 +8,40 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE
-from soilml.gap.evidence.problem import FitProblem
+from soilml.gap.evidence.held_out import PredictiveGain
+from soilml.gap.report.results import Suspect
 from soilml.gap.report.sentences import NOT_DECISIVE
-from soilml.gap.search.explanation import Explanation
-from soilml.gap.search.posterior import Names, Posterior, not_rejected
-from soilml.gap.search.prediction import PredictiveGain
-from soilml.gap.search.stepwise import SearchResult
-from soilml.gap.verdict.lookalikes import only_channels
+from soilml.inference.constants import LARGEST_SIZE
+from soilml.inference.explanation import Explanation
+from soilml.inference.posterior import Names, Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Squared deviation of the shapes from the catalogue's law, in prior variances, up to which an
-#: effect keeps its name: 2 sigma for one effect. For several effects the limit is lower, because
-#: several adjustable laws together fit almost any data.
-MAX_SHAPE_DEVIATION, MAX_SHAPE_DEVIATION_SEVERAL = 4.0, 1.0
-#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
-#: nothing: a gain error of 18 % without calibration.
-MAX_SIZE_DEVIATION = 3.0
-#: Objective above that of the soil alone up to which an effect is suspected where runs cannot name
-#: a cause: tempered odds of 1 to 3, which the report states.
-SUSPECT_MARGIN = 4.0
-#: Amplitude of a remaining discrepancy, in usual ones, from which the model is wrong in a way that
-#: the catalogue lacks (by default 8 % of a range), and the decrease of the objective from which a
-#: cause is stated all the same: tempered odds of 1100 to 1.
-LARGE_REMAINDER, DECISIVE_GAIN = 4.0, 28.0
-#: The same for a name: 5 % of a range, and tempered odds of 270 000 to 1. Where every law of
-#: the soil differs from the model's, some effect imitates that best, and a part of the gap stays.
-LARGE_BESIDE_NAME, NAME_GAIN = 2.5, 50.0
-#: Probability, causes outside the catalogue included, from which a single explanation is named; a
-#: smaller one lists it first among the suspects. That of right names lies near `IN_CATALOGUE`.
+#: Probability of no gap from which none is stated: more likely than not.
+NO_GAP = 0.5
+#: Probability, causes outside the catalogue included, from which a single explanation is named.
 NAMED_PROBABILITY = 0.9
+#: Probability that no effect is present from which none is claimed, and from which no class is.
+UNCERTAIN, CHANCE = 0.2, 0.05
+#: The same up to which suspects are named all the same where runs cannot name a cause.
+HOPELESS = 0.8
+#: Odds against the likeliest set below which another one is rejected, and probability below which
+#: a set is no suspect.
+REJECTED, LEAST_SUSPECTED = 0.03, 0.005
+#: Probability that the members of a class hold together; else no cause is stated.
+CLASS_PROBABILITY = 0.5
+#: Amplitude of a remaining discrepancy, in usual ones, beside which nothing is named: 8 % of a
+#: range.
+LARGE_REMAINDER = 4.0
+#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
+#: nothing: a gain error of 24 % without calibration.
+MAX_SIZE_DEVIATION = 4.0
+LISTED_SUSPECTS = 8  # Suspects that are listed
+#: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
+#: law does not matter: that of a usual model error.
+NEGLIGIBLE_FRACTION = 0.02
+#: Code of the reason that the soil alone explains the rows where its priors are opened.
+OUTSIDE_PRIORS = "soil-outside-priors"
 #: Why an explanation that the evidence supports is not claimed.
 IMPLAUSIBLE_FAULT = (
     "{} would explain the gap, but would have to be implausibly large for a fault of a sensor or "
@@ -55,196 +58,145 @@ OTHER_LAW = (
     "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
     "one that the catalogue lacks"
 )
-NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
-LEFT_BESIDE = "beside {}, too large an error of the {} is left for a name: further laws may differ"
-#: Why nothing is said where the soil alone is rejected without an alternative.
-NOTHING_IS_BETTER = Remark(
-    "nothing-is-better", "the soil alone is rejected, and no effect or smooth discrepancy is better"
+UNCHECKED_FAULT = (
+    "{} explains the gap, but what looks like a fault of a sensor or of the rig may be a law that "
+    "the catalogue lacks: check it, and state the check with --checked"
 )
+NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The status, the explanations it claims, and the one whose figures are shown.
+    """The status, the sets of effects it claims, and the one whose figures are shown.
 
-    `shown` is the first of the claimed explanations or of the suspects; None where nothing is
-    named or suspected. `reason` says why an explanation that the evidence supports is not claimed.
+    claimed: The sets that are stated as causes.
+    listed: The sets that the data do not reject, the first suspect first.
+    shown: The hypothesis of the first one; None where nothing is named or suspected.
+    reason: Why an explanation that the evidence supports is not claimed.
     """
 
     status: str
-    claimed: tuple[Explanation, ...]
-    shown: Explanation | None
+    claimed: tuple[Names, ...] = ()
+    listed: tuple[Names, ...] = ()
+    shown: Explanation | None = None
     reason: Remark | None = None
 
 
+def ranked_sets(posterior: Posterior) -> list[Names]:
+    """Sets of effects by the probability that they are present, alone or with others.
+
+    The first one has all effects that are likelier than not.
+
+    References: Barbieri and Berger, Optimal predictive model selection, Annals of Statistics 32,
+    2004: of single models, that of these effects predicts best under usual conditions.
+    """
+    fitted = {node.hypothesis.effects for node in posterior.nodes}
+    sets = [names for names in posterior.sets if names and names in fitted]
+    if not sets:
+        return []
+    p = {names: posterior.probability(*names) for names in sets}
+    best = max(sets, key=lambda names: (p[names] > 0.5) * len(names) + p[names])
+    rest = sorted((names for names in sets if names != best), key=lambda names: -p[names])
+    return [best, *rest]
+
+
+def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, ...]:
+    """The smallest sets whose probability is within reach of the likeliest, the first one first."""
+    if not ranked:
+        return ()
+    sets, first = posterior.sets, ranked[0]
+    least = REJECTED * max(sets[names] for names in ranked)
+    kept = [n for n in ranked[1:] if sets[n] >= least and not set(first) < set(n)]
+    kept = [first, *kept]
+    return tuple(n for n in kept if not any(set(other) < set(n) for other in kept))
+
+
 def decide(
-    problem: FitProblem,
-    result: SearchResult,
-    naming_obstacles: Sequence[Remark],
+    posterior: Posterior,
+    gains: Mapping[Names, PredictiveGain],
+    obstacles: Sequence[Remark],
     disagreements: Sequence[Remark],
 ) -> Decision:
     """The status of a report; see `soilml.gap.report.results.STATUSES`.
 
-    naming_obstacles: Why these runs cannot identify a cause.
+    gains: Log density of rows kept back by the first sets, above that of the soil alone.
+    obstacles: Why these runs cannot identify a cause.
     disagreements: Measurements that disagree with each other, which forbid a verdict without a gap.
     """
-    if not result.has_gap:
-        return Decision("undecided" if disagreements else "no-gap", (), None)
-    if is_left_open(result):
-        return Decision("undecided", (), None)
-    if naming_obstacles:
-        if not _likelier_than_soil_alone(result, SUSPECT_MARGIN):
-            return Decision("not-testable", (), None)
-        return Decision("suspected", (), _first_suspect(result))
-    suspects = _likelier_than_soil_alone(result)
-    accepted = result.accepted
-    if not accepted or () in {c.names for c in accepted}:
-        if not suspects:
-            return Decision("unknown", (), None)
-        return Decision("suspected", (), _first_suspect(result))
-    best = accepted[0]
-    if faults := _implausible_faults(best.fit):
-        text = IMPLAUSIBLE_FAULT.format(" + ".join(faults))
-        return Decision("unknown", (), None, Remark("implausible-fault", text, faults))
-    if not suspects:  # many weak rivals share the probability that the soil alone lacks
-        return Decision("unknown", (), None)
-    not_proven = result.posterior.unlisted | result.posterior.unproven
-    if best.names in result.posterior.oversized:
-        text = IMPLAUSIBLE_SIZE.format(" + ".join(best.names))
-        remark = Remark("implausible-size", text, best.names)
-        return Decision("suspected", (), _first_suspect(result), remark)
-    if best.names in not_proven:
-        text = NOT_PREDICTIVE.format(" + ".join(best.names))
-        remark = Remark("not-predictive", text, best.names)
-        return Decision("suspected", (), _first_suspect(result), remark)
-    not_proven |= result.posterior.oversized
-    listed = tuple(c for c in accepted if c.names not in not_proven)
-    if _far_from_catalogue(problem, result, best):
-        text = OTHER_LAW.format(" + ".join(best.names))
-        shown = _first_suspect(result) or best
-        return Decision("suspected", (), shown, Remark("other-law", text, best.names))
-    if left := _large_remainder(problem, result, best, LARGE_REMAINDER, DECISIVE_GAIN):
-        shown = _first_suspect(result) or best
-        text = NOT_CATALOGUED.format(" + ".join(best.names), left.replace("_", " "))
-        if shown is not best:
-            text += f", and the evidence for {' + '.join(shown.names)} is not decisive"
-        remark = Remark("not-catalogued", text, (*best.names, column(left)))
-        return Decision("suspected", (), shown, remark)
-    if len(listed) > 1:
-        listed = by_probability(listed, result.posterior)
-        return Decision("class", listed, listed[0])
-    if len(accepted) > 1 or result.posterior.probability(*best.names) < NAMED_PROBABILITY:
-        return Decision("suspected", (), _first_suspect(result) or best, NOT_DECISIVE)
-    if left := _large_remainder(problem, result, best, LARGE_BESIDE_NAME, NAME_GAIN):
-        text = LEFT_BESIDE.format(" + ".join(best.names), left.replace("_", " "))
-        remark = Remark("not-catalogued", text, (*best.names, column(left)))
-        return Decision("suspected", (), _first_suspect(result) or best, remark)
-    if not result.adequate:
-        return Decision("partly-named", accepted, best)
-    if best.shape_supported and law_matters(problem, best):
-        return Decision("form-open", accepted, best)
-    return Decision("named", accepted, best)
+    none = posterior.no_effect
+    if posterior.no_gap > NO_GAP:
+        return Decision("undecided" if disagreements else "no-gap")
+    ranked = ranked_sets(posterior)
+    chance = posterior.probability(*ranked[0]) if ranked else 0.0
+    if _is_other_soil(posterior) and none > max(UNCERTAIN, chance):
+        return Decision("undecided")
+    hopeless = HOPELESS if obstacles else 0.0
+    if not ranked or (none > UNCERTAIN and none > max(chance, hopeless)):
+        return Decision("not-testable" if obstacles else "unknown")
+    listed = not_rejected(posterior, ranked)
+    best = listed[0]
+    node = posterior.node_of(best)
+    assert node is not None
+    suspected = Decision("suspected", (), listed, node)
+    if obstacles:
+        return suspected
+    if reason := _doubt(posterior, node, gains.get(best)):
+        return replace(suspected, reason=reason)
+    if none > UNCERTAIN:
+        return replace(suspected, reason=NOT_DECISIVE)
+    if chance >= NAMED_PROBABILITY and (unchecked := _unchecked_faults(posterior, best)):
+        text = UNCHECKED_FAULT.format(" + ".join(unchecked))
+        return replace(suspected, reason=Remark("unchecked-fault", text, unchecked))
+    if chance >= NAMED_PROBABILITY:
+        if node.share_without < 0.5:
+            return Decision("partly-named", (best,), listed[:1], node)
+        if node.hypothesis.free_law and law_matters(posterior, node):
+            return Decision("form-open", (best,), listed[:1], node)
+        return Decision("named", (best,), listed[:1], node)
+    together = sum(posterior.sets[names] for names in listed)
+    if none <= CHANCE and len(listed) > 1 and together >= CLASS_PROBABILITY:
+        return Decision("class", listed, listed, node)
+    return replace(suspected, reason=NOT_DECISIVE)
 
 
-def _large_remainder(
-    problem: FitProblem, result: SearchResult, best: Explanation, large: float, decisive: float
-) -> str:
-    """The channel with a large remainder beside an explanation of little evidence, or empty."""
-    soil_alone, worst = result.soil_alone, int(np.argmax(best.amplitude))
-    if soil_alone is None or soil_alone.objective >= best.objective + decisive:
-        return ""
-    name = problem.readings.channels[worst]
-    return name if best.amplitude[worst] >= large else ""
+def _is_other_soil(posterior: Posterior) -> bool:
+    """Whether the soil alone is likeliest outside its priors, without a discrepancy."""
+    alone = next((n for n in posterior.nodes if not n.hypothesis.effects), None)
+    return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
 
 
-def _likelier_than_soil_alone(result: SearchResult, margin: float = 0.0) -> bool:
-    """Whether an effect describes the data better than the soil alone beside its discrepancy.
+def _doubt(posterior: Posterior, node: Explanation, gain: PredictiveGain | None) -> Remark | None:
+    """Why an explanation is not claimed, whatever its probability is."""
+    names = node.hypothesis.effects
+    text = " + ".join(names)
+    if faults := implausible_faults(node.fit):
+        return Remark("implausible-fault", IMPLAUSIBLE_FAULT.format(" + ".join(faults)), faults)
+    if implausible_sizes(node.fit):
+        return Remark("implausible-size", IMPLAUSIBLE_SIZE.format(text), names)
+    if gain is not None and not gain.is_better:
+        return Remark("not-predictive", NOT_PREDICTIVE.format(text), names)
+    amplitude = posterior.terms.amplitude(node.at)
+    if amplitude.max(initial=0.0) >= LARGE_REMAINDER:
+        left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
+        text = NOT_CATALOGUED.format(text, left.replace("_", " "))
+        return Remark("not-catalogued", text, (*names, column(left)))
+    if posterior.by_other_law(node.hypothesis):
+        return Remark("other-law", OTHER_LAW.format(text), names)
+    return None
 
-    Only effects count that can be suspected.
+
+def _unchecked_faults(posterior: Posterior, names: Names) -> tuple[str, ...]:
+    """The faults of sensors and rig among effects, of which no check says how large they can be.
+
+    An offset of one channel imitates what no catalogue has, such as a crust on the soil: rows alone
+    do not show a fault, a check of the sensor does.
     """
-    likeliest, soil_alone = result.likeliest_suspect, result.soil_alone
-    return bool(likeliest and soil_alone and likeliest.objective < soil_alone.objective + margin)
+    problem = posterior.problem
+    kinds = {name: problem.effects[name].about.kind for name in names}
+    return tuple(n for n in names if kinds[n] in ("sensor", "rig") and n not in problem.calibration)
 
 
-def _first_suspect(result: SearchResult) -> Explanation | None:
-    """The candidate that is listed first; see `Posterior.ranked` and `Posterior.from_first`."""
-    fitted = {c.names: c for c in result.candidates}
-    penalties = {names: c.penalty for names, c in fitted.items()}
-    listed = result.posterior.from_first(result.posterior.ranked(), penalties)
-    return fitted.get(listed[0][0] if listed else (), result.likeliest_suspect)
-
-
-def by_probability(
-    candidates: Sequence[Explanation], posterior: Posterior
-) -> tuple[Explanation, ...]:
-    """Explanations in the order of suspects, and the others of the probability of their effects."""
-    order = {names: i for i, (names, _) in enumerate(posterior.ranked())}
-
-    def place(c: Explanation) -> tuple[float, int]:
-        return -posterior.log_odds(*c.names), order.get(c.names, len(order))
-
-    return tuple(sorted(candidates, key=place))
-
-
-def is_left_open(result: SearchResult) -> bool:
-    """Whether the soil alone is rejected, though no effect and no smooth discrepancy is better.
-
-    The readings then scatter in a way that the estimated noise does not describe.
-    """
-    soil_alone, likeliest = result.soil_alone, result.likeliest
-    if not result.has_gap or soil_alone is None or np.any(soil_alone.amplitude > 0.0):
-        return False
-    return likeliest is None or soil_alone.objective <= likeliest.objective
-
-
-def with_refused_outside(
-    problem: FitProblem, result: SearchResult, gains: Mapping[Names, PredictiveGain]
-) -> SearchResult:
-    """The result with refused explanations counted as causes outside the catalogue.
-
-    They need an implausible size or fault, or another law than the catalogue's, or they predict
-    rows that were kept back worse than the soil alone does, beyond sampling error. Where a part of
-    such a set is accepted, what is refused is its supplement, not that part.
-
-    gains: Log density of the rows kept back, above that of the soil alone, as far as it is known.
-    """
-    candidates = [c for c in result.candidates if c.names]
-    unlisted = {c.names for c in candidates if _implausible_faults(c.fit)}
-    unlisted |= {names for names, gain in gains.items() if gain.is_worse}
-    unproven = frozenset(names for names, gain in gains.items() if not gain.is_better)
-    oversized = {c.names for c in candidates if implausible_sizes(c.fit)} - unlisted
-    far = unlisted | oversized
-    far |= {c.names for c in candidates if _far_from_catalogue(problem, result, c)}
-    parts = [set(c.names) for c in result.accepted if c.names not in far]
-    refused = {
-        names: frozenset().union(*(part for part in parts if part <= set(names))) for names in far
-    }
-    found = replace(
-        result.posterior,
-        refused=refused,
-        unlisted=frozenset(unlisted),
-        unproven=unproven,
-        oversized=frozenset(oversized),
-    )
-    return replace(result, posterior=found)
-
-
-def _far_from_catalogue(problem: FitProblem, result: SearchResult, best: Explanation) -> bool:
-    """Whether an explanation needs another law than the catalogue's.
-
-    An effect that changes one channel alone is known by its law alone: it needs another one where
-    the soil alone, beside its smooth discrepancy, is as likely as the catalogue's law.
-    """
-    several, soil_alone = len(best.names) > 1, result.soil_alone
-    if best.shape_deviation > (MAX_SHAPE_DEVIATION_SEVERAL if several else MAX_SHAPE_DEVIATION):
-        return True
-    if several or soil_alone is None or not best.shape_supported:
-        return False
-    by_catalogue = best.catalogue_law.evidence.value + best.penalty
-    return by_catalogue >= soil_alone.objective and best.names[0] in only_channels(problem, result)
-
-
-def _implausible_faults(fit: Solution) -> tuple[str, ...]:
+def implausible_faults(fit: Solution) -> tuple[str, ...]:
     """Faults of sensors and the rig that are far larger than their priors allow."""
     deviation = np.abs(fit.x) * np.sqrt(fit.precision)
     return tuple(
@@ -261,6 +213,30 @@ def implausible_sizes(fit: Solution) -> dict[str, float]:
         for c, x in zip(fit.coordinates, fit.x, strict=True)
         if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > LARGEST_SIZE
     }
+
+
+def suspects(
+    posterior: Posterior, decision: Decision, gains: Mapping[Names, PredictiveGain]
+) -> list[Suspect]:
+    """Explanations with their odds against all others, the first one that is shown first."""
+    ranked = ranked_sets(posterior)
+    first = decision.listed[:1] or tuple(ranked[:1])
+    rest = [n for n in ranked if posterior.within(n) > LEAST_SUSPECTED]
+    rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
+    found = []
+    for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
+        gain, node = gains.get(names), posterior.node_of(names)
+        found.append(
+            Suspect(
+                names,
+                posterior.log_odds(*names),
+                posterior.probability(*names),
+                None if gain is None else gain.value,
+                None if gain is None else gain.std_error,
+                times_usual={} if node is None else implausible_sizes(node.fit),
+            )
+        )
+    return found
 
 
 def reasons(
@@ -286,18 +262,6 @@ def reasons(
     return (decision.reason,) if decision.reason else ()
 
 
-def cause_set(decision: Decision, result: SearchResult) -> tuple[tuple[str, ...], ...]:
-    """The explanations that the data do not reject, where a cause is claimed or suspected."""
-    if decision.status == "suspected":
-        found, unlisted = result.posterior, result.posterior.unlisted
-        kept = [c for c in result.candidates if c.names not in unlisted]
-        kept = [c for c in kept if found.favours(c.names, c.penalty)]
-        left = by_probability(not_rejected(kept), found)
-        first = (decision.shown.names,) if decision.shown else ()
-        return tuple(dict.fromkeys((*first, *(c.names for c in left))))
-    return tuple(c.names for c in decision.claimed)
-
-
 def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]) -> Names:
     """The effects of the first suspect where it predicts rows kept back better than the soil alone.
 
@@ -305,41 +269,31 @@ def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]
     questions: this one is no name.
     """
     if decision.status == "class":
-        return decision.claimed[0].names
+        return decision.claimed[0]
     if decision.status != "suspected" or decision.shown is None:
         return ()
-    gain = gains.get(decision.shown.names)
-    return decision.shown.names if gain is not None and gain.is_better else ()
+    names = decision.shown.hypothesis.effects
+    gain = gains.get(names)
+    return names if gain is not None and gain.is_better else ()
 
 
-def unclaimed_effects(decision: Decision, result: SearchResult) -> tuple[str, ...]:
-    """The likeliest effects where none are claimed."""
-    shown = decision.shown or result.likeliest_suspect
-    return () if decision.claimed or shown is None else shown.names
-
-
-#: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
-#: law does not matter: that of a usual model error.
-NEGLIGIBLE_FRACTION = 0.02
-
-
-def law_matters(problem: FitProblem, candidate: Explanation) -> bool:
-    """Whether the two laws differ inside the measured range by more than matters.
+def law_matters(posterior: Posterior, node: Explanation) -> bool:
+    """Whether the free law and the catalogue's differ in the measured range by more than matters.
 
     They differ if, in some channel, the root mean square difference of their predictions exceeds
     both the standard error of a mean over the readings of that channel and the range of the channel
-    times `NEGLIGIBLE_FRACTION`.
+    times `NEGLIGIBLE_FRACTION`. Without a fit of the catalogue's law they do.
     """
-    readings = problem.readings
-    free = candidate.free_law or candidate.catalogue_law
-    difference = free.fit.prediction - candidate.catalogue_law.fit.prediction
+    readings, own = posterior.terms.readings, node.hypothesis
+    catalogue = posterior.search.nodes.get(replace(own, free_law=False))
+    if catalogue is None:
+        return True
+    difference = node.fit.prediction - catalogue.fit.prediction
     for i in range(len(readings.channels)):
         in_channel = readings.channel == i
         values = readings.measured[in_channel]
-        if not values.size:
-            continue
         rms = float(np.sqrt(np.mean(difference[in_channel] ** 2)))
-        mean_error = float(np.sqrt(np.mean(problem.covariance.std[in_channel] ** 2) / values.size))
+        mean_error = float(np.sqrt(np.mean(posterior.std[in_channel] ** 2) / values.size))
         span = max(float(values.max()), 0.0) - min(float(values.min()), 0.0)
         if rms > max(mean_error, NEGLIGIBLE_FRACTION * span):
             return True

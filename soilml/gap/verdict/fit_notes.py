@@ -8,14 +8,17 @@ import numpy as np
 
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE
-from soilml.gap.evidence.problem import AT_BOUND, FitProblem
 from soilml.gap.evidence.repeats import SIGNIFICANCE, chi_square_tail
+from soilml.inference.constants import LARGEST_SIZE
+from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import Prior
 from soilml.numerics.subspaces import ROUNDING, column_space
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import decimal, format_quantity
+
+#: Distance from a bound, as a fraction of the range, at which an estimate counts as at the bound.
+AT_BOUND = 1e-3
 
 
 def bound_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Remark]:
@@ -73,7 +76,7 @@ def size_notes(coordinates: Sequence[Coordinate], x: Sequence[float]) -> list[Re
     return notes
 
 
-def large_noise_notes(problem: FitProblem, soil: Solution) -> list[Remark]:
+def large_noise_notes(posterior: Posterior, soil: Solution) -> list[Remark]:
     r"""Notes on channels whose residuals about the soil alone are too small for their noise.
 
     With the residuals r in standard deviations of the readings and :math:`A = I - H`, the
@@ -89,8 +92,8 @@ def large_noise_notes(problem: FitProblem, soil: Solution) -> list[Remark]:
 
     References: Satterthwaite, Biometrics Bulletin 2, 1946.
     """
-    readings = problem.readings
-    if problem.covariance.components.autocorrelation > 0.0:
+    readings = posterior.terms.readings
+    if posterior.noise.autocorrelation > 0.0:
         return []
     std = readings.std
     basis = column_space(soil.derivatives / std[:, None], relative_tolerance=ROUNDING)

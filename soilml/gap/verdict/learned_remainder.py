@@ -12,7 +12,9 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import MOST_POINTS, Remainder, RemainderPart
 from soilml.fitting.covariance import USUAL
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
+from soilml.gap.verdict.remainder import LEAST_AMPLITUDE
+from soilml.inference.explanation import Explanation
+from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import UNIFORM_PRECISION
 from soilml.quantities import column
 
@@ -25,7 +27,7 @@ LEAST_INFORMATION = 0.01
 DECIMALS = 5
 
 
-def learned_remainder(problem: FitProblem, marginal: MarginalFit) -> Remainder | None:
+def learned_remainder(posterior: Posterior, node: Explanation) -> Remainder | None:
     r"""Posterior of the remainder given the fit, at the amplitudes that its evidence supports.
 
     With columns C of the functions at the readings, residuals r and the covariance V of noise and
@@ -40,36 +42,36 @@ def learned_remainder(problem: FitProblem, marginal: MarginalFit) -> Remainder |
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.8 and
     2.11; Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001.
     """
-    readings, amplitude = problem.readings, marginal.evidence.amplitude
-    blanks = _blank_parts(problem, amplitude)
+    terms, at, case = posterior.terms, node.at, posterior.problem.case
+    blanks = _blank_parts(posterior, node)
     if not blanks:
-        return problem.case.remainder
+        return case.remainder
     columns = np.concatenate([own for _, own in blanks], axis=1)
-    whiten = problem.covariance.whiten
+    whiten = terms.whiten(terms.without_discrepancy(at), node.outliers)
     white = np.asarray(whiten @ columns)
-    residual = np.asarray(whiten @ (readings.measured - marginal.fit.prediction))
+    residual = np.asarray(whiten @ node.linear.residual)
     information = white.T @ white
     spread = np.linalg.inv(np.eye(len(information)) + information)
     mean = spread @ (white.T @ residual)
-    fit = marginal.fit.whitened_by(problem.discrepancy.whiten(amplitude))
+    fit = node.fit.whitened_by(terms.whiten(at, node.outliers))
     normal = fit.jacobian.T @ fit.jacobian + np.diag(fit.precision + UNIFORM_PRECISION)
     of_tests = fit.soil_tests.rates(fit.x)
     root = np.linalg.inv(np.linalg.cholesky(normal + of_tests.T @ of_tests)).T
     moved = spread @ (white.T @ (whiten @ fit.derivatives)) @ root
     parts, first = [], 0
     for blank, own in blanks:
-        at = slice(first, first + own.shape[1])
-        first = at.stop
-        known = _factor(np.eye(own.shape[1]) - spread[at, at])
+        these = slice(first, first + own.shape[1])
+        first = these.stop
+        known = _factor(np.eye(own.shape[1]) - spread[these, these])
         parts.append(
             replace(
                 blank,
-                mean=tuple(mean[at].round(DECIMALS).tolist()),
+                mean=tuple(mean[these].round(DECIMALS).tolist()),
                 known=_written(known),
-                shared=_written(moved[at]),
+                shared=_written(moved[these]),
             )
         )
-    earlier = () if problem.case.remainder is None else problem.case.remainder.parts
+    earlier = () if case.remainder is None else case.remainder.parts
     return Remainder((*earlier, *parts))
 
 
@@ -83,30 +85,31 @@ def without_learned_discrepancy(case: Case) -> Case:
     return replace(case, discrepancy=left)
 
 
-def _blank_parts(problem: FitProblem, amplitude: Floats) -> list[tuple[RemainderPart, Floats]]:
+def _blank_parts(posterior: Posterior, node: Explanation) -> list[tuple[RemainderPart, Floats]]:
     """Range and points of each channel and gear with a remainder, and columns (m, k) of it."""
-    readings, found = problem.readings, []
-    gears = list(problem.case.gears) or [""]
+    terms, case, found = posterior.terms, posterior.problem.case, []
+    readings, amplitude, std = terms.readings, terms.amplitude(node.at), terms.std(node.at)
+    gears = list(case.gears) or [""]
     driven = np.broadcast_to(
         np.asarray(gears[0] if readings.at.gear is None else readings.at.gear), len(readings.run)
     )[readings.row]
     for i, name in enumerate(readings.channels):
-        if amplitude[i] == 0.0:
+        if amplitude[i] < LEAST_AMPLITUDE or terms.usual[i] == 0.0:
             continue
-        declared = _declared(problem.case.discrepancy, name)
+        declared = _declared(case.discrepancy, name)
         for gear in gears:
             own = (readings.channel == i) & ((driven == gear) if len(gears) > 1 else True)
             if not own.any():
                 continue
             slip, load = readings.slip[own], readings.load[own]
-            size = amplitude[i] * problem.discrepancy.process.usual[i]
-            noise = float(np.median(problem.covariance.std[own]))
+            size = amplitude[i] * terms.usual[i]
+            noise = float(np.median(std[own]))
             quiet = LEFT_OUT_OF_NOISE * (noise / size) ** 2
             part = RemainderPart(
                 column=column(name),
                 gear=gear,
                 amplitude=float(size),
-                usual=float(problem.discrepancy.process.usual[i]),
+                usual=float(terms.usual[i]),
                 slip_length=declared.slip_length,
                 log_load_length=declared.log_load_length,
                 slip=(float(slip.min()), float(slip.max())),

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from soilml.gap.evidence.problem import FitProblem
-from soilml.gap.search.stepwise import SearchResult
+from soilml.fitting.least_squares import Solution
+from soilml.inference.posterior import Posterior
 from soilml.remarks import Remark
 
 #: Change of the readings by an effect of usual size, in sigma, from which it is visible on a known
@@ -16,11 +16,9 @@ VISIBLE, UNSEEN = 6.0, 2.0
 #: Share of the largest contribution to the other soil from which a parameter is stated.
 NOTABLE = 0.3
 PULL = "drawbar_pull"
-#: Largest change of the other channels, in sigma and relative to that of pull, that counts as none.
-NEGLIGIBLE = 0.01
 
 
-def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]:
+def like_another_soil(posterior: Posterior, soil: Solution) -> list[Remark]:
     r"""The effects of usual size that a change of the soil imitates, by the parameters it takes.
 
     .. math:: \Delta x = (X^T V^{-1} X + P)^{-1} X^T V^{-1} s
@@ -29,10 +27,10 @@ def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]
     sigma, is the norm of :math:`s - X \Delta x`. References: omitted variables; Greene,
     Econometric Analysis, 7th ed., section 4.3.2.
     """
-    soil = result.soil.whitened_by(problem.covariance.whiten)
+    soil = soil.whitened_by(posterior.whiten)
     alike: dict[tuple[str, ...], list[str]] = {}
-    for s in result.soil_test.signatures:
-        whole = np.asarray(problem.covariance.whiten @ s.column)
+    for s in posterior.signatures:
+        whole = np.asarray(posterior.whiten @ s.column)
         change = np.linalg.solve(soil.information, soil.jacobian.T @ whole)
         left = float(np.linalg.norm(whole - soil.jacobian @ change))
         if float(np.linalg.norm(whole)) < VISIBLE or left >= UNSEEN:
@@ -56,20 +54,18 @@ def like_another_soil(problem: FitProblem, result: SearchResult) -> list[Remark]
     ]
 
 
-def like_another_force(
-    problem: FitProblem, result: SearchResult, names: Sequence[str]
-) -> list[Remark]:
+def like_another_force(posterior: Posterior, names: Sequence[str]) -> list[Remark]:
     """Of the effects of a cause, those that change the drawbar pull alone, where more was measured.
 
     Any force along the travel direction has such a signature, by whatever law it grows.
     """
-    if len(problem.readings.channels) == 1:
+    if len(posterior.terms.readings.channels) == 1:
         return []
-    channel = only_channels(problem, result)
+    channel = posterior.only_channel
     alone = [
         name
         for name in names
-        if channel.get(name) == PULL and problem.effects[name].about.kind != "sensor"
+        if channel.get(name) == PULL and posterior.problem.effects[name].about.kind != "sensor"
     ]
     return [
         Remark(
@@ -80,15 +76,3 @@ def like_another_force(
         )
         for name in alone
     ]
-
-
-def only_channels(problem: FitProblem, result: SearchResult) -> dict[str, str]:
-    """The channel of each effect that changes one of the measured channels alone, by its name."""
-    readings = problem.readings
-    found = {}
-    for s in result.soil_test.signatures:
-        change = np.abs(s.column / readings.std)
-        own = readings.channel == readings.channel[int(np.argmax(change))]
-        if change[~own].max(initial=0.0) < NEGLIGIBLE * change.max():
-            found[s.name] = readings.channels[readings.channel[int(np.argmax(change))]]
-    return found

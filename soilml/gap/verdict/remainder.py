@@ -6,60 +6,28 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.directions import regions, smooth_basis
-from soilml.gap.evidence.problem import FitProblem, MarginalFit
-from soilml.gap.evidence.score_test import score_test
+from soilml.gap.evidence.family_wise import family_wise_p, scores
+from soilml.gap.evidence.regions import regions
 from soilml.gap.report.results import RegionScore, RemainingDiscrepancy
-from soilml.numerics.subspaces import column_space, project_out
+from soilml.inference.constants import INTERVAL_FACTOR
+from soilml.inference.explanation import Explanation
+from soilml.inference.posterior import Posterior
 from soilml.quantities import QUANTITIES, column
 from soilml.report.numbers import decimal
 from soilml.report.terminal import shown_unit
 
-#: Factor on the expected amplitude in intervals: the part of a discrepancy that resembles a change
-#: of the soil leaves no residual that determines its size. It lies between 1.5, with which 90 %
-#: intervals covered 86 and 88 % on 50 and 99 simulated sets with a discrepancy of 2 % (seeds 0 and
-#: 7, 6 and 8), and 2, with which they covered 93 % on the 50; without a discrepancy it changed
-#: nothing.
-INTERVAL_FACTOR = 1.65
-#: Amplitude of intervals, in usual ones, below which no discrepancy of a channel is stated.
+#: Amplitude in usual ones below which no discrepancy of a channel is stated.
 LEAST_AMPLITUDE = 0.1
-
-
-def with_uncertain_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Solution:
-    """The fit with intervals under the expected amplitudes of the discrepancy.
-
-    The estimates are those of the most probable amplitudes. The amplitudes are enlarged by
-    `INTERVAL_FACTOR`, and at least the declared ones.
-    """
-    amplitude = np.maximum(interval_amplitude(marginal), problem.declared_amplitude)
-    return marginal.fit.whitened_by(problem.discrepancy.whiten(amplitude))
-
-
-def interval_amplitude(marginal: MarginalFit) -> Floats:
-    """Amplitude of each channel's discrepancy in intervals, in usual ones, (channels,)."""
-    return INTERVAL_FACTOR * marginal.evidence.expected_amplitude
-
-
-def posterior_discrepancy(problem: FitProblem, marginal: MarginalFit) -> Floats:
-    r"""Posterior mean of the discrepancy at the readings, (m,), in their unit.
-
-    .. math:: \hat\delta = \Phi T^2 \Phi^T V^{-1} (y - f(\hat x))
-    """
-    process, amplitude = problem.discrepancy.process, marginal.evidence.amplitude
-    if not np.any(amplitude > 0.0):
-        return np.zeros(len(problem.readings))
-    whiten = problem.discrepancy.whiten(amplitude)
-    residual = problem.readings.measured - marginal.fit.prediction
-    weighted = (whiten @ process.columns).T @ (whiten @ residual)
-    return np.asarray(process.columns @ (amplitude[process.channel] ** 2 * weighted))
+#: Largest variance of the logarithm of an amplitude that counts: little is known of such a one.
+MOST_LOG_VARIANCE = 0.5
 
 
 def remaining_discrepancy(
-    problem: FitProblem, before: MarginalFit, after: MarginalFit
+    posterior: Posterior, before: Explanation, after: Explanation
 ) -> dict[str, RemainingDiscrepancy]:
-    """Root mean square discrepancy of each channel beside two fits, by column."""
-    readings, std = problem.readings, problem.covariance.std
-    old, new = posterior_discrepancy(problem, before), posterior_discrepancy(problem, after)
+    """Root mean square discrepancy of each channel beside two hypotheses, by column."""
+    readings, std = posterior.terms.readings, posterior.std
+    old, new = (posterior.discrepancy(node) for node in (before, after))
     found = {}
     for i, name in enumerate(readings.channels):
         own = readings.channel == i
@@ -97,72 +65,41 @@ def _largest(values: Floats, slip: Floats, load: Floats, unit: str) -> str:
     )
 
 
-def discrepancy_amplitudes(problem: FitProblem, marginal: MarginalFit) -> dict[str, float]:
+def discrepancy_amplitudes(posterior: Posterior, node: Explanation) -> dict[str, float]:
     """Standard deviation of the discrepancy of each channel, by column, in the column's unit.
 
-    Channels without a discrepancy are left out.
+    Root mean square over its probability and that of its amplitude, with the factor of intervals;
+    a channel with hardly any is left out.
     """
-    std = interval_amplitude(marginal) * problem.discrepancy.process.usual
-    least = LEAST_AMPLITUDE * problem.discrepancy.process.usual
+    terms, at = posterior.terms, node.beside.at
+    curvature = node.linear.evaluate(at).curvature[: terms.channels]
+    spread = np.minimum(1.0 / np.maximum(curvature, 1e-9), MOST_LOG_VARIANCE)
+    present = np.sqrt(1.0 - node.share_without)
+    amplitude = INTERVAL_FACTOR * present * terms.amplitude(at) * np.exp(spread)
     return {
-        column(name): float(value)
-        for name, value, smallest in zip(problem.readings.channels, std, least, strict=True)
-        if value > smallest
+        column(name): float(a * usual)
+        for name, a, usual in zip(terms.readings.channels, amplitude, terms.usual, strict=True)
+        if a > LEAST_AMPLITUDE and usual > 0.0
     }
 
 
-#: Smooth functions of which less than this fraction is outside the span of the fit are dropped.
-MIN_RELATIVE_SINGULAR_VALUE = 1e-6
-
-
-def residual_trend(problem: FitProblem, fit: Solution) -> dict[str, float]:
-    """Root mean square of the smooth trend of a fit's residuals, by channel, in sigma.
-
-    The component of the whitened residual that smooth functions of slip and load explain and that
-    soil and named effects cannot. The expectation under noise alone is subtracted. The trend does
-    not extrapolate beyond the slips and loads of the data.
-    """
-    readings, whiten = problem.readings, problem.covariance.whiten
-    fit = fit.whitened_by(whiten)
-    smooth = smooth_basis(readings)
-    trend = {}
-    for i, name in enumerate(readings.channels):
-        in_channel = readings.channel == i
-        own = whiten @ np.where(in_channel[:, None], smooth, 0.0)
-        basis = column_space(
-            project_out(own, fit.jacobian), relative_tolerance=MIN_RELATIVE_SINGULAR_VALUE
-        )
-        power = float(np.sum((basis.T @ fit.residual) ** 2)) - basis.shape[1]
-        trend[column(name)] = float(np.sqrt(max(power, 0.0) / max(int(in_channel.sum()), 1)))
-    return trend
-
-
-def discrepancy_map(problem: FitProblem, fit: Solution, seed: int) -> list[RegionScore]:
+def discrepancy_map(posterior: Posterior, soil: Solution) -> list[RegionScore]:
     """Score of each region of the data against the fit of the soil alone, the largest first.
 
-    The score is positive where the mean reading is above the prediction.
+    The score is positive where the mean reading is above the prediction. Outliers count in none.
     """
-    parts = regions(problem.readings)
+    readings, std, whiten = posterior.terms.readings, posterior.std, posterior.whiten
+    parts = regions(readings)
     if not parts:
         return []
-    std = problem.covariance.std
     columns = np.stack([np.where(r.selected, std, 0.0) for r in parts], axis=1)
-    fit = fit.whitened_by(problem.covariance.whiten)
-    test = score_test(
-        fit.residual,
-        columns=problem.covariance.whiten @ columns,
-        space=fit.jacobian,
-        signs=np.zeros(len(parts)),
-        degrees_of_freedom=problem.covariance.components.degrees_of_freedom,
-        seed=seed,
-    )
-    standardised = (problem.readings.measured - fit.prediction) / std
+    fit = soil.whitened_by(whiten)
+    z = np.abs(scores(fit.residual, np.asarray(whiten @ columns), fit.jacobian))
+    standardised = (readings.measured - fit.prediction) / std
     found = []
-    for i in np.argsort(-test.z):
-        region, z = parts[i], float(test.z[i])
+    for i in np.argsort(-z, kind="stable"):
+        region, score = parts[i], float(z[i])
         side = float(np.mean(standardised[region.selected]))
-        signed = float(np.copysign(z, side))
-        found.append(
-            RegionScore(column(region.channel), region.slip, region.load, signed, test.p_value(z))
-        )
+        signed, p = float(np.copysign(score, side)), family_wise_p(score, len(parts))
+        found.append(RegionScore(column(region.channel), region.slip, region.load, signed, p))
     return found

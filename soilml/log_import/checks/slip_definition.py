@@ -6,7 +6,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.errors import FitError, InputError
+from soilml.errors import FitError, InputError, MissingLibraryError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import declared_misfit
 from soilml.fitting.usable_readings import usable_readings
@@ -21,7 +21,7 @@ _FEWEST, _LEAST = 4, 0.02
 _BETTER = 2.0
 #: Logarithm of the ratio of likelihoods of two definitions that is worth asking at: odds of 150.
 _DECISIVE = 5.0
-_ROWS = 48  # Most rows that are fitted
+_LEAST_ROWS, _ROWS = 6, 48  # Fewest and most rows that are fitted
 
 
 def definition_by_speeds(
@@ -72,6 +72,8 @@ def other_definition_fits(case: Case, table: Table) -> bool:
     """
     if "run" in table:
         table = max((rows for _, rows in table.groups("run")), key=len)
+    if len(table) < _LEAST_ROWS:
+        return False
     rows = table.rows(np.unique(np.linspace(0, len(table) - 1, _ROWS).round().astype(int)))
     try:
         free = select_free(case, None)
@@ -81,8 +83,8 @@ def other_definition_fits(case: Case, table: Table) -> bool:
             return False
         columns = {**rows.columns, "slip": our_slip(rows["slip"], SLIP_DEFINITIONS[2])}
         other = declared_misfit(case, usable_readings(case, Table(columns)), free)
-    except (FitError, InputError):
-        return False
+    except (FitError, InputError, MissingLibraryError):
+        return False  # among others where an estimate is made on board, without scipy
     if other is None or stated.freedom < 1:
         return False
     return 0.5 * stated.freedom * float(np.log(stated.squares / other.squares)) > _DECISIVE

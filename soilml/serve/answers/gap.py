@@ -15,7 +15,7 @@ from soilml.gap.report.page import (
     suspect_table,
 )
 from soilml.remarks import texts
-from soilml.report.numbers import format_estimate, format_p_value
+from soilml.report.numbers import format_estimate, format_probability
 from soilml.serve.answers.estimate import read_rows
 from soilml.serve.answers.job_files import MODEL_FILE, Tell, page_case, write_files
 
@@ -59,7 +59,7 @@ def verdict(report: GapReport) -> dict[str, Any]:
             for s in suspect_table(report)
         ],
         "maps": discrepancy_maps(report),
-        "p_gap": format_p_value(report.p_gap),
+        "gap_probability": format_probability(report.gap_probability),
         "sizes": [
             {"rows": name, "before": g.before, "after": g.after, "what": g.description}
             for name, g in report.gap.items()

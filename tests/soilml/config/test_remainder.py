@@ -63,7 +63,7 @@ def test_mean_and_variance_are_those_of_the_conditional_process():
         mean=tuple(spread @ white.T @ (reading / noise)),
         known=tuple(map(tuple, vector * np.sqrt(value))),
     )
-    slip, load = np.asarray([0.2, 0.45, 0.9]), np.asarray([50.0, 90.0, 300.0])
+    slip, load = np.asarray([0.2, 0.45, 0.5]), np.asarray([50.0, 90.0, 100.0])
     at = own.scaled(slip, load)
     between = 0.04 * np.exp(-0.5 * ((at[:, None] - z) ** 2).sum(axis=-1))
     gain = between @ np.linalg.inv(0.04 * correlation + noise**2 * np.eye(3))
@@ -84,6 +84,18 @@ def test_outside_the_range_the_mean_fades_and_the_error_becomes_a_usual_one():
         assert (columns**2).sum() == pytest.approx(0.09, rel=1e-4)
     small = replace(own, usual=0.1)  # an error that was larger than a usual one stays so
     assert small.mean_and_std(np.asarray([0.9]), np.asarray([5000.0]))[1][0] == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize("by_slip", [True, False])
+def test_beyond_the_range_the_mean_only_falls_and_the_error_only_grows(by_slip):
+    """A process that was fitted to rows rings beyond them: here the mean keeps its sign."""
+    own = part(mean=(3.0, -3.0, 3.0))
+    far = np.linspace(0.0, 2.0, 40)
+    slip = 0.5 + 0.3 * far if by_slip else np.full(40, 0.3)
+    load = np.full(40, 60.0) if by_slip else 40.0 * np.exp(-0.6 * far)
+    mean, std = own.mean_and_std(slip, load)
+    assert np.all(np.diff(np.abs(mean)) <= 0.0) and np.all(mean * mean[0] >= 0.0)
+    assert np.all(np.diff(std) >= 0.0) and std[-1] == pytest.approx(0.3, rel=0.1)
 
 
 def test_columns_have_the_covariance_of_the_process_given_the_points():

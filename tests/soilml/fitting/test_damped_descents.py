@@ -5,11 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from gap_sets import MODEL, case_of, driven, fit_problem
+from gap_sets import MODEL, case_of, driven
 
 from soilml.errors import InputError
 from soilml.fitting import damped_descents
-from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.damped_descents import (
     COARSE,
     FINE,
@@ -20,10 +20,11 @@ from soilml.fitting.damped_descents import (
     descend_together,
     descent,
     in_step,
+    levenberg_marquardt,
 )
 from soilml.fitting.least_squares import LeastSquaresProblem, SoilTestTerms, Solution
 from soilml.fitting.predictions import Linearisation
-from soilml.fitting.readings import Readings
+from soilml.fitting.readings import Readings, stack_readings
 from soilml.numerics.prior import Prior
 from soilml.physics.operating_point import Operating
 
@@ -119,15 +120,22 @@ def test_the_objective_counts_tests_of_the_soil():
     assert problem.objective(np.asarray([2.0]), np.asarray([-1.0])) == pytest.approx(4.0 + 9.0)
 
 
+def of_soil(case, table):
+    """The soil alone, fitted to these rows under their declared noise."""
+    readings = stack_readings(case, table)
+    whiten = np.diag(1.0 / readings.std)
+    return LeastSquaresProblem(case, tuple(select_free(case, None)), readings, whiten)
+
+
 def test_a_fit_follows_the_valley_of_bearing_modulus_and_exponent():
     """Modulus and exponent of pressure-sinkage compensate each other at the usual sinkage."""
     bearing = "kphi = [100000.0, 5000000.0]\nn = [0.4, 1.6]\n[noise]"
     case = case_of(MODEL.replace("[noise]", bearing))
-    problem = fit_problem(case, driven(case, seed=1))
-    truth = [c.prior.fraction(float(getattr(case.soil, c.path))) for c in problem.soil]
-    best = problem.fit_soil([np.asarray(truth)])
+    own = of_soil(case, driven(case, seed=1))
+    truth = [c.prior.fraction(float(getattr(case.soil, c.path))) for c in own.coordinates]
+    best = levenberg_marquardt(own, np.asarray(truth))
     for start in (np.full(5, 0.5), np.asarray([0.5, 0.5, 0.3, 0.06, 0.2])):
-        found = problem.fit_soil([start])
+        found = levenberg_marquardt(own, start)
         assert found.converged
         assert found.objective == pytest.approx(best.objective, abs=0.2)
 
@@ -147,10 +155,7 @@ def test_a_step_that_meets_a_bound_goes_on_in_the_valley():
 
 
 def test_a_start_with_a_known_linearisation_leads_to_the_same_fit():
-    problem = fit_problem(case_of(), driven(case_of(), seed=2))
-    own = LeastSquaresProblem(
-        problem.case, problem.soil, problem.readings, problem.covariance.whiten
-    )
+    own = of_soil(case_of(), driven(case_of(), seed=2))
     start = np.full(3, 0.3)
     known = own.linearised(start).linearisation
     alone, beside, elsewhere = descend_together(

@@ -8,7 +8,6 @@ from gap_sets import MODEL, case_of, driven
 
 from soilml.errors import InputError
 from soilml.fitting.readings import stack_readings, typical_std
-from soilml.gap.evidence.problem import _changed
 from soilml.gap.workflow import MOST_READINGS, _check_size
 from soilml.io.table import Table
 from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
@@ -151,21 +150,6 @@ def test_more_readings_than_fit_are_refused_with_what_to_leave_out(more, every):
         return
     with pytest.raises(InputError, match=f"^runs.csv: {n} readings in {n} rows.* of {every}$"):
         _check_size(table)
-
-
-@pytest.mark.parametrize(
-    "before, after, changed",
-    [
-        (0.0, 0.0, False),
-        (0.0, 0.29, False),  # small
-        (0.0, 0.31, True),
-        (10.0, 7.1, False),  # large, but hardly beside itself
-        (10.0, 6.9, True),
-        (6.9, 10.0, True),
-    ],
-)
-def test_a_fit_is_repeated_where_an_amplitude_changes_much(before, after, changed):
-    assert _changed(np.asarray([1.0, before]), np.asarray([1.0, after])) is changed
 
 
 def test_noise_in_the_model_is_that_of_the_readings():

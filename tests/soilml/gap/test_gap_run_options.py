@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gap_sets import case_of, driven, fit_problem
+from gap_sets import case_of, driven
 
+from soilml.fitting.readings import stack_readings
 from soilml.gap.design.run_options import _unvaried, run_options
 
 CASE = case_of()
@@ -13,7 +14,7 @@ CASE = case_of()
 
 def options(case=CASE, loads=(40.0, 60.0, 90.0), changed=None, **covariates):
     """The proposed runs by kind, for runs driven at slips of 0.06 to 0.6 under these loads."""
-    readings = fit_problem(CASE, driven(CASE, loads=loads, **covariates)).readings
+    readings = stack_readings(CASE, driven(CASE, loads=loads, **covariates))
     if changed:
         readings = replace(readings, at=replace(readings.at, **changed))
     found = list(run_options(readings, case, ()))
@@ -135,7 +136,7 @@ def test_a_covariate_is_unvaried_where_it_is_unknown_or_one_number(value, unvari
 
 
 def test_with_several_gears_each_run_is_proposed_for_each():
-    readings = fit_problem(CASE, driven(CASE)).readings
+    readings = stack_readings(CASE, driven(CASE))
     several = replace(CASE, gears={"lugged": CASE.model, "smooth": CASE.model})
     found = {(o.kind, str(o.at.gear[0])): o for o in run_options(readings, several, ())}
     kinds = {kind for kind, _ in found}

@@ -35,7 +35,7 @@ REMAINDER = (
 
 
 def report(status, **parts):
-    parts = {"gap": FIGURES, "p_gap": 0.123} | parts
+    parts = {"gap": FIGURES, "gap_probability": 0.123} | parts
     return GapReport(status, "", parts.pop("model", case_of()), **parts)
 
 
@@ -55,7 +55,7 @@ SCATTER = NoiseAgreement(2.89, True, 0.81, float(np.radians(0.6)), 0.06)
 
 
 def test_agreement_is_within_the_noise_and_what_was_declared():
-    expected = "agree within the noise: mean squared residual 8.8, p = 0.12."
+    expected = "agree within the noise: mean squared residual 8.8, probability of a gap 0.12."
     assert said("no-gap").endswith(expected)
     declared = replace(case_of(), discrepancy={"torque_Nm": Discrepancy(share=0.02)})
     assert "within the noise and the declared discrepancy:" in said("no-gap", model=declared)
@@ -64,7 +64,7 @@ def test_agreement_is_within_the_noise_and_what_was_declared():
 def test_granted_scatter_is_named_with_its_size():
     granted = "a scatter of 0.60 deg and 6 % from run to run"
     assert said("no-gap", misfit=SCATTER) == (
-        f"No gap beyond noise, granting the soil {granted}: p = 0.12."
+        f"No gap beyond noise, granting the soil {granted}: probability of a gap 0.12."
     )
     assert lines("no-gap", misfit=SCATTER)["tried"] == (
         f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
@@ -97,9 +97,9 @@ def test_without_a_cause_the_first_reason_is_stated():
 
 def test_a_gap_of_the_size_of_noise_is_a_pattern():
     small = {"train": GapReduction(1.02, 1.0, {}, 90, "all rows fitted")}
-    assert said("unknown", gap=small, p_gap=0.0065) == (
+    assert said("unknown", gap=small, gap_probability=0.9935) == (
         "There is a gap that no effect explains better than a smooth error (residuals form a "
-        "pattern that noise does not; p = 0.0065)."
+        "pattern that noise does not; probability 0.99)."
     )
 
 
@@ -173,7 +173,7 @@ def test_an_implausibly_large_fault_is_named_in_the_headline():
     fault = Remark("implausible-fault", "...", ("drawbar-offset",))
     assert said("unknown", reasons=(fault,)) == (
         "There is a gap, which only an implausibly large drawbar-offset explains (mean squared "
-        "residual 8.80; noise alone gives 1; p = 0.12)."
+        "residual 8.80; noise alone gives 1; probability 0.12)."
     )
 
 

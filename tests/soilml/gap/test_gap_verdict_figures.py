@@ -21,7 +21,6 @@ from soilml.gap.design.run_options import (
 from soilml.gap.evidence.holdout_split import split_holdout
 from soilml.gap.report.results import NextRun
 from soilml.gap.verdict import remainder as remaining
-from soilml.gap.verdict.decision import NEGLIGIBLE_FRACTION, law_matters
 from soilml.remarks import texts
 
 CHANNELS = ("torque", "sinkage")
@@ -44,103 +43,11 @@ def readings(torque, sinkage=(), slip=None, load=None):
     return stub(channels=CHANNELS, channel=channel, measured=values, slip=slip, load=load)
 
 
-@pytest.mark.parametrize(
-    ("free", "std", "matters"),
-    [
-        # the torques span 0 to 4 N m, of which 2 % are 0.08 N m
-        ([0.081] * 4, 0.01, True),
-        ([0.079] * 4, 0.01, False),
-        ([0.16, 0.0, 0.0, 0.0], 0.01, False),  # 0.08 rms
-        ([0.17, 0.0, 0.0, 0.0], 0.01, True),
-        # the standard error of a mean of four readings is half their standard deviation
-        ([0.11] * 4, 0.2, True),
-        ([0.11] * 4, 0.23, False),
-    ],
-)
-def test_a_law_matters_above_the_error_of_a_mean_and_two_per_cent_of_the_range(free, std, matters):
-    assert NEGLIGIBLE_FRACTION == 0.02
-    problem = stub(readings=readings([1.0, 2.0, 3.0, 4.0]), covariance=stub(std=np.full(4, std)))
-    law = stub(fit=stub(prediction=np.zeros(4)))
-    own = stub(fit=stub(prediction=np.asarray(free)))
-    assert law_matters(problem, stub(catalogue_law=law, free_law=own)) == matters
-
-
-def test_the_range_of_a_channel_contains_zero_and_each_channel_counts():
-    def matters(difference, values):
-        given = readings([10.0, 10.5], values)
-        problem = stub(readings=given, covariance=stub(std=np.full(4, 1e-6)))
-        law = stub(fit=stub(prediction=np.zeros(4)))
-        own = stub(fit=stub(prediction=np.asarray([0.0, 0.0, *difference])))
-        return law_matters(problem, stub(catalogue_law=law, free_law=own))
-
-    assert not matters([0.19, 0.19], [9.0, 10.0])  # from 0 to 10
-    assert matters([0.21, 0.21], [9.0, 10.0])
-    assert not matters([0.39, 0.39], [-10.0, 10.0])
-    assert matters([0.41, 0.41], [-10.0, 10.0])
-    assert not matters([0.19, 0.19], [-10.0, -9.0])
-    given = readings([], [9.0, 10.0])  # a channel without a reading does not end the comparison
-    problem = stub(readings=given, covariance=stub(std=np.full(2, 1e-6)))
-    law, own = (stub(fit=stub(prediction=np.full(2, value))) for value in (0.0, 0.21))
-    assert law_matters(problem, stub(catalogue_law=law, free_law=own))
-
-
-def discrepancy(columns, amplitude, std, channel):
-    """A problem whose discrepancy has these columns of the process, under white noise."""
-    columns, std = np.asarray(columns, dtype=float), np.asarray(std, dtype=float)
-
-    def whiten(size):
-        covariance = np.diag(std**2) + columns @ np.diag(size[channel] ** 2) @ columns.T
-        return np.linalg.inv(np.linalg.cholesky(covariance))
-
-    process = stub(columns=columns, channel=channel, usual=np.asarray([0.1, 0.002]))
-    marginal = stub(
-        evidence=stub(amplitude=np.asarray(amplitude), expected_amplitude=np.asarray(amplitude)),
-        fit=stub(prediction=np.zeros(len(std))),
-    )
-    return process, whiten, marginal
-
-
-def test_the_remaining_discrepancy_is_the_mean_of_the_process_given_the_residuals():
-    """One constant a channel: shrunk by T^2 n / (T^2 n + s^2) from the mean of n residuals."""
-    columns = [[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]
-    process, whiten, after = discrepancy(columns, [2.0, 3.0], [1.0] * 4, np.asarray([0, 1]))
-    given = readings([4.0, 8.0], [-1.0, -3.0], slip=[0.1, 0.2, 0.3, 0.4], load=[60, 60, 80, 80])
-    problem = stub(
-        readings=stub(**vars(given), __len__=None),
-        discrepancy=stub(process=process, whiten=whiten),
-        covariance=stub(std=np.asarray([0.5, 0.5, 2.0, 2.0])),
-        declared_amplitude=np.zeros(2),
-    )
-    found = remaining.posterior_discrepancy(problem, after)
-    torque, sinkage = 6.0 * 8.0 / 9.0, -2.0 * 18.0 / 19.0
-    np.testing.assert_allclose(found, [torque, torque, sinkage, sinkage])
-    _, _, weak = discrepancy(columns, [0.0, 1.0], [1.0] * 4, np.asarray([0, 1]))
-    both = remaining.remaining_discrepancy(problem, weak, after)
-    assert list(both) == ["torque_Nm", "sinkage_m"]
-    one = both["torque_Nm"]
-    assert (one.unit, one.before_value) == ("N m", 0.0)
-    assert one.after_value == pytest.approx(torque)
-    assert one.after_sigma == pytest.approx(torque / 0.5)
-    assert both["sinkage_m"].before_value == pytest.approx(2.0 * 2.0 / 3.0)
-    assert both["sinkage_m"].before_sigma == pytest.approx(2.0 / 3.0)
-    assert one.description == "measured above the model by up to 5.3 N m, at slip 0.10 under 60 N"
-    assert both["sinkage_m"].description.startswith("measured below the model by up to 1895 mm")
-
-
 def test_where_the_discrepancy_is_largest():
     slip, load = np.asarray([0.1, 0.25]), np.asarray([60.0, 123.4])
     said = remaining._largest(np.asarray([0.5, -2.0]), slip, load, "N")
     assert said == "measured below the model by up to 2.0 N, at slip 0.25 under 123 N"
     assert remaining._largest(np.zeros(2), slip, load, "N") == ""
-
-
-def test_amplitudes_of_the_updated_model_are_those_of_intervals():
-    process, whiten, marginal = discrepancy(
-        np.zeros((4, 2)), [2.0, 0.1 / remaining.INTERVAL_FACTOR], [1.0] * 4, np.asarray([0, 1])
-    )
-    problem = stub(readings=readings([1.0]), discrepancy=stub(process=process, whiten=whiten))
-    found = remaining.discrepancy_amplitudes(problem, marginal)
-    assert found == {"torque_Nm": pytest.approx(0.1 * 2.0 * remaining.INTERVAL_FACTOR)}
 
 
 def severities(check, **values):

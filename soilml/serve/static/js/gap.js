@@ -39,7 +39,7 @@ function show({ id, result }) {
     fold("Why", element("p", {}, result.meaning), ...result.lines.map((line) => element("p", {}, line)),
       wordList(result.reasons.filter((reason) => reason !== result.sentence))),
     result.maps.length ? fold("Where the model disagrees",
-      element("p", { class: "soft" }, `Scores in σ of the readings in a range of slip and load against the fit of the soil alone; ★ where significant, ▲ measured above the model, ▼ below. Probability of such a gap under noise alone: ${result.p_gap}.`),
+      element("p", { class: "soft" }, `Scores in σ of the readings in a range of slip and load against the fit of the soil alone; ★ where significant, ▲ measured above the model, ▼ below. Probability of a gap: ${result.gap_probability}.`),
       element("div", { class: "maps" }, ...result.maps.map(map))) : null,
     fold("Effects and the size of the gap", ...effects(result.effects), sizes(result.sizes), suspects(result.suspects)),
     fold("What to drive or check next", nextRuns(result.next_runs)),

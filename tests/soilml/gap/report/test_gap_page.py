@@ -159,7 +159,6 @@ def report(status="named", **changes):
             "noise_scale_torque_Nm": 0.87,
             "friction_angle_std": 0.00698,
         },
-        residual_trend={"torque_Nm": 0.25, "sinkage_m": 0.0},
         suspects=(Suspect(("slip-sinkage",), 7.0, 0.9),),
         conditions=(Remark("one-bed", "the bed was the same for all rows"),),
         discrepancy={
@@ -167,8 +166,8 @@ def report(status="named", **changes):
                 "N m", 0.404, 0.137, 2.3, 1.6, "measured below the model, at slip 0.14 under 71 N"
             )
         },
-        p_gap=0.00025,
-        p_residual=0.86,
+        gap_probability=0.9998,
+        remainder_probability=0.14,
         seed=7,
         curves=curves(),
     )
@@ -229,7 +228,6 @@ def test_hostile_names_stay_text():
         notes=(said(EVIL),),
         not_claimed=(said(EVIL),),
         untestable={EVIL: said(EVIL)},
-        residual_trend={EVIL: 1.0},
         suspects=(Suspect((EVIL,), 0.0, 0.45),),
         discrepancy={EVIL: RemainingDiscrepancy(EVIL, 2.0, 1.0, 2.0, 1.0, EVIL)},
         variance_components={EVIL: 1.0},
@@ -267,7 +265,7 @@ def test_the_page_contains_the_figures_of_the_report():
         *("23.147 ± 0.074", "27.327 ± 0.074", "+4.179°", "0.4040 ± 0.0013 rad"),  # the soil
         *("61203", "61284", "more effects than needed"),
         "7.25 σ",
-        "p = 0.86",
+        "a smooth discrepancy is left beside this explanation: 0.14",
         *("0.137 N m", "1.60", "at slip 0.14 under 71 N"),  # the discrepancy
         "> 0.99",
         "0.87 × the declared noise",
@@ -299,7 +297,8 @@ def test_non_finite_figures_are_rendered():
     c = replace(c, before=np.full(8, nan), after_std=np.full(8, nan))
     odd = GapReduction(inf, nan, {"sinkage_m": (nan, 0.0)}, 0, "")
     old = {"n": EstimatedValue(nan, nan, "1"), "kphi": EstimatedValue(0.0, inf, "N/m^(n+2)")}
-    whole = report(curves=c, gap={"train": odd}, soil_before=old, soil_after=old, p_residual=nan)
+    soils = {"soil_before": old, "soil_after": old}
+    whole = report(curves=c, gap={"train": odd}, remainder_probability=nan, **soils)
     read(
         page(replace(whole, where=(RegionScore("sinkage_m", (0, 1), (1, 2), inf, nan),)), "m", "r")
     )

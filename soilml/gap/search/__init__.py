@@ -1,1 +1,0 @@
-"""Search for missing effects: candidate fits, stepwise selection and posterior probabilities."""

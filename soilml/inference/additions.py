@@ -1,0 +1,145 @@
+"""Predicted values of a hypothesis with one thing more: an effect, free laws, opened priors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.effect_signatures import Signature, effect_signatures
+from soilml.inference import constants
+from soilml.inference.evidence import linear_model, of_priors
+from soilml.inference.explanation import Explanation, Prediction
+from soilml.inference.gaussian_terms import Hyperparameters
+from soilml.inference.problem import SOIL_ALONE, Hypothesis
+
+if TYPE_CHECKING:
+    from soilml.inference.search import Search
+
+#: Distance from the ends of an opened prior at which a fit starts: one at a bound would stay there.
+OFF_BOUNDS = 0.02
+#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
+LARGE_DISCREPANCY = 3.0
+
+
+def additions(
+    search: Search, node: Explanation, ladder: Sequence[Hyperparameters]
+) -> dict[Hypothesis, Prediction]:
+    """Predicted values of a node's hypothesis with one thing more, the best of a ladder."""
+    p = len(node.fit.x)
+    extra, moves = _moves(search, node)
+    model = linear_model(search.terms, node.fit, node.outliers, extra)
+    start = node.fit.start_values()
+    found: dict[Hypothesis, Prediction] = {}
+    prior = constants.DISCREPANCY_PRIOR
+    for at in ladder:
+        try:
+            products, constant = model.reduced(at)
+            own = node.linear.evaluate(at)
+            rest = node.linear.beside(at, own.curvature) + of_priors(node.linear, own)
+        except np.linalg.LinAlgError:
+            continue
+        rest -= 2.0 * float(np.log(prior if at.present else 1.0 - prior))
+        for hypothesis, columns, sign in moves:
+            value, step = model.evidence_with(products, constant, [*range(p), *columns], p)
+            if sign and step[p] * sign <= 0.0:
+                continue
+            value += rest + search.problem.penalty(hypothesis)
+            if hypothesis not in found or value < found[hypothesis].value:
+                found[hypothesis] = Prediction(value, start, at, node.outliers)
+    return found | _by_catalogue(search, node, start) | _opened(search, node, start)
+
+
+def _moves(
+    search: Search, node: Explanation
+) -> tuple[list[tuple[Coordinate, Floats]], list[tuple[Hypothesis, list[int], int]]]:
+    """Further coordinates with their columns, and hypotheses with the numbers of theirs.
+
+    The third entry of a move is the sign that the size of its effect must have, or 0.
+    """
+    h, fit, problem = node.hypothesis, node.fit, search.problem
+    s, w = problem.readings.log_slip_and_load
+    terms = {"slip_power": s, "by_slip": problem.readings.slip, "by_load": w}
+    extra: list[tuple[Coordinate, Floats]] = []
+    moves: list[tuple[Hypothesis, list[int], int]] = []
+    p = len(fit.x)
+    if len(h.effects) < constants.MOST_EFFECTS:
+        for signature in _signatures(search, node):
+            shapes = problem.shapes(signature.name)
+            names, first = tuple(sorted((*h.effects, signature.name))), p + len(extra)
+            extra.append((problem.size(signature.name), signature.column))
+            extra += [(c, signature.column * terms[c.name]) for c in shapes]
+            free = [*range(first, first + 1 + len(shapes))]
+            if not h.free_law or not h.effects:
+                moves.append((replace(h, effects=names, free_law=False), [first], signature.sign))
+            if shapes and (h.free_law or not h.effects):
+                moves.append((replace(h, effects=names, free_law=True), free, signature.sign))
+            elif h.free_law:
+                moves.append((replace(h, effects=names), [first], signature.sign))
+    if h.effects and not h.free_law:
+        first = p + len(extra)
+        for i, own in enumerate(fit.coordinates):
+            if own.effect:
+                column = fit.derivatives[:, i] * fit.x[i]
+                extra += [(c, column * terms[c.name]) for c in problem.shapes(own.effect)]
+        if p + len(extra) > first:
+            moves.append((replace(h, free_law=True), [*range(first, p + len(extra))], 0))
+    return extra, moves
+
+
+def _signatures(search: Search, node: Explanation) -> list[Signature]:
+    """How the readings change with each effect that may act beside those of a node."""
+    estimate = node.fit.linearisation.sinkage_at(np.zeros((1, len(node.fit.x))))
+    others = search.problem.effects_beside(node.hypothesis.effects)
+    case, readings = node.fit.fitted(), search.problem.readings
+    found, untestable = effect_signatures(case, readings, others, estimate)
+    if node.hypothesis == SOIL_ALONE:
+        search.untestable = untestable
+    search.signatures[node.hypothesis.effects] = found
+    return found
+
+
+def _by_catalogue(
+    search: Search, node: Explanation, start: Mapping[str, float]
+) -> dict[Hypothesis, Prediction]:
+    """The hypothesis by the catalogue's laws, where that with free ones is a node.
+
+    Whether the catalogue's laws explain too decides how far free ones count for an effect.
+    """
+    if not node.hypothesis.free_law:
+        return {}
+    own = replace(node.hypothesis, free_law=False)
+    return {own: Prediction(node.value, start, node.at, node.outliers)}
+
+
+def _opened(
+    search: Search, node: Explanation, start: Mapping[str, float]
+) -> dict[Hypothesis, Prediction]:
+    """The hypothesis with the priors of its soil opened, where that can matter.
+
+    The fit presses against one of them, or a large discrepancy is left.
+    """
+    h, problem = node.hypothesis, search.problem
+    if h.wide_priors or problem.wide_soil == problem.soil:
+        return {}
+    ends = [
+        min(x - c.lower, c.upper - x)
+        for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)
+        if not c.effect
+    ]
+    large = search.terms.amplitude(node.at).max(initial=0.0) > LARGE_DISCREPANCY
+    if min(ends, default=1.0) >= constants.PRESSED and not large:
+        return {}
+    values = node.fit.values()
+    opened = {
+        c.path: float(
+            np.clip(c.prior.fraction(values.get(c.path, c.nominal)), OFF_BOUNDS, 1.0 - OFF_BOUNDS)
+        )
+        for c in problem.wide_soil
+    }
+    wide = replace(h, wide_priors=True)
+    return {wide: Prediction(node.value, {**start, **opened}, node.at, node.outliers)}

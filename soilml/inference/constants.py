@@ -1,0 +1,95 @@
+"""Every number that decides in the inference, with its reason.
+
+Where a sample set a number, it is of `datagen.blind_sets`, seed 1, one plan in twenty: the sets
+that `python bench/gap.py --seed 1 --every 20` draws.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# ---- priors of what a model lacks
+
+#: Causes that a model is expected to lack before any row is seen, whatever the catalogue's size.
+EXPECTED_CAUSES = 1.0
+#: Largest number of effects in one explanation: with more, several laws together fit almost any
+#: rows.
+MOST_EFFECTS = 3
+#: Prior probability that an effect follows another law than the catalogue's: published laws of
+#: one mechanism differ from each other as often as not.
+OTHER_LAW_PRIOR = 0.5
+#: Prior probability that the soil lies outside the priors that the case states: one in twenty.
+OUTSIDE_PRIORS = 0.05
+#: Prior probability that a smooth discrepancy is present.
+DISCREPANCY_PRIOR = 0.5
+#: Range over which the logarithm of the size of an effect of soil or gear is uniform, in reference
+#: sizes; the density falls with two further powers beyond it.
+SMALLEST_SIZE, LARGEST_SIZE, TAIL_POWER = 0.01, 5.0, 2.0
+#: Prior standard deviation of the error of a sensor or rig that nothing has checked, in reference
+#: sizes.
+UNCHECKED_STD = 2.0
+
+# ---- priors of scatter, discrepancy and noise
+
+#: One unit of scatter from run to run: half a degree of friction angle, 5 % of the bearing moduli.
+#: Soils that are prepared alike scatter by about one, the standard deviation of its prior.
+SCATTER_UNITS = {"friction_angle": float(np.deg2rad(0.5)), "bearing": 0.05}
+#: Probability that a discrepancy has a cause which the catalogue lacks, and the scale of its
+#: amplitude, in usual ones: 20 % of a range. A heavy tail does not reward an effect for explaining
+#: a part of a large discrepancy (Gelman, Bayesian Analysis 1(3), 2006).
+UNKNOWN_CAUSE, UNKNOWN_SCALE = 0.02, 10.0
+#: Prior standard deviation of the logarithm of the noise over the declared one, which is a lower
+#: bound.
+LOG_NOISE_STD = 0.3
+#: Correlations of neighbouring samples that are tried, and their prior probabilities; they are
+#: tried where a run has that many readings, which can tell them apart.
+AUTOCORRELATIONS = {0.0: 0.8, 0.5: 0.1, 0.8: 0.1}
+AUTOCORRELATED_RUN = 8
+#: Prior probability that a reading strays, and the standard deviation with which it does, as a
+#: share of its channel's range.
+OUTLIER_PRIOR, OUTLIER_WIDTH = 0.01, 0.5
+#: Log odds from which a reading is taken as straying, or no longer: a hysteresis, so that the
+#: search ends.
+OUTLIER_GAIN = 0.5
+
+# ---- the search
+
+#: Evidence (-2 ln p) within which of the best one an explanation is kept and extended: odds of
+#: 3000 to 1, beyond which its share of any answer is below its rounding.
+NEAR = 16.0
+#: The same for sets of several effects when they are proposed: many are predicted, and each costs
+#: a fit.
+NEAR_SET = 4.0
+#: Decrease of -2 ln p by a linearised step that counts without a fit; what promises more is fitted.
+TRUSTED = 4.0
+#: Fits of one round, of an explanation in turn with its hyperparameters, and rounds.
+FITS_PER_ROUND, FITS_IN_TURN, ROUNDS = 8, 4, 7
+#: Single effects that are fitted in the first round in any case.
+FIRST_SINGLES = 4
+#: Amplitude of a discrepancy, in usual ones, from which it can hide an effect that explains nearly
+#: everything: so many single effects are then fitted without a discrepancy first.
+HIDING, HIDDEN = 2.5, 8
+#: Size from which the fit of an effect starts, in reference sizes: off zero, where the derivative
+#: of some effects vanishes.
+START_SIZE = 0.7
+#: Change of the logarithm of a hyperparameter from which a fit is repeated under the new ones.
+MOVED = 0.5
+#: Distance from an end of its prior, as a fraction, at which a soil parameter presses against it.
+PRESSED = 0.02
+
+# ---- the answer
+
+#: Discrepancy, root mean square in the noise of a reading, that is no gap: with noise it makes
+#: residuals five per cent larger than noise alone.
+NEGLIGIBLE_DISCREPANCY = 0.3
+#: Probability that an effect of the catalogue is the right description of a cause that it explains.
+IN_CATALOGUE = 0.97
+#: Share of the explanations by another law than the catalogue's that are right: of an effect whose
+#: own law explains no more than the soil alone, another cause may be at work.
+OTHER_LAW_RIGHT = 0.3
+#: Squared distance of the shapes from the catalogue's law, in prior variances, up to which a free
+#: law is still the catalogue's.
+FAR_LAW = 1.0
+#: Factor on intervals about their mean: what the discrepancy of each channel cannot imitate, and
+#: what Laplace's approximation of the hyperparameters leaves out. Calibrated on the sample.
+INTERVAL_FACTOR = 1.35

@@ -1,0 +1,373 @@
+r"""Evidence of a fit: soil, sizes and hyperparameters integrated out.
+
+For a fit at x with Jacobian J and residual r, Gaussian priors of precision P, columns U of the
+Gaussian terms and B = [U diag(tau), J], everything is in the Gram matrices of [U, J, r] by channel:
+
+.. math::
+    M = \operatorname{diag}(I, P) + B^T V_e^{-1} B, \quad b = B^T V_e^{-1} r - \pi, \quad
+    -2 \ln p(y \mid \eta) = r^T V_e^{-1} r - b^T M^{-1} b + \ln|M| + \ln|V_e| - 2 \ln p(\eta)
+
+    \frac{d}{d \ln \tau_g} = 2 \sum_{k \in g} (1 - [M^{-1}]_{kk} - \beta_k^2), \quad
+    \frac{d}{d \ln s_c} = 2 (n_c - \mathrm{dof}_c - \mathrm{rss}_c), \quad \beta = M^{-1} b
+
+with half the gradient pi of the priors' -2 ln density. As x is integrated, the hyperparameters eta
+at the optimum are those of restricted maximum likelihood with a prior. They are integrated by
+Laplace's approximation too, with their expected information.
+
+References: MacKay, Bayesian Interpolation, Neural Computation 4(3), 1992; Patterson and Thompson,
+Biometrika 58, 1971; Searle, Casella and McCulloch, Variance Components, 1992, section 6.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats, Integers
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.least_squares import Solution
+from soilml.inference import constants
+from soilml.inference.gaussian_terms import DISCREPANCY, GaussianTerms, Hyperparameters
+from soilml.inference.priors import (
+    AT_BOUND,
+    LOG_2PI,
+    WEAK_PRECISION,
+    correction_of_prior,
+    prior_of_hyperparameters,
+)
+from soilml.numerics.prior import UNIFORM_PRECISION
+
+Booleans = NDArray[np.bool_]
+
+#: Smallest expected information on a hyperparameter that counts, and on one that was never seen.
+LEAST_INFORMATION, LEAST_DEGREES = 0.15, 0.5
+#: Residual, in standard deviations, of a reading without equilibrium.
+NO_EQUILIBRIUM = 1e3
+#: Iterations of the search for hyperparameters.
+ITERATIONS = 25
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """A linear model at some hyperparameters."""
+
+    value: float  # -2 ln of the evidence with x integrated, bounds ignored
+    curvature: Floats  # of half of it in the logarithms of the hyperparameters
+    covariance: Floats  # (p, p) of the coordinates, as if none were at a bound
+    step: Floats  # (p,) to the optimum under these hyperparameters
+    push: Floats  # (p,) gradient of ln p of the coordinates at a bound
+    weights: Floats  # (used,) mean weights of the columns
+    used: Integers  # (used,) numbers of the columns that have a variance
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Evidence of a fit, -2 ln p up to a constant that all share.
+
+    promised: What a step from the fit to the optimum gives in the linear model; it counts up to
+        `TRUSTED`, the rest only once it was fitted.
+    """
+
+    at: Hyperparameters
+    value: float
+    promised: float
+
+    @property
+    def trusted(self) -> float:
+        """The evidence without what a long step only promises."""
+        return self.value + max(self.promised - constants.TRUSTED, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearisedFit:
+    """Readings near a fit: Jacobian, residual, and the priors of the coordinates.
+
+    held (p,): Coordinates at a bound, which stay there.
+    precision, pull, constant (p,): Of Gaussian priors or what stands for others: precision, half
+        the gradient of -2 ln density, and its value.
+    information (p, p), cost: Of tests of the soil.
+    """
+
+    terms: GaussianTerms
+    outliers: Booleans
+    coordinates: Sequence[Coordinate]
+    x: Floats
+    jacobian: Floats
+    residual: Floats
+    held: Booleans
+    precision: Floats
+    pull: Floats
+    constant: Floats
+    information: Floats
+    cost: float
+    _products: dict[float, tuple[Floats, Floats, float]] = field(default_factory=dict)
+    _taken: dict[tuple[float, bytes], tuple[Floats, Floats, float]] = field(default_factory=dict)
+
+    def without(self, outliers: Booleans) -> LinearisedFit:
+        """The same model of other readings."""
+        return replace(self, outliers=outliers, _products={}, _taken={})
+
+    def products(self, autocorrelation: float) -> tuple[Floats, Floats, float]:
+        """Gram matrices (channels, q + p + 1, ...) of [U, J, r]; counts; ln|V_e| at scale 1."""
+        if autocorrelation not in self._products:
+            white = self.terms.whitened(autocorrelation, ~self.outliers)
+            own = np.column_stack([self.jacobian, self.residual])
+            own = white.noise[:, None] * own if white.noise.ndim == 1 else white.noise @ own
+            q, k = white.columns.shape[1], own.shape[1]
+            gram = np.zeros((self.terms.channels, q + k, q + k))
+            for c in range(self.terms.channels):
+                of = self.terms.readings.channel == c
+                gram[c, :q, :q] = white.gram[c]
+                gram[c, :q, q:] = white.columns[of].T @ own[of]
+                gram[c, q:, :q] = gram[c, :q, q:].T
+                gram[c, q:, q:] = own[of].T @ own[of]
+            self._products[autocorrelation] = gram, white.counts, white.log_determinant
+        return self._products[autocorrelation]
+
+    def _ordered(
+        self, autocorrelation: float, used: Integers, order: Integers
+    ) -> tuple[Floats, Floats, float]:
+        """Gram matrices of the used columns and of [J, r] in an order; see `products`."""
+        key = autocorrelation, used.tobytes()
+        if key not in self._taken:
+            gram, counts, log_determinant = self.products(autocorrelation)
+            p = len(self.x)
+            q = gram.shape[1] - p - 1
+            take = np.concatenate([used, q + order, [q + p]])
+            self._taken[key] = gram[:, take[:, None], take], counts, log_determinant
+        return self._taken[key]
+
+    def evaluate(self, at: Hyperparameters) -> Evaluation:
+        """The model at some hyperparameters."""
+        _, _, found = self._evaluated(at, in_full=True)
+        assert found is not None
+        return found
+
+    def _evaluated(
+        self, at: Hyperparameters, *, in_full: bool
+    ) -> tuple[float, Floats, Evaluation | None]:
+        """Value and gradient, and the rest where asked for.
+
+        In one Cholesky factor, coordinates at a bound stand after the others: the solution of the
+        first ones leaves them where they are, and the determinant has all.
+        """
+        from scipy.linalg import solve_triangular
+
+        terms, p, first = self.terms, len(self.x), self.terms.groups
+        variance = terms.variance(at)
+        used = np.flatnonzero(variance > 0.0)
+        order = np.concatenate([np.flatnonzero(~self.held), np.flatnonzero(self.held)])
+        gram, counts, log_determinant = self._ordered(at.autocorrelation, used, order)
+        weight = np.exp(-2.0 * at.log[first:])
+        total = np.tensordot(weight, gram, axes=1)
+        k = len(used)
+        free = k + int(np.count_nonzero(~self.held))
+        scale = np.concatenate([np.sqrt(variance[used]), np.ones(p)])
+        matrix = scale[:, None] * total[:-1, :-1] * scale
+        matrix[np.arange(k), np.arange(k)] += 1.0
+        matrix[k:, k:] += (np.diag(self.precision) + self.information)[np.ix_(order, order)]
+        b = scale * total[:-1, -1]
+        b[k:] -= self.pull[order]
+        factor = np.linalg.cholesky(matrix)
+        half = solve_triangular(factor[:free, :free], b[:free], lower=True)
+        beta = np.zeros(len(scale))
+        beta[:free] = solve_triangular(factor[:free, :free].T, half, lower=False)
+        prior, gradient, curvature = prior_of_hyperparameters(terms, at)
+        value = float(
+            total[-1, -1]
+            - half @ half
+            + 2.0 * np.log(np.diag(factor)).sum()
+            + log_determinant
+            + 2.0 * counts @ at.log[first:]
+            - p * LOG_2PI
+            + self.cost
+            + self.constant.sum()
+            + prior
+        )
+        root = solve_triangular(factor, np.eye(len(matrix)), lower=True)
+        inverse = root.T @ root
+        of_terms = terms.group[used] >= 0
+        change = 2.0 * (1.0 - np.diag(inverse)[:k] - beta[:k] ** 2)
+        np.add.at(gradient, terms.group[used][of_terms], change[of_terms])
+        left = np.append(-scale * beta, 1.0)
+        spread = scale[:, None] * inverse * scale
+        squares = weight * ((gram @ left) @ left)
+        degrees = weight * np.tensordot(gram[:, :-1, :-1], spread, axes=2)
+        gradient[first:] += 2.0 * (counts - degrees - squares)
+        curvature[first:] += 2.0 * np.maximum(counts - degrees, LEAST_DEGREES)
+        if not in_full:
+            return value, gradient, None
+        shrunk = (np.eye(k) - inverse[:k, :k]) ** 2
+        for g in range(first):
+            own = terms.group[used] == g
+            curvature[g] += 2.0 * float(shrunk[np.ix_(own, own)].sum())
+        back = np.argsort(order)
+        step, push = np.zeros(p), np.zeros(p)
+        step[order] = beta[k:]
+        push[order[free - k :]] = b[free:] - factor[free:, :free] @ half
+        covariance = inverse[k:, k:][np.ix_(back, back)]
+        return value, gradient, Evaluation(value, curvature, covariance, step, push, beta[:k], used)
+
+    def best(self, start: Hyperparameters, iterations: int = ITERATIONS) -> Hyperparameters:
+        """The hyperparameters of the largest evidence, as far as `start` allows a discrepancy."""
+        from scipy.optimize import minimize
+
+        bounds, fixed = self.terms.bounds(), self.terms.of_kind(DISCREPANCY) & (not start.present)
+
+        def objective(log: Floats) -> tuple[float, Floats]:
+            try:
+                value, gradient, _ = self._evaluated(replace(start, log=log), in_full=False)
+            except np.linalg.LinAlgError:
+                return 1e9, np.zeros_like(log)
+            return value, np.where(fixed, 0.0, gradient)
+
+        first = np.clip(start.log, *np.asarray(bounds).T)
+        options = {"maxiter": iterations, "ftol": 1e-5, "maxcor": 8}
+        found = minimize(
+            objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options=options
+        )
+        return replace(start, log=found.x)
+
+    def evidence(self, at: Hyperparameters) -> Evidence:
+        """Evidence with coordinates and hyperparameters integrated out."""
+        found = self.evaluate(at)
+        value = found.value + of_priors(self, found) + self.beside(at, found.curvature)
+        free = ~self.held
+        curvature = np.linalg.inv(found.covariance)[np.ix_(free, free)]
+        promised = float(found.step[free] @ curvature @ found.step[free])
+        return Evidence(at, value, promised)
+
+    def beside(self, at: Hyperparameters, curvature: Floats) -> float:
+        """What hyperparameters, outliers and autocorrelation add to -2 ln p of `evaluate`."""
+        counted = ~self.terms.of_kind(DISCREPANCY) | at.present
+        own = np.maximum(curvature[counted], LEAST_INFORMATION)
+        value = float((np.log(own) - LOG_2PI).sum())
+        width = self.terms.largest_outlier[self.outliers]
+        odds = constants.OUTLIER_PRIOR / (1.0 - constants.OUTLIER_PRIOR)
+        strays = (self.residual[self.outliers] / width) ** 2 + 2.0 * np.log(width / odds)
+        value += float((strays + LOG_2PI).sum())
+        value -= 2.0 * float(np.log(constants.AUTOCORRELATIONS[at.autocorrelation]))
+        return value + float(np.count_nonzero(~self.outliers)) * LOG_2PI
+
+    def reduced(self, at: Hyperparameters) -> tuple[Floats, float]:
+        """Products (p + 1, p + 1) of [J, r] under the covariance at `at`; ln of its determinant.
+
+        With -2 ln of the prior density of the hyperparameters.
+        """
+        from scipy.linalg import solve_triangular
+
+        terms, p = self.terms, self.jacobian.shape[1]
+        gram, counts, log_determinant = self.products(at.autocorrelation)
+        variance = terms.variance(at)
+        used, q = np.flatnonzero(variance > 0.0), gram.shape[1] - p - 1
+        take = np.concatenate([used, np.arange(q, q + p + 1)])
+        weight = np.exp(-2.0 * at.log[terms.groups :])
+        total = np.einsum("c,cij->ij", weight, gram[:, take[:, None], take])
+        k, t = len(used), np.sqrt(variance[used])
+        matrix = t[:, None] * total[:k, :k] * t + np.eye(k)
+        factor = np.linalg.cholesky(matrix)
+        half = solve_triangular(factor, t[:, None] * total[:k, k:], lower=True)
+        value = 2.0 * float(np.log(np.diag(factor)).sum()) + log_determinant
+        value += 2.0 * float(counts @ at.log[terms.groups :])
+        return total[k:, k:] - half.T @ half, value + prior_of_hyperparameters(terms, at)[0]
+
+    def evidence_with(
+        self, products: Floats, constant: float, columns: Sequence[int], first: int
+    ) -> tuple[float, Floats]:
+        """Evidence of the model of some columns, and the step of its coordinates.
+
+        products, constant: By `reduced`.
+        first: Number of the first coordinate whose prior is integrated here; see `of_priors`.
+        """
+        own = list(columns)
+        inner = np.ix_(own, own)
+        precision, held = self.precision[own], self.held[own]
+        curvature = products[inner] + np.diag(precision) + self.information[inner]
+        b = products[own, -1] - self.pull[own]
+        free, step = ~held, np.zeros(len(own))
+        step[free] = np.linalg.solve(curvature[np.ix_(free, free)], b[free])
+        covariance = np.linalg.inv(curvature)
+        push = np.where(free, 0.0, b - curvature @ step)
+        value = float(
+            products[-1, -1]
+            - b @ step
+            + np.linalg.slogdet(curvature)[1]
+            + constant
+            - len(own) * LOG_2PI
+            + self.cost
+            + self.constant[own].sum()
+        )
+        coordinates = [self.coordinates[i] for i in own]
+        for i in range(first, len(own)):
+            value += correction_of_prior(
+                coordinates[i],
+                float(self.x[own[i]]),
+                float(1.0 / covariance[i, i]),
+                float(step[i]),
+                float(push[i]),
+                held=bool(held[i]),
+            )
+        return value, step
+
+
+def linear_model(
+    terms: GaussianTerms,
+    fit: Solution,
+    outliers: Booleans,
+    extra: Sequence[tuple[Coordinate, Floats]] = (),
+) -> LinearisedFit:
+    """A fit's neighbourhood, with further coordinates at zero and their columns (m,) of J."""
+    coordinates = [*fit.coordinates, *(c for c, _ in extra)]
+    jacobian = np.column_stack([fit.derivatives, *(column[:, None] for _, column in extra)])
+    x = np.concatenate([fit.x, np.zeros(len(extra))])
+    precision, pull, constant = np.zeros(len(x)), np.zeros(len(x)), np.zeros(len(x))
+    for i, c in enumerate(coordinates):
+        if np.isfinite(c.std):
+            precision[i], pull[i] = c.std**-2, x[i] * c.std**-2
+            constant[i] = x[i] * pull[i] + 2.0 * np.log(c.std) + LOG_2PI
+        else:
+            precision[i] = WEAK_PRECISION if c.effect else UNIFORM_PRECISION
+    deviation = fit.soil_tests.deviation(fit.x)
+    rates = np.zeros((deviation.size, len(x)))
+    rates[:, : len(fit.x)] = fit.soil_tests.rates(fit.x)
+    lower, upper = (
+        np.asarray([getattr(c, end) for c in coordinates]) for end in ("lower", "upper")
+    )
+    held = (x <= lower + AT_BOUND) | (x >= upper - AT_BOUND)
+    held[len(fit.x) :] = False
+    residual = fit.measured - fit.prediction
+    return LinearisedFit(
+        terms=terms,
+        outliers=outliers,
+        coordinates=coordinates,
+        x=x,
+        jacobian=jacobian,
+        residual=np.where(
+            np.isfinite(residual), residual, NO_EQUILIBRIUM * fit.problem.readings.std
+        ),
+        held=held,
+        precision=precision,
+        pull=pull + rates.T @ deviation,
+        constant=constant,
+        information=rates.T @ rates,
+        cost=float(deviation @ deviation),
+    )
+
+
+def of_priors(model: LinearisedFit, found: Evaluation) -> float:
+    """-2 ln of the factors by which exact priors along each axis differ from their stand-ins."""
+    diagonal = np.diag(found.covariance)
+    return sum(
+        correction_of_prior(
+            c,
+            float(model.x[i]),
+            float(1.0 / diagonal[i]),
+            float(found.step[i]),
+            float(found.push[i]),
+            held=bool(model.held[i]),
+        )
+        for i, c in enumerate(model.coordinates)
+    )

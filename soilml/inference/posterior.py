@@ -1,0 +1,314 @@
+"""Every answer as a marginal of one posterior over hypotheses, hyperparameters and unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.fitting.coordinates import values_at
+from soilml.fitting.covariance import Whitening
+from soilml.fitting.effect_signatures import Signature
+from soilml.fitting.least_squares import Solution
+from soilml.fitting.predictions import PredictionRequest, predict_many
+from soilml.inference import constants
+from soilml.inference.draws import DRAWS, Component, Draws, Marginal, marginal, proposals, weighted
+from soilml.inference.explanation import Explanation
+from soilml.inference.gaussian_terms import GaussianTerms, Hyperparameters
+from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
+from soilml.inference.search import Search
+from soilml.remarks import Remark
+
+Names = tuple[str, ...]
+
+#: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
+MOST_LOG_ODDS = 500.0
+#: Probability of a component below which it is not drawn from.
+LEAST_DRAWN = 0.003
+#: Largest change of other channels, in sigma and relative to that of one, that counts as none.
+UNCHANGED = 0.01
+
+
+def infer(
+    problem: InferenceProblem, progress: Callable[[float], None] = lambda _: None
+) -> Posterior:
+    """The posterior of a problem.
+
+    Raises `InputError` where the model cannot be fitted. Where it cannot carry the loads of some
+    rows, `Posterior.refused` is the fit that shows which.
+    """
+    search = Search(problem, progress).run()
+    return Posterior(search)
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Probabilities of hypotheses, and what follows from them.
+
+    Single effects that were never fitted, since their prediction is far from the best, count with
+    their predicted evidence.
+    """
+
+    search: Search
+
+    @property
+    def problem(self) -> InferenceProblem:
+        """The problem, with the noise that its readings have at the fit."""
+        return self.search.problem
+
+    @property
+    def terms(self) -> GaussianTerms:
+        """All that is no effect."""
+        return self.search.terms
+
+    @property
+    def refused(self) -> Solution | None:
+        """The best fit where none carries the loads of all rows."""
+        return self.search.refused
+
+    @cached_property
+    def nodes(self) -> tuple[Explanation, ...]:
+        """Fitted hypotheses, the likeliest first."""
+        return tuple(sorted(self.search.nodes.values(), key=lambda node: node.value))
+
+    @property
+    def best(self) -> Explanation:
+        """The likeliest hypothesis."""
+        return self.nodes[0]
+
+    @property
+    def soil(self) -> Explanation:
+        """The soil alone, within the priors of the case."""
+        return self.search.nodes[SOIL_ALONE]
+
+    @cached_property
+    def noise(self) -> Hyperparameters:
+        """Noise and scatter by the likeliest hypothesis, without a discrepancy."""
+        return self.terms.without_discrepancy(self.best.at)
+
+    @cached_property
+    def std(self) -> Floats:
+        """Standard deviation (m,) of the readings by noise and scatter."""
+        return self.terms.std(self.noise)
+
+    @property
+    def outliers(self) -> NDArray[np.bool_]:
+        """Readings (m,) that stray by the likeliest hypothesis."""
+        return self.best.outliers
+
+    @cached_property
+    def whiten(self) -> Whitening:
+        """What whitens noise and scatter; outliers weigh nothing."""
+        return self.terms.whiten(self.noise, self.outliers)
+
+    def discrepancy(self, node: Explanation, at: Hyperparameters | None = None) -> Floats:
+        """Mean (m,) of the smooth discrepancy beside a node, in the unit of the readings."""
+        terms, at = self.terms, at or node.at
+        found = node.linear.evaluate(at)
+        own = found.used[np.isin(terms.group[found.used], np.arange(terms.channels))]
+        weights = found.weights[np.isin(found.used, own)] * np.sqrt(terms.variance(at)[own])
+        return np.asarray(terms.columns[:, own] @ weights)
+
+    @property
+    def signatures(self) -> list[Signature]:
+        """Signatures of all effects beside the soil alone."""
+        return self.search.signatures.get((), [])
+
+    @property
+    def untestable(self) -> dict[str, Remark]:
+        """Why the rows cannot test some effects, by name."""
+        return self.search.untestable
+
+    @cached_property
+    def _weights(self) -> tuple[list[Names], Floats, Floats]:
+        """Effects, probability, and share that counts for the effects, of every hypothesis."""
+        tried = self.search.nodes
+        items = [(n.hypothesis, n.value) for n in self.nodes]
+        items += [
+            (h, own.value)
+            for h, own in self.search.predicted.items()
+            if h not in tried and len(h.effects) == 1 and h not in self.search._tried
+        ]
+        values = np.asarray([value for _, value in items])
+        weights = np.exp(-0.5 * (values - values.min()))
+        weights /= weights.sum()
+        shares = [constants.OTHER_LAW_RIGHT if self.by_other_law(h) else 1.0 for h, _ in items]
+        return [h.effects for h, _ in items], weights, np.asarray(shares)
+
+    @cached_property
+    def _by_law(self) -> dict[tuple[Names, bool], float]:
+        """The lowest value of each set of effects, with the catalogue's laws and with free ones."""
+        values: dict[tuple[Names, bool], float] = {}
+        for h, own in [
+            *((h, p.value) for h, p in self.search.predicted.items()),
+            *((n.hypothesis, n.value) for n in self.nodes[::-1]),
+        ]:
+            if h in self.search.nodes or len(h.effects) == 1:
+                key = h.effects, h.free_law
+                values[key] = min(own, values.get(key, np.inf))
+        return values
+
+    @cached_property
+    def only_channel(self) -> dict[str, str]:
+        """The channel of each effect that changes one of the measured channels alone, by name."""
+        readings, found = self.terms.readings, {}
+        for s in self.signatures:
+            change = np.abs(s.column / readings.std)
+            largest = readings.channel[int(np.argmax(change))]
+            others = change[readings.channel != largest]
+            if others.max(initial=0.0) < UNCHANGED * change.max():
+                found[s.name] = readings.channels[largest]
+        return found
+
+    def by_other_law(self, hypothesis: Hypothesis) -> bool:
+        """Whether a hypothesis explains only by another law than the catalogue's.
+
+        The catalogue's laws explain no more than a part of its effects does, and the free ones are
+        far from them, or its effects change one channel alone: any force, and any error of that
+        channel, is such a law.
+        """
+        if not hypothesis.free_law:
+            return False
+        names, values = hypothesis.effects, self._by_law
+        parts = [v for (n, free), v in values.items() if not free and set(n) < set(names)]
+        if values.get((names, False), np.inf) <= min(parts, default=np.inf):
+            return False
+        node = self.search.nodes.get(hypothesis)
+        several = len(self.terms.readings.channels) > 1
+        one_channel = several and all(name in self.only_channel for name in names)
+        return node is None or one_channel or shape_deviation(node) > constants.FAR_LAW
+
+    def node_weight(self, node: Explanation) -> float:
+        """Probability of a fitted hypothesis."""
+        return float(self._weights[1][self.nodes.index(node)])
+
+    @cached_property
+    def sets(self) -> dict[Names, float]:
+        """Probability of exactly these effects within the catalogue, the likeliest first."""
+        found: dict[Names, float] = {}
+        for names, weight, share in zip(*self._weights, strict=True):
+            found[names] = found.get(names, 0.0) + float(weight * share)
+        return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+
+    @cached_property
+    def no_effect(self) -> float:
+        """Probability that no effect is present, whatever else is."""
+        return self.sets.get((), 0.0)
+
+    @cached_property
+    def no_gap(self) -> float:
+        """Probability that the soil alone, within its priors, explains the rows.
+
+        Beside no discrepancy, or beside one that is far below the noise in every channel.
+        """
+        own, terms = self.soil, self.terms
+        share = own.share_without
+        size = np.abs(self.discrepancy(own, own.beside.at)) / terms.std(own.beside.at)
+        channel = terms.readings.channel
+        squares = [np.mean(size[channel == i] ** 2) for i in range(terms.channels)]
+        if np.sqrt(max(squares, default=0.0)) < constants.NEGLIGIBLE_DISCREPANCY:
+            share = 1.0
+        return self.node_weight(own) * share
+
+    def within(self, effects: Collection[str]) -> float:
+        """Probability that these effects are present, within the catalogue."""
+        return sum(p for names, p in self.sets.items() if set(effects) <= set(names))
+
+    def probability(self, *effects: str) -> float:
+        """Probability that these effects are present, causes outside the catalogue included."""
+        return constants.IN_CATALOGUE * self.within(effects)
+
+    def log_odds(self, *effects: str) -> float:
+        """Natural logarithm of the odds that these effects are present, within the catalogue."""
+        p = self.within(effects)
+        odds = np.log(max(p, 1e-300)) - np.log(max(1.0 - p, 1e-300))
+        return float(np.clip(odds, -MOST_LOG_ODDS, MOST_LOG_ODDS))
+
+    def effects(self) -> list[str]:
+        """All effects with a probability, the likeliest first."""
+        names = {name for own in self.sets for name in own}
+        return sorted(names, key=lambda name: (-self.within([name]), name))
+
+    def node_of(self, effects: Names) -> Explanation | None:
+        """The likeliest fitted hypothesis of exactly these effects."""
+        return next((n for n in self.nodes if n.hypothesis.effects == effects), None)
+
+    def components(self, least: float = LEAST_DRAWN) -> list[Component]:
+        """Hypotheses, each with and without a discrepancy, and their probabilities; sum one."""
+        found = []
+        for node, weight in zip(self.nodes, self._weights[1], strict=False):
+            share = node.share_without
+            for evidence, part in ((node.without, share), (node.beside, 1.0 - share)):
+                if weight * part > least:
+                    found.append(Component(node, evidence.at, float(weight * part)))
+        total = sum(c.weight for c in found)
+        return [replace(c, weight=c.weight / total) for c in found]
+
+    def draws(self, seed: int, count: int = DRAWS) -> list[Draws]:
+        """Draws of hypothesis, discrepancy, hyperparameters and coordinates.
+
+        Coordinates are proposed from Laplace's approximation, widened, and weighted by the density
+        of the full model, so that bounds and curvature count; the probability of each component
+        stays that of its evidence.
+
+        References: Geweke, Econometrica 57, 1989 (importance sampling from widened proposals).
+        """
+        rng = np.random.default_rng(seed)
+        proposed = [
+            own for one in self.components() for own in proposals(one, self.terms, count, rng)
+        ]
+        requests = [
+            PredictionRequest(
+                own.node.fit.case,
+                own.node.fit.coordinates,
+                own.x,
+                self.terms.readings,
+                replace(
+                    own.node.fit.linearisation.sinkage_at(own.x - own.node.fit.x), nearest=True
+                ),
+            )
+            for own in proposed
+        ]
+        predicted = predict_many(requests)
+        return [weighted(o, self.terms, y) for o, y in zip(proposed, predicted, strict=True)]
+
+    def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
+        """Marginals of the soil parameters that are free within the case's priors, by path.
+
+        factor: By which intervals are widened about their mean.
+        """
+        own = self.draws(seed)
+        found = {}
+        for c in self.problem.soil:
+            values, weights = [], []
+            for part in own:
+                paths = [other.path for other in part.node.fit.coordinates]
+                at = paths.index(c.path)
+                values.append(values_at([part.node.fit.coordinates[at]], part.x[:, [at]])[:, 0])
+                weights.append(part.weight)
+            found[c.path] = marginal(
+                np.concatenate(values), np.concatenate(weights), c.unit, factor
+            )
+        return found
+
+    def log_density(self, node: Explanation, left_out: NDArray[np.bool_]) -> float:
+        r"""ln p of readings given all others, by a hypothesis: the difference of two evidences.
+
+        .. math:: \ln p(y_o \mid y_r, h) = \ln p(y \mid h) - \ln p(y_r \mid h)
+
+        References: Vehtari and Ojanen, Statistics Surveys 6, 2012, section 2 (the log score).
+        """
+        with_ = node.linear.evaluate(node.at).value
+        rest = node.linear.without(node.outliers | left_out).evaluate(node.at).value
+        return -0.5 * (with_ - rest)
+
+
+def shape_deviation(node: Explanation) -> float:
+    """Squared distance of the shapes from the catalogue's laws, in prior variances."""
+    fit = node.fit
+    shapes = [i for i, c in enumerate(fit.coordinates) if c.effect and c.is_shape]
+    return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes]))

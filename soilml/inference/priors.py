@@ -1,0 +1,120 @@
+"""Prior densities of hyperparameters and sizes, and the integrals with exact ones."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.fitting.coordinates import Coordinate
+from soilml.inference import constants
+from soilml.inference.gaussian_terms import (
+    DISCREPANCY,
+    SCATTER,
+    GaussianTerms,
+    Hyperparameters,
+)
+from soilml.numerics.prior import UNIFORM_PRECISION
+
+LOG_2PI = float(np.log(2.0 * np.pi))
+#: Precision that stands for the prior of a size until that is integrated exactly, in reference
+#: sizes: so weak that it does not shrink the size.
+WEAK_PRECISION = 0.1
+#: Distance from a bound at which a coordinate counts as at it.
+AT_BOUND = 1e-9
+
+
+def prior_of_hyperparameters(
+    terms: GaussianTerms, at: Hyperparameters
+) -> tuple[float, Floats, Floats]:
+    """-2 ln of the prior density of the logarithms, its gradient, and the curvature of half of it.
+
+    Amplitudes of a discrepancy are exponential with a mean of one usual one, or with a small
+    probability half-Cauchy; scatter is half-normal; the logarithm of a noise scale is normal.
+    """
+    value, gradient, curvature = 0.0, np.zeros_like(at.log), np.zeros_like(at.log)
+    own = terms.of_kind(DISCREPANCY)
+    if at.present:
+        a, scale = np.exp(at.log[own]), constants.UNKNOWN_SCALE
+        share = a / scale
+        usual = (1.0 - constants.UNKNOWN_CAUSE) * np.exp(-a)
+        tail = constants.UNKNOWN_CAUSE * 2.0 / np.pi / scale / (1.0 + share**2)
+        slope = (-usual - tail * 2.0 * share / scale / (1.0 + share**2)) / (usual + tail)
+        value += float(-2.0 * (np.log(usual + tail) + at.log[own]).sum())
+        gradient[own], curvature[own] = -2.0 * (1.0 + a * slope), np.minimum(a, 1.0)
+    own = terms.of_kind(SCATTER)
+    u = np.exp(at.log[own])
+    value += float((u**2 - 2.0 * at.log[own] - np.log(2.0 / np.pi)).sum())
+    gradient[own], curvature[own] = 2.0 * u**2 - 2.0, 2.0 * u**2
+    s, std = at.log[terms.groups :], constants.LOG_NOISE_STD
+    value += float((s**2).sum() / std**2 + 2.0 * len(s) * np.log(std))
+    gradient[terms.groups :], curvature[terms.groups :] = 2.0 * s / std**2, std**-2
+    return value, gradient, curvature
+
+
+#: Distances from a peak, in its standard deviations, at which a density is summed; sizes of either
+#: sign at which the density of a size changes.
+_ABOUT = np.linspace(-8.0, 8.0, 97)
+_SIZES = np.concatenate([-np.geomspace(30.0, 1e-3, 40), [0.0], np.geomspace(1e-3, 30.0, 40)])
+#: Part of the marginal precision that the readings contribute at least.
+LEAST_SHARE = 0.02
+#: Farthest that a size without bounds is summed, in reference sizes.
+FARTHEST = 20.0
+
+
+def correction_of_prior(
+    coordinate: Coordinate, x: float, precision: float, step: float, push: float, *, held: bool
+) -> float:
+    r"""-2 ln of the factor by which one exact prior changes Laplace's approximation.
+
+    .. math:: I = \int p(x + t)\, e^{g t - \lambda t^2 / 2} dt
+
+    between the bounds of the coordinate, with the marginal gradient g and precision lambda of the
+    likelihood: the prior of a soil parameter is uniform, that of a size 1 / (|x| + e). A coordinate
+    at a bound has the gradient that presses it there, and none that would lead away from it, since
+    that was not fitted.
+    """
+    if np.isfinite(coordinate.std):  # a normal prior is exact
+        return 0.0
+    standin = WEAK_PRECISION if coordinate.effect else UNIFORM_PRECISION
+    own, slope = max(precision - standin, LEAST_SHARE * precision), precision * step
+    if held:
+        inward = 1.0 if x <= coordinate.lower + AT_BOUND else -1.0
+        slope = push if push * inward < 0.0 else 0.0
+    low, high = coordinate.lower - x, coordinate.upper - x
+    laplace = 0.5 * (LOG_2PI - np.log(precision)) + (0.0 if held else 0.5 * precision * step**2)
+    if not coordinate.effect:
+        return -2.0 * float(_log_integral(slope, own, low, high) - laplace)
+    peak, std = np.clip(slope / own, low, high), own**-0.5
+    if held and slope:
+        std = min(std, 1.0 / abs(slope))
+    wide = np.linspace(max(low, -FARTHEST), min(high, FARTHEST), 33)
+    t = np.unique(np.clip(np.concatenate([peak + std * _ABOUT, wide, _SIZES - x]), low, high))
+    log = slope * t - 0.5 * own * t**2
+    log += log_density_of_size(x + t, coordinate.lower < 0.0 < coordinate.upper)
+    top = float(log.max())
+    return -2.0 * float(top + np.log(np.trapezoid(np.exp(log - top), t)) - laplace)
+
+
+def _log_integral(slope: float, precision: float, low: float, high: float) -> float:
+    """Logarithm of the integral of exp(slope t - precision t^2 / 2) between two bounds."""
+    from scipy.special import log_ndtr
+
+    root = np.sqrt(precision)
+    a, b = low * root - slope / root, high * root - slope / root
+    if a > 0.0:  # mirrored, so that the tail is that below
+        a, b = -b, -a
+    upper, lower = float(log_ndtr(b)), float(log_ndtr(a))
+    inside = upper + np.log1p(-np.exp(min(lower - upper, -1e-12)))
+    return float(0.5 * slope**2 / precision + 0.5 * (LOG_2PI - np.log(precision)) + inside)
+
+
+def log_density_of_size(x: Floats, two_sided: bool) -> Floats:
+    r"""ln of the density of sizes x (...), in reference sizes: 1 / [(|x| + e) ln(1 + X / e)] to X.
+
+    Beyond X it falls with further powers of the size.
+    """
+    small, large = constants.SMALLEST_SIZE, constants.LARGEST_SIZE
+    size = np.abs(x) + small
+    span = np.log1p(large / small) * (2.0 if two_sided else 1.0)
+    beyond = np.maximum(np.log(size / (large + small)), 0.0)
+    return np.asarray(-np.log(span * size) - constants.TAIL_POWER * beyond)

@@ -1,0 +1,355 @@
+"""One search: fit, estimate hyperparameters, predict every addition, fit what is within reach.
+
+A node is a hypothesis that was fitted. From each node near the best one, the evidence of every
+addition (an effect, free laws, opened priors) is predicted by a linear model, under a ladder of
+hyperparameters that it may lead to: as fitted, without discrepancy, with less of it, with hardly
+any scatter. The best are fitted, in turn with their hyperparameters, until nothing is left to fit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.errors import InputError
+from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import noise_of_operation
+from soilml.fitting.damped_descents import COARSE, FINE, Asking, Tolerance, descent, in_step
+from soilml.fitting.effect_signatures import Signature, current_size
+from soilml.fitting.least_squares import LeastSquaresProblem, Solution
+from soilml.fitting.predictions import Linearisation
+from soilml.inference import constants
+from soilml.inference.additions import additions
+from soilml.inference.conditional import leave_one_out
+from soilml.inference.evidence import linear_model
+from soilml.inference.explanation import Explanation, Prediction, StartedFit
+from soilml.inference.gaussian_terms import (
+    DISCREPANCY,
+    SCATTER,
+    GaussianTerms,
+    Hyperparameters,
+    gaussian_terms,
+    scatter_columns,
+)
+from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
+from soilml.remarks import Remark
+
+Booleans = NDArray[np.bool_]
+
+#: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
+SOIL_STARTS = (0.5, 0.25)
+#: Objective within which of the best first fit of the soil others are optima to keep.
+OTHER_OPTIMUM = 50.0
+#: Nodes from which additions are predicted, the likeliest first.
+EXTENDED = 6
+#: Evidence within which fits without a discrepancy, which may hide their effects, are kept.
+NEAR_HIDDEN = 40.0
+#: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
+#: a bound would stay there.
+INWARD = 0.8
+#: Steps of the ladder: of the logarithm of the discrepancy, and the logarithm of hardly any
+#: scatter; scatter above the third counts as some.
+LESS_DISCREPANCY, LITTLE_SCATTER, SOME_SCATTER = 1.0, -1.5, -0.7
+#: Amplitudes and scatter below the first (the logarithm below the second) count less where they
+#: change.
+SMALL, USUAL, OF_SMALL = 0.3, -0.5, 0.2
+#: Readings that are taken as outliers in one estimate, at most.
+MOST_OUTLIERS = 12
+
+
+@dataclass(eq=False)
+class Search:
+    """The nodes of a problem, and the predicted values of other hypotheses."""
+
+    problem: InferenceProblem
+    progress: Callable[[float], None] = lambda _: None
+    nodes: dict[Hypothesis, Explanation] = field(default_factory=dict)
+    predicted: dict[Hypothesis, Prediction] = field(default_factory=dict)
+    untestable: dict[str, Remark] = field(default_factory=dict)
+    signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
+    _tried: set[Hypothesis] = field(default_factory=set)
+
+    def run(self) -> Search:
+        """Fit until nothing near the best is left.
+
+        Raises `InputError` where the model cannot carry the loads of the rows.
+        """
+        self._fit_soil()
+        for number in range(0 if self.refused else constants.ROUNDS):
+            self.progress((1.0 + number) / (2.0 + constants.ROUNDS))
+            jobs = self._proposed(first=number == 0)
+            if not jobs:
+                break
+            self._tried |= {job.hypothesis for job in jobs}
+            self._settle(jobs, self.lowest)
+        return self
+
+    @property
+    def lowest(self) -> float:
+        """The value of the best node."""
+        return min((node.value for node in self.nodes.values()), default=float("inf"))
+
+    # ---- the soil alone
+
+    def _fit_soil(self) -> None:
+        """The soil alone from several starts; noise and scatter as its best fit has them."""
+        problem, readings = self.problem, self.problem.readings
+        none = np.zeros(len(readings), bool)
+        self.terms = gaussian_terms(readings, problem.case, np.zeros((len(readings), 2)))
+        starts = [{c.path: c.prior.fraction(c.nominal) for c in problem.soil}]
+        starts += [dict.fromkeys((c.path for c in problem.soil), x) for x in SOIL_STARTS]
+        jobs = [StartedFit(SOIL_ALONE, start, self.terms.first(), none) for start in starts]
+        answers = self.fit(jobs, COARSE)
+        fits = [fit for fit in answers if not isinstance(fit, InputError)]
+        if not fits:
+            raise next(error for error in answers if isinstance(error, InputError))
+        carried = [fit for fit in fits if np.isfinite(fit.prediction).all()]
+        if not carried:
+            self.refused = min(fits, key=lambda fit: fit.objective)
+            return
+        best = min(carried, key=lambda fit: fit.objective)
+        readings = readings.with_noise_at(best.prediction)
+        operation = noise_of_operation(best.fitted(), readings)
+        if operation.any():
+            readings = readings.with_noise_of_operation(operation)
+        self.problem = problem = replace(problem, readings=readings)
+        self.terms = gaussian_terms(
+            readings, problem.case, scatter_columns(best.fitted(), readings)
+        )
+        kept = [f for f in carried if f.objective < best.objective + OTHER_OPTIMUM]
+        first = self.terms.first()
+        jobs = [
+            StartedFit(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept
+        ]
+        self._settle(jobs, float("inf"))
+        if not self.nodes:
+            raise InputError("the model cannot be fitted to these rows")
+        self._choose_autocorrelation(self.nodes[SOIL_ALONE])
+        soil = self.nodes[SOIL_ALONE]
+        large = self.terms.amplitude(soil.beside.at).max(initial=0.0) > constants.HIDING
+        if large and soil.beside.trusted < soil.without.trusted:
+            self._fit_hidden(soil, best)
+
+    refused: Solution | None = None
+
+    def _choose_autocorrelation(self, node: Explanation) -> None:
+        """The autocorrelation of the largest evidence, where runs are long enough to tell."""
+        readings = self.problem.readings
+        if np.median(np.bincount(readings.run[readings.row])) < constants.AUTOCORRELATED_RUN:
+            return
+        for rho in list(constants.AUTOCORRELATIONS)[1:]:
+            new = self.node(
+                node.hypothesis, node.fit, replace(node.at, autocorrelation=rho), node.outliers
+            )
+            if new.value < self.nodes[node.hypothesis].value:
+                self.nodes[node.hypothesis] = new
+
+    def _fit_hidden(self, soil: Explanation, plain: Solution) -> None:
+        """Fit the likeliest single effects without a discrepancy, which can hide them.
+
+        A large discrepancy is a local optimum: beside it, an effect that explains nearly everything
+        is not needed. They are predicted from the soil alone under noise and scatter.
+        """
+        at, linear = soil.without.at, plain.linearisation
+        (fit,) = self.fit([StartedFit(SOIL_ALONE, plain.start_values(), at, soil.outliers, linear)])
+        if isinstance(fit, InputError):
+            return
+        model = linear_model(self.terms, fit, soil.outliers)
+        at = model.best(at)
+        half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
+        alone = replace(soil, fit=fit, linear=model)
+        found = additions(self, alone, [at, replace(at, log=half)])
+        singles = sorted(
+            ((own.value, h, own) for h, own in found.items() if len(h.effects) == 1),
+            key=lambda item: item[:2],
+        )
+        jobs: list[StartedFit] = []
+        for _, h, own in singles[: 2 * constants.HIDDEN]:
+            start = {path: 0.5 + INWARD * (x - 0.5) for path, x in own.start.items()}
+            if not any(job.hypothesis.effects == h.effects for job in jobs) or len(jobs) < 3:
+                jobs.append(StartedFit(h, start, own.at, soil.outliers))
+            if len(jobs) == constants.HIDDEN:
+                break
+        self._settle(jobs, float("inf"), NEAR_HIDDEN)
+
+    # ---- fits
+
+    def fit(
+        self, jobs: Sequence[StartedFit], tolerance: Tolerance = COARSE
+    ) -> list[Solution | InputError]:
+        """Fits that share each call of the model; the error of one that the model refuses."""
+        works = []
+        for job in jobs:
+            coordinates = self.problem.coordinates(job.hypothesis)
+            whiten = self.terms.whiten(job.at, job.outliers)
+            case = self.problem.case_of(job.hypothesis)
+            own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
+            first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
+            zero = [0.0 if c.effect else job.start.get(c.path, 0.5) for c in coordinates]
+            known = job.near
+            if known is not None and len(known.x) != len(coordinates):
+                known = None
+            works.append(_careful(own, np.asarray(first), np.asarray(zero), known, tolerance))
+        return in_step(works)
+
+    def _first_size(self, coordinate: Coordinate) -> float:
+        """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
+        if not coordinate.effect:
+            return 0.5
+        if coordinate.is_shape:
+            return 0.0
+        if coordinate.path in self.problem.case.parameters():
+            own = coordinate.reference_size
+            return current_size(self.problem.case, coordinate.path, own)
+        return constants.START_SIZE if coordinate.upper > 0.0 else -constants.START_SIZE
+
+    def node(
+        self, hypothesis: Hypothesis, fit: Solution, at: Hyperparameters, outliers: Booleans
+    ) -> Explanation:
+        """A fit with the hyperparameters of its largest evidence, with and without discrepancy."""
+        linear = linear_model(self.terms, fit, outliers)
+        beside, without = (
+            linear.evidence(linear.best(replace(at, present=present))) for present in (True, False)
+        )
+        node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
+        prior = constants.DISCREPANCY_PRIOR
+        log = np.logaddexp(
+            np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
+        )
+        node.value = float(-2.0 * log) + self.problem.penalty(hypothesis)
+        return node
+
+    def _settle(
+        self, jobs: Sequence[StartedFit], lowest: float, margin: float = constants.NEAR
+    ) -> None:
+        """Fit, estimate hyperparameters, and repeat while these move and the node is near.
+
+        lowest: The value of the best node so far.
+        """
+        found: dict[Hypothesis, Explanation] = {}
+        for turn in range(constants.FITS_IN_TURN):
+            again = []
+            fits = self.fit(jobs, COARSE if turn == 0 else FINE)
+            for job, fit in zip(jobs, fits, strict=True):
+                if isinstance(fit, InputError) or not np.isfinite(fit.prediction).all():
+                    continue
+                try:
+                    node = self.node(job.hypothesis, fit, job.at, job.outliers)
+                    if node.value < lowest + margin:
+                        outliers = self._outliers(node)
+                        if (outliers != job.outliers).any():
+                            node = self.node(job.hypothesis, fit, node.at, outliers)
+                except np.linalg.LinAlgError:
+                    continue
+                known = found.get(job.hypothesis)
+                if known is None or node.value < known.value:
+                    found[job.hypothesis] = node
+                lowest = min(lowest, node.value)
+                target = node.promising.at
+                moved = _distance(self.terms, job.at, target) > constants.MOVED
+                moved = moved or bool((node.outliers != job.outliers).any())
+                if node.value < lowest + margin and (moved or turn == 0):
+                    start, near = fit.start_values(), fit.linearisation
+                    again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
+            jobs = again
+            if not jobs:
+                break
+        for hypothesis, node in found.items():
+            known = self.nodes.get(hypothesis)
+            if known is None or node.value < known.value:
+                self.nodes[hypothesis] = node
+
+    def _outliers(self, node: Explanation) -> Booleans:
+        """Readings (m,) that stray, by their density given all others.
+
+        A reading strays where a normal density with half the range of its channel, and a small
+        prior probability, is likelier. One is taken at a time, the farthest first.
+        """
+        strays, width = node.outliers.copy(), self.terms.largest_outlier
+        odds = np.log(constants.OUTLIER_PRIOR / (1.0 - constants.OUTLIER_PRIOR))
+        for _ in range(MOST_OUTLIERS):
+            error, variance = leave_one_out(node.linear.without(strays), node.at)
+            wide = variance + width**2
+            usual = -0.5 * (error**2 / variance + np.log(variance))
+            far = -0.5 * (error**2 / wide + np.log(wide)) + odds
+            gain = np.where(strays, usual - far, far - usual)
+            i = int(np.argmax(gain))
+            if gain[i] < constants.OUTLIER_GAIN:
+                break
+            strays[i] = not strays[i]
+        return strays
+
+    # ---- proposals
+
+    def _proposed(self, *, first: bool) -> list[StartedFit]:
+        """The fits of the next round; in the first one the best single effects in any case."""
+        lowest = self.lowest
+        near = sorted(self.nodes.values(), key=lambda node: node.value)
+        near = [node for node in near if node.value < lowest + constants.NEAR][:EXTENDED]
+        for node in {id(n): n for n in (*near, self.nodes[SOIL_ALONE])}.values():
+            if node.extended:
+                continue
+            node.extended = True
+            for hypothesis, own in additions(self, node, self._ladder(node)).items():
+                known = self.predicted.get(hypothesis)
+                if known is None or own.value < known.value:
+                    self.predicted[hypothesis] = own
+        open_ = [
+            (own.value, h)
+            for h, own in self.predicted.items()
+            if h not in self.nodes and h not in self._tried
+        ]
+        open_.sort()
+        within = [
+            (value, h)
+            for value, h in open_
+            if value < lowest + (constants.NEAR if len(h.effects) <= 1 else constants.NEAR_SET)
+        ][: constants.FITS_PER_ROUND]
+        if first:
+            singles = [own for own in open_ if len(own[1].effects) == 1]
+            within = sorted({*within, *singles[: constants.FIRST_SINGLES]})
+        chosen = [(h, self.predicted[h]) for _, h in within]
+        return [StartedFit(h, own.start, own.at, own.outliers) for h, own in chosen]
+
+    def _ladder(self, node: Explanation) -> list[Hyperparameters]:
+        """Hyperparameters that an addition may lead to: less discrepancy, or less scatter."""
+        beside, without = node.beside.at, node.without.at
+        kinds = self.terms.of_kind(DISCREPANCY), self.terms.of_kind(SCATTER)
+        less = np.where(kinds[0], beside.log - LESS_DISCREPANCY, beside.log)
+        found = [beside, without, replace(beside, log=less)]
+        if max(beside.log[kinds[1]].max(), without.log[kinds[1]].max()) > SOME_SCATTER:
+            for at in (beside, without):
+                still = np.where(kinds[1], np.minimum(at.log, LITTLE_SCATTER), at.log)
+                found.append(replace(at, log=still))
+        return found
+
+
+def _careful(
+    problem: LeastSquaresProblem,
+    first: Floats,
+    zero: Floats,
+    near: Linearisation | None,
+    tolerance: Tolerance,
+) -> Asking[Solution]:
+    """One fit; where the model refuses its trials, again from effects at zero."""
+    try:
+        return (yield from descent(problem, first, near, tolerance))
+    except InputError:
+        return (yield from descent(problem, zero, None, tolerance))
+
+
+def _distance(terms: GaussianTerms, a: Hyperparameters, b: Hyperparameters) -> float:
+    """Largest change of the logarithm of a hyperparameter that matters to a fit."""
+    if a.present != b.present or a.autocorrelation != b.autocorrelation:
+        return float("inf")
+    change = np.abs(a.log - b.log)
+    of_terms = np.arange(len(change)) < terms.groups
+    smaller, larger = np.exp(np.minimum(a.log, b.log)), np.maximum(a.log, b.log)
+    change = np.where(of_terms & (smaller < SMALL) & (larger < USUAL), OF_SMALL * change, change)
+    if not a.present:
+        change = np.where(terms.of_kind(DISCREPANCY), 0.0, change)
+    return float(change.max())
