@@ -11,6 +11,7 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
 from soilml.log_import.guesses.constants import stated_radius, stated_scale
 from soilml.log_import.guesses.draft import Draft, Marked, inputs_of
+from soilml.log_import.guesses.evidence import LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.guesses.signs_and_tares import (
     far_sinkage,
@@ -81,7 +82,7 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
         "torque": ((300.0, "mN m"), (0.0, "N m")),
         "motor_current": ((60.0, "mA"), (0.0, "A")),
         "slope": ((1.2, "deg"), (0.0, "rad")),
-        "slip": ((1.2, "%"), (0.0, "1")),
+        "slip": ((LEAST_PERCENT, "%"), (0.0, "1")),
         "load": ((0.0, "N"),),
         "drawbar_pull": ((0.0, "N"),),
         "wheel_speed": ((0.0, "rad/s"),),
@@ -162,7 +163,13 @@ def draft_of(
     if role == "slope" and column.address.endswith("orientation.pitch"):
         why = "of a quaternion (REP 103): there the nose is down where it is positive"
         draft.put("reverse", True, why)
-    if role == "slip" and _OF_TYRES & {*words_of(column.name)}:
+    if role == "slip" and MOST_FRACTION < moving < LEAST_PERCENT and column.kind is None:
+        why = Marked(
+            f"CHANGE: it goes to {moving:.2g}, which 1 - v/(r omega) cannot be; where it is in per "
+            "cent, write unit = '%' and remove this line"
+        )
+        draft.put("definition", "(r omega - v)/v", why)
+    elif role == "slip" and _OF_TYRES & {*words_of(column.name)}:
         why = "as of tyres, and of Chrono's rigs; remove this line where it is 1 - v/(r omega)"
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:

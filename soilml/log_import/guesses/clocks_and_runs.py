@@ -12,6 +12,7 @@ from soilml.errors import InputError
 from soilml.log_import.channels.runs import alike_structs, key_words, matched_files, run_names
 from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.columns import WHEEL_WORDS, candidates_of, name_scores, words_of
+from soilml.log_import.guesses.draft import Marked
 from soilml.log_import.mapping.log_map import FileKind
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
@@ -23,6 +24,7 @@ _OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "
 _NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
 _MOST_WHEELS, _TURNS = 12, 0.2
 Log = Sequence[Recording]
+_SINCE_1970 = 5e8  # Seconds, and what is larger, of a clock that counts from 1970
 _MOST = 400  # Most rows of a table that somebody has made of runs
 
 
@@ -39,6 +41,24 @@ def guess_clock(recordings: Sequence[Recording]) -> tuple[str, str]:
                 values = recording.columns[candidate.name]
                 best = (score, candidate.name, unit or time_unit(values))
     return best[1], best[2]
+
+
+def why_time_unit(recordings: Sequence[Recording], column: str, unit: str) -> str:
+    """The comment of a unit of time: a mark where the log does not state it, and no size shows it.
+
+    Clocks since 1970, days of spreadsheets and seconds with steps below one are clear.
+    """
+    for recording in recordings:
+        if column not in recording.columns or recording.clock is not None:
+            continue
+        own = next(c for c in candidates_of([recording]) if c.name == column)
+        values = recording.columns[column]
+        steps = np.diff(values[np.isfinite(values)])
+        clear = abs(own.about.low) > _SINCE_1970 or unit == "d"
+        if own.kind == "s" or clear or (unit == "s" and float(np.median(steps)) < 1.0):
+            return ""
+        return Marked("CHANGE: not stated; by the size of its steps")
+    return ""
 
 
 def guess_run_column(recordings: Sequence[Recording]) -> tuple[str, int]:

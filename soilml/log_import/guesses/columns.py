@@ -12,7 +12,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
+from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time, rises
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, is_raw_signal, spelling, unit_in_name
@@ -51,6 +51,12 @@ _UNIT_SUFFICES = {
 _LEAST_LOAD, _MOST_SINKAGE = 1.0, 900.0
 _FEWEST_PLACES = 10  # Fewest different values of a travel
 _CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
+_WORD_SCORE, _FULL = 4.0, 4  # Least weight of a full word of a role, and its letters
+#: Words whose number is that of a bus, a port or an input, and of no wheel.
+_BUSES = {"can", "bus", "port", "node", "adc", "ch", "channel", "ai", "uart", "com", "usb", "dev"}
+#: Words of counters of lines, which are no clock however evenly they rise.
+COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index", "idx", "frame",
+            "id", "no", "nr", "number", "row", "line", "record"}  # fmt: skip
 _MOST_TEXTS = 12  # Most columns of text that are listed
 
 
@@ -86,9 +92,31 @@ def name_scores(name: str) -> dict[str, float]:
     return scores
 
 
+def says_role(role: str, name: str) -> bool:
+    """Whether a name has a full word of a role, and not only a letter, an axis or a short sign."""
+    if name_scores(name).get(role, 0.0) < _WORD_SCORE:
+        return False
+    text = " ".join(word for word in words_of(name) if word not in (*_PLACES, *_FILLERS))
+    texts = (" ".join(words_of(name)), text)
+    return any(
+        weight >= _WORD_SCORE and any(len(word) >= _FULL or not word.isascii()
+                                      for word in match[0].split())
+        for weight, pattern in _patterns()[role]
+        for match in filter(None, map(pattern.search, texts))
+    )  # fmt: skip
+
+
 def wheel_word(name: str) -> tuple[str, ...]:
-    """The words of a name that say which wheel it belongs to, such as ("front", "left")."""
-    return tuple(word for word in words_of(name) if word in WHEEL_WORDS)
+    """The words of a name that say which wheel it belongs to, such as ("front", "left").
+
+    The number of a bus or of an input is none.
+    """
+    words = words_of(name)
+    before = ["", *words]
+    return tuple(
+        word for word, last in zip(words, before, strict=False)
+        if word in WHEEL_WORDS and not (word.isdigit() and last in _BUSES)
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -161,8 +189,10 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
     if role == "time":
         if kind not in (None, "s"):
             return 0.0
-        even = looks_like_time(values, score > 0.0)
-        return even * (score + (2.0 if kind == "s" else 0.0) + 1.0)
+        if score > 0.0 or kind == "s":
+            # a named clock may jitter: that it rises is enough
+            return rises(values) * (score + (2.0 if kind == "s" else 0.0) + 1.0)
+        return 0.0 if COUNTERS & {*words_of(column.name)} else looks_like_time(values)
     wanted = (ROLES[role][0], *_ALSO.get(role, ()))
     if is_raw_signal(column.unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
         kind = None  # the name decides

@@ -25,12 +25,14 @@ from soilml.log_import.guesses.clocks_and_runs import (
     rows_are_runs,
     run_of_rows,
     structs_are_runs,
+    why_time_unit,
 )
 from soilml.log_import.guesses.columns import (
     candidates_of,
     describe,
     describe_texts,
     liveliest,
+    name_scores,
     words_of,
 )
 from soilml.log_import.guesses.constants import agreed_constants, stated_radius
@@ -44,13 +46,14 @@ from soilml.log_import.guesses.draft import (
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.roles import Assignment, assign, axle_of
-from soilml.log_import.guesses.support import mark_unsupported
+from soilml.log_import.guesses.evidence import as_table, mark, weigh
 from soilml.log_import.guesses.wheel_radius import wheel_lines
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import is_side_file
 from soilml.log_import.recording import Recording
+from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
 _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
@@ -85,6 +88,7 @@ class DraftedMap:
 
     text: str
     marked: int
+    evidence: str = ""  # What speaks for each guess, as lines of text
 
 
 def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
@@ -130,6 +134,7 @@ class _MapDrafting:
             self.run_count = len(self.labels)
             first = lines_of_first(first, self.run_column) if self.labels else first
         self.time_column, self.time_unit = ("", "") if self.steady else guess_clock(first)
+        self.time_why = why_time_unit(first, self.time_column, self.time_unit)
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
         self.structs = structs_are_runs(logs[0], self.time_column)
         self.pauses, self.longest = pauses(logs[0], self.time_column, self.time_unit)
@@ -196,13 +201,17 @@ class _MapDrafting:
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
-        clear = [role for role, why in self.reasons.items() if not isinstance(why, Marked)]
-        radius = stated_radius(self.stated.common)
+        constants = self._constants()
+        explained: list[str] = []
         for group in drafts.values():
-            mark_unsupported(group, inputs_of(group, self.run), radius, clear)
+            evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
+                             self.columns, self.reasons)  # fmt: skip
+            mark(group, evidence)
+            explained.append(as_table(evidence))
         add_errors(first, self.found, self.errors)
         for role, why in self.reasons.items():
-            if role in first and (isinstance(why, Marked) or "column" not in first[role].comments):
+            known = role in first and isinstance(first[role].comments.get("column"), Marked)
+            if role in first and not (known and not isinstance(why, Marked)):
                 first[role].comments["column"] = why
         lines += wheel_lines(first, self.found, self.run, self.stated.common, self.run_names)
         lines += load_lines(self.found, self.stated, self.run_names, len(self.labels))
@@ -226,7 +235,20 @@ class _MapDrafting:
             lines += _window_lines(self.runs)
         # values are plain already; names and lines of the log also stand in comments
         text = "\n".join(one_line(line) for line in lines) + "\n"
-        return DraftedMap(text, sum(isinstance(line, Marked) for line in lines))
+        names = [f"wheel {name}\n" if name else "" for name in drafts]
+        why = "".join(name + own for name, own in zip(names, explained, strict=True))
+        return DraftedMap(text, sum(isinstance(line, Marked) for line in lines), why)
+
+    def _constants(self) -> dict[str, float]:
+        """Radius (m) and weight on each wheel (N), as far as the logs state them."""
+        stated, found = self.stated.common, {}
+        if radius := stated_radius(stated):
+            found["radius"] = radius
+        if "mass" in stated:
+            count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
+            mass, _, unit = stated["mass"][0].partition(" ")
+            found["weight"] = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
+        return found
 
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])
@@ -269,8 +291,10 @@ class _MapDrafting:
         if self.steady:
             return []
         if self.time_column:
-            column = key_line("column", self.time_column)
-            return ["", "[time]", column, key_line("unit", self.time_unit)]
+            named = "time" in name_scores(self.time_column)
+            why: str = "" if named else Marked("CHANGE: its name is of no time; it rises evenly")
+            column = key_line("column", self.time_column, why)
+            return ["", "[time]", column, key_line("unit", self.time_unit, self.time_why)]
         if not self.rate:
             return ["", "# Time comes from the messages."]
         why = "stated in the log"
