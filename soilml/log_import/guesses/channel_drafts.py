@@ -28,6 +28,7 @@ from soilml.log_import.units import dimension, is_raw_signal
 _USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)
 #: Masses that a scale shows, as forces; any other is taken for kg.
 _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
+_FAR_IN_M = 4.0  # A height of so many m is rather one in mm
 #: Words that say that a column counts the pulses of an encoder.
 _COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
 #: What several columns of a channel are.
@@ -129,6 +130,8 @@ def draft_of(
     if role in ("position", "wheel_angle", "sinkage") and known.size:
         moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
                      (run.find(c.address)[1] for c in (column, *more)))  # fmt: skip
+        if role == "sinkage":  # no wheel sinks in by metres, however little that changes
+            moving = max(moving, float(np.nanmedian(np.abs(known))) / _FAR_IN_M)
     if role == "slope" and more:
         return draft  # an angle, whatever the unit of accelerations
     unit, why = guess_unit(role, column, moving)

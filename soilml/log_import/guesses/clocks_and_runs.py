@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -162,7 +163,8 @@ def refuse_a_table_of_runs(log: Sequence[Recording]) -> None:
 def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     """Kinds of files with different columns that have one run in common; empty for one kind.
 
-    The word that the names of all files of a kind share, and no other file has, is its pattern.
+    The words that the names of all files of a kind share, and not those of all kinds, are its
+    pattern.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, log in enumerate(logs):
@@ -171,17 +173,19 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     if len(groups) < 2:
         return ()
     names = run_names([log[0].file for log in logs])
-    words = [set(key_words(name, set())) for name in names]
+    words = [key_words(name, set()) for name in names]
+    shared = [set.intersection(*({*words[i]} for i in members)) for members in groups.values()]
+    of_all = set.intersection(*shared)
     kinds = []
-    for members in groups.values():
-        others = [i for i in range(len(logs)) if i not in members]
-        own = set.intersection(*(words[i] for i in members))
-        own -= {word for i in others for word in words[i]}
-        if not own:
+    for members, common in zip(groups.values(), shared, strict=True):
+        # in their order, with those that two kinds share: what is left says which run it is
+        own = [w for w in dict.fromkeys(words[members[0]]) if w in common - of_all]
+        others = [{*words[i]} for i in range(len(logs)) if i not in members]
+        if not own or any({*own} <= other for other in others):
             return ()
-        word = max(sorted(own), key=len)
         # a dot in the name of a table of TOML would begin another one
-        kinds.append(FileKind(word.replace(".", "_"), f"*{word}*"))
+        name = "_".join(own).replace(".", "_")
+        kinds.append(FileKind(name, "*".join(["", *map(glob.escape, own), ""])))
     try:
         runs = matched_files(logs, kinds)
     except InputError:

@@ -23,6 +23,7 @@ _LEVER, _ANY_LEVER = (0.005, 1.2), (1e-4, 0.8)
 _MOST_PULL, _ANY_SINKAGE = 1.2, 0.6
 #: T / (W r) of wheels on soil: outside of it by a factor of 10, a unit is another one.
 _TRACTION = (0.02, 1.2)
+_USUAL_LEVER = (0.004, 0.25)  # The same in m, where no radius is known
 #: Travel over rotation of wheels, m; slips of a driven wheel, 5th to 95th percentile.
 _RADII, _SLIPS = (0.02, 0.6), (-0.3, 0.97)
 _TOGETHER, _FEWEST = 0.8, 6  # Correlation that confirms, and fewest means that tell it
@@ -119,8 +120,9 @@ def mark(drafts: Mapping[str, Draft], evidence: Iterable[Evidence]) -> None:
     """Mark the channels whose evidence does not suffice."""
     for one in evidence:
         comments = drafts[one.role].comments
-        if not one.silent and not isinstance(comments.get("column"), Marked):
-            comments["column"] = Marked(one.mark)
+        said = comments.get("column", "")
+        if not one.silent and not isinstance(said, Marked):
+            comments["column"] = Marked(f"{one.mark}; {said}" if said else one.mark)
 
 
 def as_table(evidence: Iterable[Evidence]) -> str:
@@ -183,13 +185,14 @@ def _confirmed(
     if size and weight and _OF_MASS[0] < size / weight < _OF_MASS[1]:
         yield "load", f"the stated mass gives {weight:.3g} N, and it shows {size:.3g} N"
     together = _together(means)
-    if size and "torque" in means and radius:
-        traction = float(np.nanmedian(np.abs(means["torque"]))) / size / radius
+    if size and "torque" in means:
+        lever = float(np.nanmedian(np.abs(means["torque"]))) / size
         alone = {
             role: sum(c.kind == UNITS[role] for c in columns) == 1 for role in ("torque", "load")
         }
-        if _TRACTION[0] < traction < _TRACTION[1]:
-            why = f"torque over load and radius is {traction:.2g}, as of a wheel"
+        low, high = (r * radius for r in _TRACTION) if radius else _USUAL_LEVER
+        if low < lever < high:
+            why = f"torque over load is {lever:.2g} m, as of a wheel"
             units = {role: role in found and found[role].unit for role in alone}
             for role, other in (("torque", "load"), ("load", "torque")):
                 known = role in found and (found[role].word or (units[role] and alone[role]))
