@@ -108,8 +108,9 @@ def read_table(
     ------
     TableError
         For the first error in the file: a missing file, column or value, an unknown column, a cell
-        that is not a number, or a value outside the limits of its quantity, such as a slip of 2. A slip
-        of 1 or -1, of a wheel that spins on the spot or is locked, is read as 0.9999 or -0.9999.
+        that is not a number, or a value outside the limits of its quantity, such as a slip of 2.
+        A slip of 1 or -1, of a wheel that spins on the spot or is locked, is read as 0.9999 or
+        -0.9999.
     MissingLibraryError
         For a Parquet file where pyarrow is not installed, a spreadsheet without python-calamine.
 

@@ -134,9 +134,7 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
         )
 
 
-def one_sensor(
-    wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats
-) -> str:
+def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats) -> str:
     """Why rotation and travel are one measurement, from which no slip follows; "" where two are.
 
     rim, ground: Means of windows or samples (n,), m/s. The travel of an odometry of the wheels is r

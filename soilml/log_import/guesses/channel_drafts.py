@@ -11,7 +11,7 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
 from soilml.log_import.guesses.constants import stated_radius, stated_scale
 from soilml.log_import.guesses.draft import Draft, Marked, inputs_of
-from soilml.log_import.guesses.evidence import LEAST_PERCENT, MOST_FRACTION
+from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.guesses.signs_and_tares import (
     far_sinkage,
@@ -66,7 +66,7 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
         return column.unit, ""
     words = words_of(column.name)
     if role in ("wheel_angle", "wheel_speed") and _COUNTS & {*words}:
-        return "count" if role == "wheel_angle" else "count/s", "by its name"
+        return "count" if role == "wheel_angle" else "count/s", BY_NAME
     if role == "wheel_angle":
         if column.about.wraps_at:
             if abs(column.about.wraps_at - 2.0 * math.pi) < 0.01:
@@ -89,8 +89,8 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
         "wheel_speed": ((0.0, "rad/s"),),
     }[role]
     unit = next(unit for least, unit in large if moving >= least)
-    if "rpm" in words:
-        unit = "rpm"
+    if "rpm" in words and role == "wheel_speed":
+        return "rpm", BY_NAME
     why = "not stated; by the size of the values" if len(large) > 1 else "not stated"
     return unit, why
 

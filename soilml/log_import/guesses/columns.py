@@ -57,12 +57,25 @@ _BUSES = {"can", "bus", "port", "node", "adc", "ch", "channel", "ai", "uart", "c
 #: Words of counters of lines, which are no clock however evenly they rise.
 COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index", "idx", "frame",
             "id", "no", "nr", "number", "row", "line", "record"}  # fmt: skip
+#: Last parts of German compounds.
+_HEADS = ("geschwindigkeit", "drehzahl", "spannung", "pressung", "verschiebung", "durchmesser",
+          "radius", "einsinkung", "tiefe", "breite", "länge", "laenge", "fläche", "flaeche",
+          "druck", "kraft", "last", "moment", "strom", "winkel", "weg")  # fmt: skip
 _MOST_TEXTS = 12  # Most columns of text that are listed
 
 
 def words_of(name: str) -> list[str]:
     """The words of a column's name in small letters: `WheelSpeed_FL` -> wheel, speed, fl."""
     return [word.lower() for word in _WORD.findall(_CAMEL.sub(" ", name))]
+
+
+def parts_of(words: Sequence[str]) -> list[str]:
+    """Words with German compounds as their two parts: raddrehzahl -> rad, drehzahl."""
+    found = []
+    for word in words:
+        head = next((h for h in _HEADS if word.endswith(h) and len(word) > len(h) + 2), "")
+        found += [word.removesuffix(head), head] if head else [word]
+    return found
 
 
 @cache
@@ -80,7 +93,8 @@ def name_scores(name: str) -> dict[str, float]:
     words = words_of(name)
     # "velocity front left wheel" is a velocity of a wheel: words of the place stand between
     texts = {
-        " ".join(word for word in words if word not in left_out)
+        " ".join(word for word in own if word not in left_out)
+        for own in (words, parts_of(words))
         for left_out in ((), _PLACES, _FILLERS, (*_PLACES, *_FILLERS))
     }
     scores = {}
@@ -96,14 +110,16 @@ def says_role(role: str, name: str) -> bool:
     """Whether a name has a full word of a role, and not only a letter, an axis or a short sign."""
     if name_scores(name).get(role, 0.0) < _WORD_SCORE:
         return False
-    text = " ".join(word for word in words_of(name) if word not in (*_PLACES, *_FILLERS))
-    texts = (" ".join(words_of(name)), text)
-    return any(
-        weight >= _WORD_SCORE and any(len(word) >= _FULL or not word.isascii()
-                                      for word in match[0].split())
+    words = words_of(name)
+    text = " ".join(word for word in words if word not in (*_PLACES, *_FILLERS))
+    texts = (" ".join(words), text, " ".join(parts_of(words)))
+    found = (
+        match[0]
         for weight, pattern in _patterns()[role]
-        for match in filter(None, map(pattern.search, texts))
-    )  # fmt: skip
+        for match in (m for own in texts for m in pattern.finditer(own))
+        if weight >= _WORD_SCORE
+    )
+    return any(len(w) >= _FULL or not w.isascii() for text in found for w in text.split())
 
 
 def wheel_word(name: str) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.channels.inputs import Inputs, moving
-from soilml.log_import.guesses.columns import Candidate, name_scores, says_role
+from soilml.log_import.guesses.columns import Candidate, says_role
 from soilml.log_import.guesses.draft import Draft, Marked
 from soilml.log_import.mapping.channel_map import UNITS
 
@@ -31,6 +31,7 @@ _OF_MASS = (0.5, 2.0)  # Load over its share of the stated mass
 #: Largest fraction that a column of slip may hold, and the least one of per cent: (r omega - v)/v
 #: lies between.
 MOST_FRACTION, LEAST_PERCENT = 1.0, 5.0
+BY_NAME = "by its name"  # Why a unit is known that no brackets state, as of ticks and rpm
 _PAIRS = (("torque", "drawbar_pull"), ("motor_current", "drawbar_pull"), ("torque", "slip"),
           ("sinkage", "slip"), ("sinkage", "torque"), ("motor_current", "torque"))  # fmt: skip
 
@@ -90,6 +91,8 @@ def weigh(
             continue
         own = draft.column
         stated = own.unit if own.kind not in (None, "other") else ""
+        if draft.comments.get("unit") == BY_NAME:
+            stated = str(draft.keys["unit"])
         word = says_role(role, own.name) or says_role(role, own.address)
         found[role] = Evidence(role, own.address, stated, word, second=_second(
             role, own, seconds.get(role, ()), columns, drafts.values()))  # fmt: skip
@@ -164,10 +167,7 @@ def _confirmed(
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.abs(means["ground_speed"] / rim) * gear
         ratio = ratio[np.isfinite(ratio)]
-        if turning == "rim_speed":
-            radius_here = 1.0
-        else:
-            radius_here = radius
+        radius_here = 1.0 if turning == "rim_speed" else radius
         if ratio.size and _travels_by_itself(ratio):
             low, high = (float(x) for x in np.percentile(ratio, [5, 95]))
             slips = (1.0 - high / radius_here, 1.0 - low / radius_here) if radius_here else (9, 9)
@@ -207,12 +207,12 @@ def _confirmed(
         low, high = float(np.nanmin(slip)), float(np.nanmax(slip))
         given = 100.0 * high if drafts["slip"].keys.get("unit") == "%" else high
         known = 0.02 < given <= MOST_FRACTION or given >= LEAST_PERCENT
-        if -1.0 <= low and high <= 1.0 and known and not drafts["slip"].is_marked:
+        if low >= -1.0 and high <= 1.0 and known and not drafts["slip"].is_marked:
             yield "slip", f"it lies between {low:.2g} and {high:.2g}"
 
 
 def _travels_by_itself(ratio: Floats) -> bool:
-    """Whether travel and rotation are two measurements: one computed of the other has no scatter."""
+    """Whether travel and rotation are two measurements: else their ratio has no scatter."""
     return ratio.size < 3 or float(np.ptp(ratio)) > 1e-9 * float(np.max(ratio))
 
 

@@ -43,10 +43,10 @@ from soilml.log_import.guesses.draft import (
     key_line,
     keys_alike,
 )
+from soilml.log_import.guesses.evidence import as_table, mark, weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.roles import Assignment, assign, axle_of
-from soilml.log_import.guesses.evidence import as_table, mark, weigh
 from soilml.log_import.guesses.wheel_radius import wheel_lines
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap

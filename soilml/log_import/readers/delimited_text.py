@@ -25,6 +25,7 @@ from soilml.log_import.readers.text_layout import (
     find_layout,
     known_header,
     split_line,
+    with_labview_head,
 )
 from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
@@ -73,7 +74,7 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
             "sample a line, separated by comma, semicolon, tab or spaces"
         )
-    layout = known_header(path, layout)
+    layout = with_labview_head(known_header(path, layout))
     LOG_VALUES.check(path, len(lines) * len(layout.names))
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
