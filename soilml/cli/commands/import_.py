@@ -146,7 +146,7 @@ def _init(args: argparse.Namespace) -> int:
     import shlex
 
     from soilml.cli.output import tell, write_stdout
-    from soilml.log_import.guesses.map_text import draft_map
+    from soilml.log_import.new_map import draft_map
 
     draft = draft_map(args.files)
     if args.explain:

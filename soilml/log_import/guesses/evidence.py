@@ -37,7 +37,7 @@ _PAIRS = (("torque", "drawbar_pull"), ("motor_current", "drawbar_pull"), ("torqu
 
 
 @dataclass
-class Evidence:
+class GuessEvidence:
     """What speaks for a column in a role.
 
     unit: The stated unit; "" where it was guessed.
@@ -77,7 +77,7 @@ def weigh(
     seconds: Mapping[str, Sequence[Candidate]],
     columns: Sequence[Candidate],
     shown: Mapping[str, str],
-) -> list[Evidence]:
+) -> list[GuessEvidence]:
     """The evidence for each channel of a wheel that is a column.
 
     inputs: Samples as the drafts read them; None where they cannot be read.
@@ -94,7 +94,7 @@ def weigh(
         if draft.comments.get("unit") == BY_NAME:
             stated = str(draft.keys["unit"])
         word = says_role(role, own.name) or says_role(role, own.address)
-        found[role] = Evidence(role, own.address, stated, word, second=_second(
+        found[role] = GuessEvidence(role, own.address, stated, word, second=_second(
             role, own, seconds.get(role, ()), columns, drafts.values()))  # fmt: skip
         if role in shown and not isinstance(shown[role], Marked) and stated:
             found[role].physics = shown[role]
@@ -119,7 +119,7 @@ def _second(
     return left[0] if left else ""
 
 
-def mark(drafts: Mapping[str, Draft], evidence: Iterable[Evidence]) -> None:
+def mark(drafts: Mapping[str, Draft], evidence: Iterable[GuessEvidence]) -> None:
     """Mark the channels whose evidence does not suffice."""
     for one in evidence:
         comments = drafts[one.role].comments
@@ -128,7 +128,7 @@ def mark(drafts: Mapping[str, Draft], evidence: Iterable[Evidence]) -> None:
             comments["column"] = Marked(f"{one.mark}; {said}" if said else one.mark)
 
 
-def as_table(evidence: Iterable[Evidence]) -> str:
+def as_table(evidence: Iterable[GuessEvidence]) -> str:
     """The evidence as lines of text, one for each channel."""
     lines = []
     for e in evidence:
@@ -146,11 +146,12 @@ def _means(inputs: Inputs) -> dict[str, Floats]:
     kept = np.flatnonzero(moving(inputs))
     width = max(1, min(round(1.0 / inputs.step), kept.size // 60))
     blocks = kept[: kept.size // width * width].reshape(-1, width)
-    return {role: own[blocks].mean(axis=1) for role, own in inputs.values.items()}
+    means = {role: own[blocks].mean(axis=1) for role, own in inputs.values.items()}
+    return {role: own for role, own in means.items() if np.isfinite(own).any()}
 
 
 def _confirmed(
-    found: Mapping[str, Evidence],
+    found: Mapping[str, GuessEvidence],
     drafts: Mapping[str, Draft],
     inputs: Inputs,
     constants: Mapping[str, float],
@@ -223,9 +224,10 @@ def _together(means: Mapping[str, Floats]) -> dict[tuple[str, str], float]:
         if not {one, other} <= means.keys():
             continue
         good = np.isfinite(means[one]) & np.isfinite(means[other])
-        both = np.stack([means[one][good], means[other][good]])
-        if both.shape[1] >= _FEWEST and np.ptp(both, axis=1).min() > 0.0:
-            found[one, other] = abs(float(np.corrcoef(both)[0, 1]))
+        a, b = means[one][good], means[other][good]
+        if a.size >= _FEWEST and np.ptp(a) > 0.0 and np.ptp(b) > 0.0:
+            together = np.asarray(np.corrcoef(a, b), dtype=np.float64)
+            found[one, other] = abs(float(together[0, 1]))
     return found
 
 

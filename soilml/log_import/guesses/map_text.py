@@ -1,14 +1,11 @@
-"""A commented map for logs that nobody has described: `soilml import --init`."""
+"""The text of a commented map for logs that nobody has described."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from soilml.errors import InputError
 from soilml.io.cell_text import one_line
 from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
@@ -50,8 +47,6 @@ from soilml.log_import.guesses.roles import Assignment, assign, axle_of
 from soilml.log_import.guesses.wheel_radius import wheel_lines
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
-from soilml.log_import.readers import read_log
-from soilml.log_import.readers.side_files import is_side_file
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
@@ -91,36 +86,7 @@ class DraftedMap:
     evidence: str = ""  # What speaks for each guess, as lines of text
 
 
-def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
-    """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
-
-    Guesses come from names, units and the behaviour of the values. What no log shows, such as
-    the radius, is marked with CHANGE or NEEDED.
-
-    Raises `InputError` where a file cannot be read or has no columns.
-    """
-    return draft_map(logs).text
-
-
-def draft_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> DraftedMap:
-    """What `init_map` gives, with the number of lines that are marked."""
-    files = log_files(logs)
-    recordings = [read_log(Path(file)) for file in files]
-    return _MapDrafting(recordings).draft()
-
-
-def log_files(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """The files, without those that state constants of the others.
-
-    Raises `InputError` where there is none.
-    """
-    files = [Path(f) for f in ([logs] if isinstance(logs, str | os.PathLike) else logs)]
-    if not files:
-        raise InputError("no log was given; needed is at least one file")
-    return [file for file in files if not is_side_file(file)] or files
-
-
-class _MapDrafting:
+class MapDrafting:
     """The draft of a map of some logs, section by section."""
 
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
@@ -189,8 +155,8 @@ class _MapDrafting:
             return tuple(replace(kind, clock="start") for kind in named)
         return tuple(named)
 
-    def draft(self) -> DraftedMap:
-        """The whole map."""
+    def draft(self, doubts: Mapping[str, str] | None = None) -> DraftedMap:
+        """The whole map, with a mark on the channels that its own rows put in doubt, by role."""
         lines = self._head()
         lines += self._files() + self._time_lines() + self._run_lines()
         groups = self.found.wheels or {"": {}}
@@ -206,6 +172,8 @@ class _MapDrafting:
         for group in drafts.values():
             evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
                              self.columns, self.reasons)  # fmt: skip
+            for one in evidence:
+                one.against = one.against or (doubts or {}).get(one.role, "")
             mark(group, evidence)
             explained.append(as_table(evidence))
         add_errors(first, self.found, self.errors)

@@ -15,6 +15,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.bounds import LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
+from soilml.log_import.readers.program_heads import known_header, with_labview_head
 from soilml.log_import.readers.text_layout import (
     BLOCK,
     MISSING,
@@ -23,9 +24,7 @@ from soilml.log_import.readers.text_layout import (
     decode_text,
     find_blocks,
     find_layout,
-    known_header,
     split_line,
-    with_labview_head,
 )
 from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
