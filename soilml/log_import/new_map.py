@@ -51,7 +51,8 @@ def _doubts(recordings: Sequence[Sequence[Recording]], text: str) -> dict[str, s
         for name in remark.about:
             role = COLUMNS[name].name if name in COLUMNS else name
             if role in ROLES:
-                doubts.setdefault(role, remark.text.removeprefix("map: "))
+                said = remark.text.removeprefix("map: ").replace(f" in [{role}]", "")
+                doubts.setdefault(role, said)
     return doubts
 
 

@@ -173,7 +173,8 @@ class MapDrafting:
             evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
                              self.columns, self.reasons)  # fmt: skip
             for one in evidence:
-                one.against = one.against or (doubts or {}).get(one.role, "")
+                if not group[one.role].is_marked:  # one mark suffices
+                    one.against = one.against or (doubts or {}).get(one.role, "")
             mark(group, evidence)
             explained.append(as_table(evidence))
         add_errors(first, self.found, self.errors)
