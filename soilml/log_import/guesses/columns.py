@@ -61,6 +61,8 @@ COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index",
 _HEADS = ("geschwindigkeit", "drehzahl", "spannung", "pressung", "verschiebung", "durchmesser",
           "radius", "einsinkung", "tiefe", "breite", "länge", "laenge", "fläche", "flaeche",
           "druck", "kraft", "last", "moment", "strom", "winkel", "weg")  # fmt: skip
+_SIDE = re.compile(r"(?:(?<=[a-z_. ])[LR]|[_. ]?(?:[lr]|left|right)(?![a-z])|\d)$")
+_UNCLEAR = 0.5  # What puts a speed of a side, without another word, before other guesses
 _MOST_TEXTS = 12  # Most columns of text that are listed
 
 
@@ -153,11 +155,33 @@ def candidates_of(recordings: Sequence[Recording], steady: bool = False) -> list
     for recording in recordings:
         for name in recording.columns:
             counts[name] = counts.get(name, 0) + 1
-    return [
-        _candidate(recording, name, counts[name] > 1, steady)
-        for recording in recordings
-        for name in recording.columns
-    ]
+    return _of_sides(
+        [
+            _candidate(recording, name, counts[name] > 1, steady)
+            for recording in recordings
+            for name in recording.columns
+        ]
+    )
+
+
+def _of_sides(columns: list[Candidate]) -> list[Candidate]:
+    """The columns, of which speeds of a left and a right side, or with numbers, are of wheels.
+
+    A vehicle has one speed of travel: `velL` and `velR`, `velocity0` and `velocity1` turn.
+    """
+    frames: dict[str, list[Candidate]] = {}
+    for c in columns:
+        best = max(c.scores, key=lambda role: c.scores[role], default="")
+        if best == "ground_speed" and (match := _SIDE.search(c.address)):
+            frames.setdefault(c.address[: match.start()], []).append(c)
+    of_wheels = {c.address for own in frames.values() if len(own) > 1 for c in own}
+    found = []
+    for c in columns:
+        if c.address in of_wheels:
+            role = "rim_speed" if c.kind == "m/s" else "wheel_speed"
+            c = replace(c, scores={role: c.scores["ground_speed"] + _UNCLEAR})
+        found.append(c)
+    return found
 
 
 def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -> Candidate:
