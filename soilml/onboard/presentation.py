@@ -74,13 +74,8 @@ def _prior_text(low: float, high: float, unit: str) -> str:
 
 def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
     """Mean, std and interval of every parameter, by column name."""
-    columns = {}
-    for i, name in enumerate(estimate.names):
-        key = column(name)
-        columns[key] = estimate.mean[:, i]
-        columns[f"{key}_std"] = estimate.std[:, i]
-        columns[f"{key}_p05"] = estimate.low[:, i]
-        columns[f"{key}_p95"] = estimate.high[:, i]
+    columns = estimate.reading_columns()
+    del columns["in_range"]
     return columns
 
 

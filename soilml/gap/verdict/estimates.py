@@ -16,12 +16,12 @@ from soilml.fitting.effect_signatures import Signature
 from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.marginal_likelihood import LARGEST_SIZE, SMALLEST_SIZE, TEMPERING
 from soilml.gap.evidence.problem import FitProblem
-from soilml.gap.report.results import EstimatedValue
 from soilml.gap.search.explanation import Explanation
 from soilml.gap.search.posterior import Posterior
 from soilml.numerics.prior import Prior
 from soilml.quantities import Z_90
 from soilml.report.numbers import significant
+from soilml.results import EstimatedValue
 
 #: Sizes, in reference sizes, over whose logarithm the likelihood of an effect is summed.
 SIZES = np.geomspace(SMALLEST_SIZE, LARGEST_SIZE, 40)
