@@ -24,6 +24,7 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_9
 from soilml.remarks import Remark
 from soilml.report.numbers import share_left
 from soilml.report.parameter_lines import parameter_lines
+from soilml.report.terminal import significant
 from soilml.results import EstimatedValue, Interval, Result
 
 if TYPE_CHECKING:
@@ -139,13 +140,19 @@ class Fit(Result):
         )
 
     @property
+    def fits(self) -> bool:
+        """Whether the rows do not reject model and sensors as in the file."""
+        exact = self.exact_model or self
+        return not any(remark.code in AGAINST_EXACT for remark in exact.warnings)
+
+    @property
     def verdict(self) -> str:
         """Whether model and rows agree, and what to do where they do not, in one sentence."""
-        exact = self if self.exact_model is None else self.exact_model
+        exact = self.exact_model or self
         against = [remark.code for remark in exact.warnings if remark.code in AGAINST_EXACT]
         count = f"{self.rows_used} row{'' if self.rows_used == 1 else 's'}"
         if against:
-            size = f" ({np.sqrt(exact.misfit):.3g} times the noise; p < 0.001)"
+            size = f" ({significant(float(np.sqrt(exact.misfit)), 2)} times the noise; p < 0.001)"
             known = against[0] == AGAINST_EXACT[0]
             return f"The model does not fit these rows{size if known else ''}: run `soilml gap`."
         left = self.remaining_fraction
@@ -244,7 +251,7 @@ class Fit(Result):
     def use_of_exact(self) -> Remark:
         """When to use this fit, which takes model and sensors as exact, in place of the average."""
         if any(remark.code in AGAINST_EXACT for remark in self.warnings):
-            text = "the rows speak against exact_model: do not use it"
+            text = "the model misfits these rows: do not use exact_model"
         else:
             text = (
                 "use exact_model only where this model and these sensors were verified on a known "

@@ -79,6 +79,19 @@ def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
     return columns
 
 
+def verdict(columns: Mapping[str, Any], by: str | None, remarks: Sequence[Remark]) -> str:
+    """How many rows or groups are estimated, and what they do not determine, in one sentence."""
+    known = np.asarray(columns["in_range"])
+    what = f"{by or 'row'}{'' if known.size == 1 else 's'}" if by != "all" else "set of all rows"
+    are = "is" if known.size == 1 else "are"
+    head = f"{int(known.sum())} of {known.size} {what} {are} estimated"
+    if any(remark.code == "rows-disagree" for remark in remarks):
+        return f"{head}; rows disagree with the model: run `soilml gap`."
+    vague = [name for remark in remarks if remark.code == "not-identified" for name in remark.about]
+    names = " and ".join(_words(name) for name in dict.fromkeys(vague))
+    return f"{head}; {names} mostly from the prior." if vague else f"{head}."
+
+
 def _relative_width(estimate: Estimate) -> NDArray[np.float64]:
     """RMS over the parameters of posterior width / prior width, (rows,); NaN out of range."""
     widths = np.sqrt(np.mean((estimate.std / estimate.prior_std) ** 2, axis=1))

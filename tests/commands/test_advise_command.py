@@ -110,7 +110,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, command, s
 
 def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, capsys):
     command = ["identify", "model.toml", "runs.csv", "--method", "posterior"]
-    assert main(command) == 0
+    assert main([*command, "--format", "json"]) == 0
     captured = capsys.readouterr()
     content = json.loads(captured.out)
     assert content["identified"] == {
@@ -130,7 +130,7 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     )  # least squares: no samples, no advice
     assert "identified" not in json.loads((folder / "o.json").read_text())
     capsys.readouterr()
-    assert main([*command, "--by", "run"]) == 0
+    assert main([*command, "--by", "run", "--format", "json"]) == 0
     assert "advice" in json.loads(capsys.readouterr().out)["runs"]["a"]
 
 
@@ -138,7 +138,10 @@ def test_noise_that_only_the_table_declares_gives_an_answer_without_advice(folde
     (folder / "silent.toml").write_text(MODEL.split("[noise]")[0])
     rows = "run,slip,load_N,torque_Nm,torque_Nm_std\na,0.2,60,2.9,0.06\na,0.2,60,2.95,0.06\n"
     (folder / "own.csv").write_text(rows)
-    assert main(["identify", "silent.toml", "own.csv", "--method", "posterior"]) == 0
+    assert (
+        main(["identify", "silent.toml", "own.csv", "--method", "posterior", "--format", "json"])
+        == 0
+    )
     assert "advice" not in json.loads(capsys.readouterr().out)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from soilml.cli.main import COMMANDS
+from soilml.cli.main import COMMANDS, parser
 
 ROOT = Path(__file__).parents[2]
 
@@ -38,3 +38,27 @@ def test_every_command_is_there_without_entry_points(tmp_path):
         if words == ["--help"]:
             listed = {line.split()[0] for line in done.stdout.splitlines() if COMMAND.match(line)}
             assert listed == set(COMMANDS)
+
+
+def options():
+    """Command and action of every option and argument of all commands."""
+    commands = next(action for action in parser()._actions if action.choices)
+    for name, sub in commands.choices.items():
+        for action in sub._actions:
+            yield name, action
+
+
+def test_shared_options_mean_the_same_in_all_commands():
+    """One word, one meaning: -q, -v, -o and --format, of which none has a default."""
+    texts, have = {}, {}
+    for name, action in options():
+        for word in action.option_strings:
+            have.setdefault(word, set()).add(name)
+        if "--format" in action.option_strings:
+            assert set(action.choices) in ({"table", "csv", "json"}, {"table", "json"}), name
+            assert action.default is None
+        for word in {"-q", "-v", "--format"} & set(action.option_strings):
+            texts.setdefault(word, set()).add(action.help)
+    assert have["-q"] == have["--quiet"] == have["-v"] == have["--verbose"] == set(COMMANDS)
+    assert have["-o"] == have["--out"]
+    assert all(len(said) == 1 for said in texts.values())

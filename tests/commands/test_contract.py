@@ -69,18 +69,20 @@ def test_simulated_rows_can_be_identified(model_file, tmp_path, capsys):
     out = str(tmp_path / "sim.csv")
     command = ["simulate", str(model_file), "--slip", "0.1:0.6:6", "--load", "40,90"]
     assert main([*command, "--run", "sim", "--out", out]) == 0
-    assert main(["identify", str(model_file), out, "--method", "nonlinear"]) == 0
+    assert (
+        main(["identify", str(model_file), out, "--method", "nonlinear", "--format", "json"]) == 0
+    )
     found = json.loads(capsys.readouterr().out)
     assert found["parameters"]["shear_modulus"]["value"] == pytest.approx(0.025, rel=1e-3)
 
 
 def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--method", "posterior"]
-    assert main([*command, "--by", "run"]) == 0
+    assert main([*command, "--by", "run", "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
     assert content["runs"]["run_0"]["rows_used"] == 8
-    assert main(command) == 0
+    assert main([*command, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert "runs-as-one-soil" in {one["code"] for one in content["warnings"]}
 
@@ -103,14 +105,14 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     assert content["parameters"]["friction_angle"]["unit"] == "rad"
     assert set(content) >= {"method", "parameters", "correlation", "warnings", "rows_used"}
     capsys.readouterr()
-    assert main(command[:-2]) == 0
+    assert main([*command[:-2], "--format", "json"]) == 0
     assert json.loads(capsys.readouterr().out) == content
 
 
 @pytest.mark.slow
 def test_identify_warns_of_one_load(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--where", "load_N=40"]
-    assert main([*command, "--method", "posterior"]) == 0
+    assert main([*command, "--method", "posterior", "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert ("not-identified", ["cohesion"]) in [
         (w["code"], w["about"]) for w in content["warnings"]
@@ -149,7 +151,7 @@ def test_soils_and_effects_list_their_catalogues(capsys):
     assert "wong1989/dry_sand" in listed and "kphi" in listed
     assert main(["soils", "comin2017/es-3"]) == 0
     assert "published as -830" in capsys.readouterr().out
-    assert main(["soils", "--json"]) == 0
+    assert main(["soils", "--format", "json"]) == 0
     assert json.loads(capsys.readouterr().out)["wong1989/dry_sand"]["values"]["n"] == 1.1
     assert main(["effects"]) == 0
     listed = capsys.readouterr().out

@@ -40,7 +40,7 @@ def study(tmp_path):
 
 @pytest.mark.slow
 def test_the_answer_is_json_in_a_pipe(study, capsys):
-    assert main(["design", str(study), *FEW]) == 0
+    assert main(["design", str(study), *FEW, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["goal"]["slope_rad"] == pytest.approx(0.05236, abs=1e-5)
     assert content["soils"] == ["ding2015/hit_lss1"]
@@ -72,7 +72,7 @@ def test_files_and_the_verdict(study, tmp_path, capsys):
 @pytest.mark.slow
 def test_options_change_slope_gravity_and_soils(study, capsys):
     options = ["--slope", "20", "--gravity", "moon", "--soil", "moore1999/drift"]
-    assert main(["design", str(study), *FEW, *options]) == 0
+    assert main(["design", str(study), *FEW, *options, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["gravity_m_s2"] == 1.62 and content["soils"] == ["moore1999/drift"]
     codes = {one["code"] for one in content["warnings"]}
@@ -89,7 +89,7 @@ def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
     study.write_text(STUDY[:start] + text + STUDY[end:])
     if model_file.parent != tmp_path:
         (tmp_path / model_file.name).write_text(model_file.read_text())
-    assert main(["design", str(study), *FEW]) == 0
+    assert main(["design", str(study), *FEW, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert any(one["code"] == "errors-before-rows" for one in content["warnings"])
     assert content["soils"] == [str(tmp_path / model_file.name), str(tmp_path / "runs.csv")]

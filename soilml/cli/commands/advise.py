@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from soilml.experiment_design import ParameterSamples
     from soilml.remarks import Remark
 
+FORMATS = ("table", "csv", "json")
 HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
 Rank the operating points (slip, load) and sensors of a next measurement by how
@@ -115,7 +116,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from soilml.cli.options import available_effects, parse_names, parse_numbers
-    from soilml.cli.output import tell, write_columns
+    from soilml.cli.output import show_verdict, tell, write_columns
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
@@ -170,6 +171,7 @@ def run(args: argparse.Namespace) -> int:
         from soilml.experiment_design.presentation import save_maps
 
         save_maps(args.picture, advice, at)
+    show_verdict(advice.summary(), args.out)
     if args.all:
         ranked = sorted(advice.choices, key=lambda c: c.overall)
         write_columns(advice_columns(advice, [("candidate", c) for c in ranked]), args.out)
