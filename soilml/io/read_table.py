@@ -65,7 +65,8 @@ _LIMITS: dict[str, Limits] = {
 #: a slip of 1 to a thousandth, and the model is defined below 1.
 _SPINNING = 0.9999
 _MOST = 1e30  # Magnitude of any other number; squares and products of such are finite
-Rows = Table | ArrowStream | Mapping[str, ArrayLike]  # What the analyses take as rows
+# What the analyses take as rows: a table, a data frame, columns, or the path of a file
+Rows = Table | ArrowStream | Mapping[str, ArrayLike] | str | os.PathLike[str]
 
 
 def read_table(
@@ -287,8 +288,8 @@ def _read_parquet(file: Path, ignore_extra: bool) -> Table:
 def as_table(rows: Rows) -> Table:
     """The table of rows; data frames, columns and tables made of them are checked as files are.
 
-    rows: A `Table`; a data frame of pandas, polars or pyarrow; or a mapping of columns (rows,) by
-        names such as load_N, numbers and, for runs, text.
+    rows: A `Table`; the path of a file; a data frame of pandas, polars or pyarrow; or a mapping of
+        columns (rows,) by names such as load_N, numbers and, for runs, text.
 
     Raises `TableError` for another object, columns of different lengths, and what `read_table`
     refuses.
@@ -301,7 +302,7 @@ def as_table(rows: Rows) -> Table:
     if isinstance(rows, Table):
         # the rows of files have been checked, and have the lines of their file
         return rows if len(rows.line) else _checked(rows.columns, rows.source, rows.metadata)
-    if isinstance(rows, ArrowStream):
+    if isinstance(rows, str | os.PathLike | ArrowStream):
         return read_table(rows)
     if not isinstance(rows, Mapping):
         raise TableError(

@@ -57,7 +57,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--map", type=InputFile, metavar="MAP.toml", help="how the logs are read")
     parser.add_argument(
-        "--out", metavar="RUNS.csv", help="write the table and its report; with --init, the map"
+        "-o",
+        "--out",
+        metavar="RUNS.csv",
+        help="write table and report; with --init, the map",
     )
     parser.add_argument("--accept", action="store_true", help="import although the map looks wrong")
 
@@ -94,8 +97,9 @@ def _is_that_table(file: str, out: str | None) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Write the map, or the table and its report."""
-    from soilml.cli.output import is_terminal, origin_of, tell
+    from soilml.cli.output import origin_of, tell
     from soilml.cli.progress import stage_progress
+    from soilml.cli.screen import is_terminal
     from soilml.io.text_tables import csv_text
     from soilml.log_import.workflow import import_log
     from soilml.optional_imports import need
@@ -175,7 +179,8 @@ def _print_remarks(found: ImportedLog) -> None:
 
 
 def _print_table(found: ImportedLog) -> None:
-    from soilml.cli.output import format_columns, is_terminal, write_stdout
+    from soilml.cli.output import format_columns, write_stdout
+    from soilml.cli.screen import is_terminal
     from soilml.io.text_tables import csv_text
 
     table = found.table
