@@ -27,7 +27,6 @@ RUN = (
     "docs/papers/comin2017.md",
     "docs/papers/nagatani2009.md",
     "docs/papers/nagatani_climbing.md",
-    "docs/papers/slip_models.md",
     "docs/papers/wang2018.md",
     "docs/reference/tables.md",
     "exported/README.md",

@@ -47,7 +47,7 @@ ROOMS = {
     "identification": ("soilml/identification", "soilml/identification", "/plot"),
     "onboard": (
         "soilml/onboard",
-        "soilml/onboard commands/test_contract.py commands/test_outputs.py"
+        "soilml/onboard commands/test_contract.py commands/test_outputs.py commands/test_reports.py"
         " commands/test_estimate_case.py test_flags.py test_onnx_interface.py test_ros2_example.py"
         " training/test_trained_slip.py training/slip_step",
         "",

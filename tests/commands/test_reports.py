@@ -105,3 +105,18 @@ def test_the_file_of_a_report_has_the_numbers_of_the_table(folder, capsys):
     found = json.loads((folder / "found/report.json").read_text())
     del found["report"]
     assert found == json.loads((folder / "all.json").read_text())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "code", "about"),
+    [
+        ("wheel_linear", "not-identified", ["cohesion", "friction_angle"]),
+        ("wheel", "channels-used", ["torque"]),
+    ],
+)
+def test_a_remark_of_an_estimate_has_its_code_and_what_it_is_about(folder, name, code, about):
+    command = ["estimate", name, "runs.csv", "--by", "run", "--report", "found", "--out", "o.csv"]
+    assert main(command) == 0
+    remarks = json.loads((folder / "found/report.json").read_text())["report"]["warnings"]
+    assert {one["code"]: one["about"] for one in remarks}[code] == about

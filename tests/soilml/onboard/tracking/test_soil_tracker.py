@@ -206,12 +206,13 @@ def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
 def test_what_is_remembered_does_not_grow(estimator, wheel_posterior):
     tracker = SoilTracker(estimator, length=32)
     rows = rows_of(wheel_posterior, 150)
-    sizes = []
+    sizes, remembered = [], []
     for row in rows:
         state = tracker.read(**row)
+        remembered.append(state.rows_remembered)
         sizes.append(sum(array.nbytes for array in tracker.save().values()))
     assert max(sizes[75:]) <= max(sizes[:75])
-    assert 32 <= state.rows_remembered <= 34 and state.rows_since_change == 150
+    assert 32 <= min(remembered[40:]) <= max(remembered) <= 34 and state.rows_since_change == 150
 
 
 def test_a_stored_state_continues_where_it_stopped(settled, estimator, wheel_posterior, tmp_path):
