@@ -109,15 +109,23 @@ def train(
     on the third all metrics are measured. Where they are too few for that, each row is judged by a
     fit to the other runs instead (`training.few_rows`).
 
-    spec: From `read_spec`; its regressors are fitted in place.
-    data: From `read_dataset`, with the features and targets of the spec.
-    progress: Called with the name of a stage, the steps done and the total number of steps.
+    Parameters
+    ----------
+    spec : Spec
+        From `read_spec`; its regressors are fitted in place.
+    data : Dataset
+        From `read_dataset`, with the features and targets of the spec.
+    progress : callable
+        Called with the name of a stage, the steps done and the total number of steps.
 
     Returns
     -------
     TrainedModel
 
-    Raises `InputError` where a regressor does not converge, or needs more memory than is free.
+    Raises
+    ------
+    InputError
+        Where a regressor does not converge, or needs more memory than is free.
 
     Examples
     --------
