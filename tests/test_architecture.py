@@ -22,6 +22,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/csv_by_arrow.py": {"pyarrow"},
     "soilml/io/parquet.py": {"pyarrow"},
+    "soilml/log_import/readers/lines_by_arrow.py": {"pyarrow"},
     "soilml/io/spreadsheet.py": {"python_calamine"},
     "soilml/io/table.py": {"pyarrow"},
     "soilml/fitting/scipy_descents.py": {"scipy"},

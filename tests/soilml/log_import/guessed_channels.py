@@ -27,12 +27,13 @@ ROLES = {
     "current": (("motor_current",), "motor_current"), "load": (("load",), "load"),
     "pull": (("drawbar_pull",), "drawbar_pull"), "sinkage": (("sinkage",), "sinkage"),
 }  # fmt: skip
-RIGHT, MARKED, SILENT = "right", "marked", "silent"
+#: Right and silent, right and marked, wrong and marked, wrong and silent.
+RIGHT, LOOKED_AT, MARKED, SILENT = "right", "right, marked", "marked", "silent"
 
 
 def judged(logs, truth: Truth, text=None):
     """Each channel and constant of a rig, and the channels that it does not hold but the map has:
-    right, wrong or absent but marked, wrong or absent in silence.
+    right, right but marked, wrong or absent but marked, wrong or absent in silence.
     """
     text = init_map(logs) if text is None else text
     content = tomllib.loads(text)
@@ -76,7 +77,10 @@ def judged(logs, truth: Truth, text=None):
                 right = same(inputs.time, values, truth, true)
         elif right:
             right = same_way(inputs.values[key], truth)
-        found[name] = RIGHT if right else MARKED if is_marked(text, own) else SILENT
+        marked = is_marked(text, own)
+        found[name] = {(1, 0): RIGHT, (1, 1): LOOKED_AT, (0, 1): MARKED, (0, 0): SILENT}[
+            right, marked
+        ]
     for name in ("torque", "load", "pull", "sinkage"):
         role = ROLES[name][0][0]
         if name not in truth.known and role in content:
@@ -151,9 +155,9 @@ def main(module="described_rigs", detail="yes"):
     every = [x for own in rigs.values() for x in own.values()]
     if detail == "yes":
         for name, own in rigs.items():
-            wrong = {k: v for k, v in own.items() if v != RIGHT}
-            print(f"{name:28} {sum(v == RIGHT for v in own.values())}/{len(own)} {wrong or ''}")
-    for kind in (RIGHT, MARKED, SILENT):
+            wrong = {k: v for k, v in own.items() if v not in (RIGHT, LOOKED_AT)}
+            print(f"{name:28} {len(own) - len(wrong)}/{len(own)} {wrong or ''}")
+    for kind in (RIGHT, LOOKED_AT, MARKED, SILENT):
         print(f"{kind}: {every.count(kind)} of {len(every)}, {every.count(kind) / len(every):.0%}")
 
 
