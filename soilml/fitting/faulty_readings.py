@@ -99,7 +99,9 @@ def _resolution(values: Floats) -> float:
 
 
 def _chance(values: Floats, noise: float) -> float:
-    """Probability that two readings of one channel are equal by chance."""
+    """Probability that two readings of one channel are equal by chance; 1 where few values tell."""
+    if np.unique(values[np.isfinite(values)]).size < STEP_LEVELS:
+        return 1.0
     step = _resolution(values)
     return min(1.0, step / (2.0 * np.sqrt(np.pi) * noise)) if noise > 0.0 else 1.0
 
@@ -173,7 +175,7 @@ def _held(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
     order = np.lexsort((time, np.unique(run, return_inverse=True)[1]))
     same_run = run[order[1:]] == run[order[:-1]]
     spoilt[order[1:]] = same_run & (values[order[1:]] == values[order[:-1]])
-    if chance * len(table) > BY_CHANCE or np.unique(values).size < STEP_LEVELS:
+    if chance * len(table) > BY_CHANCE:
         spoilt[:] = False
     return spoilt, "the same as in the row before, to the last digit: the sensor or logger held it"
 
