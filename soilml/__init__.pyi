@@ -4,6 +4,7 @@ from soilml.config.case import Case as Case
 from soilml.config.case import read_case as read_case
 from soilml.config.measurement_noise import Noise as Noise
 from soilml.errors import SoilmlError as SoilmlError
+from soilml.experiment_design.next_rows import advise as advise
 from soilml.fitting.simulation import simulate as simulate
 from soilml.gap import gap as gap
 from soilml.identification import METHODS as METHODS
@@ -13,6 +14,7 @@ from soilml.io.table import Table as Table
 from soilml.numerics.prior import Prior as Prior
 from soilml.onboard.estimate import Estimate as Estimate
 from soilml.onboard.estimator import Estimator as Estimator
+from soilml.onboard.table_estimates import estimate as estimate
 from soilml.onboard.tracking import SoilTracker as SoilTracker
 from soilml.parameters import Parameter as Parameter
 from soilml.physics.contact import Force as Force
@@ -33,6 +35,8 @@ from soilml.rover_design import design as design
 from soilml.row_status import Status as Status
 from soilml.soil_export import export_soil as export_soil
 from soilml.soil_maps import soil_map as soil_map
+from soilml.traction import pull as pull
 from training.adaptation import adapt as adapt
+from training.train import train as train
 
 __version__: str

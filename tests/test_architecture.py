@@ -54,6 +54,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/log_import/units.py": {"pint"},
     "soilml/physics/computing_device.py": {"torch"},
     "soilml/processes.py": {"threadpoolctl"},
+    "soilml/results.py": {"pandas"},
     "soilml/serve/command.py": {"tornado"},
     "soilml/serve/application.py": {"tornado"},
     "soilml/serve/guarded_handler.py": {"tornado"},

@@ -23,7 +23,10 @@ SMOOTH = ["--where", "run=kls1_smooth_w59"]
 
 def test_identification_says_what_five_points_at_one_load_can_tell(capsys):
     model = str(ROOT / "examples/kls1/model.toml")
-    assert main(["identify", model, str(KLS1), *SMOOTH, "--method", "nonlinear"]) == 0
+    assert (
+        main(["identify", model, str(KLS1), *SMOOTH, "--method", "nonlinear", "--format", "json"])
+        == 0
+    )
     found = json.loads(capsys.readouterr().out)
     assert found["rows_used"] == 5
     assert ("not-identified", ["cohesion"]) in [(w["code"], w["about"]) for w in found["warnings"]]
@@ -80,7 +83,10 @@ def test_the_continuous_law_of_braking_explains_driving_and_braking_far_better(t
     for law in ("displacement-sign", "slip-sign"):
         model = tmp_path / f"{law}.toml"
         model.write_text(text.replace("[gear]", f'[gear]\nbraking = "{law}"'))
-        assert main(["identify", str(model), str(runs), "--method", "nonlinear"]) == 0
+        assert (
+            main(["identify", str(model), str(runs), "--method", "nonlinear", "--format", "json"])
+            == 0
+        )
         misfit.append(json.loads(capsys.readouterr().out)["misfit"])
     assert misfit[0] < 0.4 * misfit[1]
 

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
-from soilml.cli.options import declared_outputs, input_files, need_for_options
+from soilml.cli.options import add_screen_options, declared_outputs, input_files, need_for_options
 from soilml.cli.process import (
     StopSignals,
     Terminated,
@@ -21,6 +21,7 @@ from soilml.cli.process import (
     reserve_standard_descriptors,
     silence_stdout,
 )
+from soilml.cli.screen import SCREEN
 from soilml.errors import InputError, SoilmlError, did_you_mean
 from soilml.io.atomic_files import check_outputs, clear_interrupted, replaced
 
@@ -147,6 +148,7 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             name, help=module.HELP, description=module.DESCRIPTION, formatter_class=layout
         )
         module.add_arguments(sub)
+        add_screen_options(sub, getattr(module, "FORMATS", ()))
         if command == name:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]
             root.prog = sub.prog
@@ -174,7 +176,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     Returns: Exit status: 0 for success, 2 with one line on standard error for bad input, 128 and
     the number of the signal for a signal that asks the process to stop. `papers` gives 1 where a
-    number is not reproduced. An output file is complete or absent in every case.
+    number is not reproduced, `gap` 3 where the data cannot be analysed (`bad-data`). An
+    output file is complete or absent in every case.
     """
     try:
         with StopSignals() as signals:
@@ -225,6 +228,7 @@ def _status(words: list[str]) -> int:
     words = _join_negative_values(words)
     args = parser(words[0] if words else "").parse_args(words)
     args.command_line, args.make_parser = words, parser
+    SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()
     need_for_options(args, words[0])

@@ -57,7 +57,24 @@ def add_output(parser: argparse.ArgumentParser, name: str, file: str, text: str)
             raise argparse.ArgumentTypeError(str(error)) from None
         return OutputFile(path)
 
-    parser.add_argument(name, type=checked, metavar=file, help=text)
+    short = ("-o",) if name == "--out" else ()
+    parser.add_argument(*short, name, type=checked, metavar=file, help=text)
+
+
+def add_screen_options(parser: argparse.ArgumentParser, formats: Sequence[str] = ()) -> None:
+    """Declare -q and -v, and --format where a command prints a result in these formats."""
+    if formats:
+        parser.add_argument(
+            "--format",
+            choices=formats,
+            help="form of the result on standard output; tables of rows are CSV into a pipe",
+        )
+    parser.add_argument(
+        "-q", "--quiet", action="store_true", help="print no remarks on standard error"
+    )
+    parser.add_argument(
+        "-v", "--verbose", action="store_true", help="print all details of the result"
+    )
 
 
 def declared_outputs(args: argparse.Namespace) -> list[Path]:

@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from soilml.cli.options import REPORT_FILES, input_files
+from soilml.cli.screen import SCREEN, is_terminal
 from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.cell_text import escaped
 from soilml.io.spreadsheet import split_sheet
 from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
 from soilml.report.figure_style import save_png
-from soilml.report.page import Content, Provenance, Report, report_texts
+from soilml.report.page import Content, Provenance, Report, json_text, report_texts
 from soilml.report.terminal import rounded, shown_column
 
 if TYPE_CHECKING:
@@ -65,13 +66,27 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
         count = len(next(iter(columns.values())))
         tell(f"{count} row{'' if count == 1 else 's'} written to {out}")
         return
-    for text in [f"{format_columns(columns)}\n"] if is_terminal() else csv_blocks(columns):
-        write_stdout(text)
+    form = SCREEN.form_of_rows()
+    if form == "csv":
+        for text in csv_blocks(columns):
+            write_stdout(text)
+        return
+    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    write_stdout(f"{format_columns(columns)}\n" if form == "table" else json_text(content))
 
 
-def is_terminal() -> bool:
-    """Whether standard output is a terminal."""
-    return sys.stdout is not None and sys.stdout.isatty()
+def show_verdict(text: str, out: str | None) -> None:
+    """Print a verdict above a table that is about to be printed; not above CSV or JSON."""
+    if out is None and SCREEN.form_of_rows() == "table":
+        show(f"{text}\n")
+
+
+def show_result(text: str, content: Mapping[str, Any]) -> None:
+    """Print a result as text, into a pipe too, or as JSON where --format says so."""
+    if SCREEN.form == "json":
+        write_stdout(json_text(content))
+    else:
+        show(text)
 
 
 def show(text: str) -> None:
@@ -82,6 +97,8 @@ def show(text: str) -> None:
 
 def tell(text: str) -> None:
     """Print a message on standard error; broken to the width of a terminal, else one line."""
+    if SCREEN.quiet:
+        return
     text = escaped(text)
     print(
         wrapped(text) if sys.stderr is not None and sys.stderr.isatty() else text, file=sys.stderr

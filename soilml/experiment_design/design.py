@@ -23,6 +23,7 @@ from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.quantities import column
+from soilml.results import Result
 
 #: Default slips, and the number of default loads.
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
@@ -134,8 +135,8 @@ class RatedRow:
         return float(np.sqrt(np.mean(self.remaining_fraction**2)))
 
 
-@dataclass(frozen=True)
-class Advice:
+@dataclass(frozen=True, repr=False)
+class Advice(Result):
     """Expected effect of each next measurement, and the best sequence of several.
 
     Attributes
@@ -193,6 +194,19 @@ class Advice:
         from soilml.experiment_design.presentation import plot_maps
 
         return plot_maps(self, measured, ax)
+
+    def summary(self) -> str:
+        """The best next row, and what it leaves of each prior."""
+        from soilml.experiment_design.presentation import advice_verdict
+
+        return advice_verdict(self)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each candidate, the best first, with the fractions that it leaves."""
+        from soilml.experiment_design.presentation import advice_columns
+
+        ranked = sorted(self.choices, key=lambda c: c.overall)
+        return advice_columns(self, [(str(i), c) for i, c in enumerate(ranked, 1)])
 
 
 def best_row(choices: Sequence[RatedRow], names: Sequence[str], name: str | None) -> RatedRow:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.experiment_design.design import Advice, RatedRow
+from soilml.experiment_design.design import Advice, RatedRow, channel_label
 from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
@@ -174,3 +175,40 @@ def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[An
     label = "expected remaining fraction of the prior width"
     axes[0].figure.colorbar(image, ax=list(axes)).set_label(label, fontsize=9)
     return np.asarray(axes)
+
+
+def advice_verdict(advice: Advice) -> str:
+    """The best next row, and what it leaves of each prior."""
+    return f"Measure next: {row_message(advice, advice.best())}."
+
+
+def best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:
+    """The rows of the table: reason and candidate."""
+    rows = [("best in all", advice.best())]
+    rows += [
+        (f"best in all with {own[1]}", advice.best(None, own)) for own in advice.channel_sets[1:]
+    ]
+    rows += [(f"best for {name}", advice.best(name)) for name in advice.names]
+    repeat = advice.best_repetition()
+    if repeat is not None:
+        rows.append(("best repeat", repeat))
+    if len(advice.sequence) > 1:
+        rows += [
+            (f"row {i} of {len(advice.sequence)}", c) for i, c in enumerate(advice.sequence, 1)
+        ]
+    return rows
+
+
+def advice_columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
+    """The table's columns."""
+    choices = [choice for _, choice in rows]
+    columns: dict[str, Any] = {
+        "row": [why.replace("_", " ") for why, _ in rows],
+        "channels": [channel_label(c.candidate.channels) for c in choices],
+        "slip": np.asarray([c.candidate.slip for c in choices]),
+        "load_N": np.asarray([c.candidate.load for c in choices]),
+    }
+    for i, name in enumerate(advice.names):
+        columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
+    columns["all_left"] = np.asarray([c.overall for c in choices])
+    return columns

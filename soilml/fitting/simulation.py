@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from soilml.config.case import Case
+from soilml.config.given_case import GivenCase, as_case
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.io.table import Table
@@ -28,7 +29,7 @@ BLOCK = 65_536  # Rows that are solved at a time
 
 
 def simulate(
-    case: Case,
+    case: GivenCase,
     slip: ArrayLike,
     load: ArrayLike,
     *,
@@ -46,7 +47,7 @@ def simulate(
     Parameters
     ----------
     case
-        Gear, soil and effects, as `read_case` returns them; a case of one gear.
+        Gear, soil and effects, as `read_case` returns them, or the path of a model file; one gear.
     slip, load
         Slip ratios and vertical loads (N), (n,) or numbers.
     speed, pass_number, slip_angle
@@ -86,6 +87,7 @@ def simulate(
     >>> print(rows["torque_Nm"].round(2), rows["status"])
     [1.19 2.26] ['ok' 'ok']
     """
+    case = as_case(case)
     if case.gears:
         raise InputError(f"simulate takes one gear; this case has {', '.join(case.gears)}")
     known = {"speed": speed, "pass_number": pass_number, "slip_angle": slip_angle}

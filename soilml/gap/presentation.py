@@ -135,9 +135,28 @@ def _discrepancy_table(report: GapReport) -> str:
     return format_table(("discrepancy left (rms)", "size", "unit", "sigma"), rows)
 
 
-def audit_text(found: Audit) -> str:
-    """A line for each effect, what cannot be distinguished or tested, and runs to add."""
+def audit_verdict(found: Audit) -> str:
+    """How many effects these runs could name, and the run that would add most."""
+    nameable = sum(e.nameable for e in found.effects)
+    count = len(found.effects) + len(found.untestable)
+    head = f"These runs could name {nameable} of {count} effects"
+    gaining = [run for run in found.added_runs if run.gained]
+    if not gaining:
+        return f"{head}; no single run adds one."
+    return f"{head}; add {gaining[0].kind.replace('_', ' ')} to name {len(gaining[0].gained)} more."
 
+
+def audit_text(found: Audit, details: bool = False) -> str:
+    """The verdict and the effects that can be named; with details, a line for each effect.
+
+    With details also what cannot be distinguished or tested, and all runs to add.
+    """
+    if not details:
+        named = [e.name for e in found.effects if e.nameable]
+        runs = [run for run in found.added_runs if run.gained][:3]
+        lines = [f"they could name: {', '.join(named)}"] if named else []
+        lines += [f"add {run.kind} ({run.text}): {', '.join(run.gained)}" for run in runs]
+        return "\n".join([audit_verdict(found), *lines, "details: -v, or --out FILE.json"])
     rows = [
         (
             e.name,
@@ -155,7 +174,7 @@ def audit_text(found: Audit) -> str:
         for factor, unit in [shown_unit(e.unit)]
     ]
     header = ("effect", "nameable", "size", "left", "apart", "detectable", "absorbed", "rival")
-    parts = [format_table(header, rows, text_columns=2, last_left=True)]
+    parts = [audit_verdict(found), format_table(header, rows, text_columns=2, last_left=True)]
     if found.classes:
         parts.append(
             "these effects cannot be distinguished at their reference sizes:\n"

@@ -9,6 +9,7 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
+from soilml.config.given_case import GivenCase, as_case
 from soilml.config.measurement_noise import checked_sensors
 from soilml.config.remainder import SAME_ROWS
 from soilml.errors import InputError, solvable
@@ -20,11 +21,7 @@ from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.fitting.usable_readings import answered_rows, with_zeros_replaced
-from soilml.gap.checks import (
-    DataCheckResult,
-    check_readings,
-    estimate_repeat_noise,
-)
+from soilml.gap.checks import DataCheckResult, check_readings, estimate_repeat_noise
 from soilml.gap.design.discriminating_runs import next_runs
 from soilml.gap.design.run_kinds import check_costs, rank_by_cost
 from soilml.gap.evidence.held_out import predictive_gains
@@ -106,7 +103,7 @@ MAX_OUTLIER_FRACTION, OUTLIERS_STATED = 0.1, 3
 
 @solvable("the gap analysis")
 def gap(
-    case: Case,
+    case: GivenCase,
     table: Rows,
     *,
     free: Sequence[str] | None = None,
@@ -124,9 +121,9 @@ def gap(
 
     Parameters
     ----------
-    case : Case
+    case : Case or path
         Model, soil, priors, measurement noise, and the bias of sensors.
-    table : Table, data frame or mapping of columns
+    table : Table, path, data frame or mapping of columns
         Rows with `run`, `slip`, `load_N` and measured channels.
     free : sequence of str, optional
         Soil parameters to fit; by default those with a prior.
@@ -180,6 +177,7 @@ def gap(
     >>> gap(case, Table(columns)).status
     'no-gap'
     """
+    case = as_case(case)
     effects = candidate_effects(case, effects)
     case = without_learned_discrepancy(case).without_suspected()
     known_costs = check_costs(costs or {})

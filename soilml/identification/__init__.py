@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.config.given_case import GivenCase, as_case
 from soilml.config.remainder import SAME_ROWS
 from soilml.errors import FitError, InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
@@ -49,7 +50,7 @@ MOST_ROWS = 100_000
 
 @solvable("the identification")
 def identify(
-    case: Case,
+    case: GivenCase,
     table: Rows,
     free: Sequence[str] | None = None,
     method: str = "averaged",
@@ -59,10 +60,10 @@ def identify(
     Parameters
     ----------
     case
-        Model, soil, priors and noise, as `read_case` returns it.
+        Model, soil, priors and noise, as `read_case` returns it, or the path of a model file.
     table
-        Measured rows, as `read_table` returns them: `slip`, `load_N`, and one or more of
-        `torque_Nm`, `drawbar_pull_N` and `sinkage_m`; NaN where not measured.
+        Measured rows: a `Table`, a data frame or the path of a table, with `slip`, `load_N`, and
+        one or more of `torque_Nm`, `drawbar_pull_N` and `sinkage_m`; NaN where not measured.
     free
         Paths of the free parameters (`cohesion`, `kphi`, `slip-sinkage.n1`); by default those with
         a prior.
@@ -105,7 +106,7 @@ def identify(
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
     0.494 +- 0.040 rad
     """
-    table = as_table(table)
+    case, table = as_case(case), as_table(table)
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     if method in CLOSED_FORM and case.gears:

@@ -11,16 +11,21 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.errors import InputError
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.levels import is_one_load
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
+from soilml.identification.soil_explanation import SoilExplanation as SoilExplanation
 from soilml.numerics.prior import Prior
 from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
 from soilml.remarks import Remark
 from soilml.report.numbers import share_left
+from soilml.report.parameter_lines import parameter_lines
+from soilml.report.terminal import significant
+from soilml.results import EstimatedValue, Interval, Result
 
 if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
@@ -40,50 +45,8 @@ AGAINST_EXACT = ("excess-residuals", "unlikely")
 MAJORITY = 0.5
 
 
-@dataclass(frozen=True)
-class SoilExplanation:
-    """One way in which sensors and model may differ from the model file.
-
-    Attributes
-    ----------
-    effect
-        Name of an effect of the catalogue that the model lacks; "" for none.
-    error_scale
-        Size of all errors of sensors and model over the typical ones; 0 for those declared alone.
-    probability
-        Its share in the averaged answer.
-    """
-
-    effect: str
-    error_scale: float
-    probability: float
-
-    @property
-    def exact(self) -> bool:
-        """Whether it takes model and sensors to be exactly as in the file."""
-        return not self.effect and self.error_scale == 0.0
-
-    def __str__(self) -> str:
-        """What it says, in words."""
-        if self.exact:
-            return "the model as in its file"
-        errors = f"typical errors x {self.error_scale:g}"
-        if not self.effect:
-            return errors
-        return f"{self.effect} and {errors}" if self.error_scale else self.effect
-
-    def as_json(self) -> dict[str, Any]:
-        """Its content in a report; `effect` is null for none."""
-        return {
-            "effect": self.effect or None,
-            "error_scale": self.error_scale,
-            "probability": self.probability,
-            "text": str(self),
-        }
-
-
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, repr=False)
+class Fit(Result):
     """Estimates of p parameters with their covariance and warnings.
 
     `std` is the expected distance between estimate and true value, given the rows, the noise of the
@@ -141,11 +104,20 @@ class Fit:
     exact_model: Fit | None = None
 
     @property
-    def interval(self) -> tuple[Floats, Floats]:
-        """Ends (p,) of the 90 % interval; Gaussian where the method does not compute them."""
-        if self.low is None or self.high is None:
-            return self.values - Z_90 * self.std, self.values + Z_90 * self.std
-        return self.low, self.high
+    def mean(self) -> Floats:
+        """Estimates (p,) in SI units, the same as `values`."""
+        return self.values
+
+    @property
+    def interval(self) -> Interval:
+        """Ends (p,) of the 90 % interval; `interval(level)` has those of another level.
+
+        They are Gaussian where the method does not compute them.
+        """
+        low, high = self.low, self.high
+        if low is None or high is None:
+            low, high = self.values - Z_90 * self.std, self.values + Z_90 * self.std
+        return Interval.around(self.values, low, high)
 
     @property
     def std(self) -> Floats:
@@ -157,8 +129,58 @@ class Fit:
         """Correlations (p, p)."""
         return np.asarray(self.covariance / np.outer(self.std, self.std))
 
-    def __getitem__(self, name: str) -> float:
-        return float(self.values[self.names.index(name)])
+    def __getitem__(self, name: str) -> EstimatedValue:
+        """One parameter, which computes as its mean; `InputError` for another name."""
+        if name not in self.names:
+            raise InputError(f"{name!r} is not identified; there are: {', '.join(self.names)}")
+        i = self.names.index(name)
+        low, high = self.interval
+        return EstimatedValue(
+            float(self.values[i]), float(self.std[i]), self.units[i], float(low[i]), float(high[i])
+        )
+
+    @property
+    def fits(self) -> bool:
+        """Whether the rows do not reject model and sensors as in the file."""
+        exact = self.exact_model or self
+        return not any(remark.code in AGAINST_EXACT for remark in exact.warnings)
+
+    @property
+    def verdict(self) -> str:
+        """Whether model and rows agree, and what to do where they do not, in one sentence."""
+        exact = self.exact_model or self
+        against = [remark.code for remark in exact.warnings if remark.code in AGAINST_EXACT]
+        count = f"{self.rows_used} row{'' if self.rows_used == 1 else 's'}"
+        if against:
+            size = f" ({significant(float(np.sqrt(exact.misfit)), 2)} times the noise; p < 0.001)"
+            known = against[0] == AGAINST_EXACT[0]
+            return f"The model does not fit these rows{size if known else ''}: run `soilml gap`."
+        left = self.remaining_fraction
+        open_ = [name for name in self.names if left.get(name, 0.0) > NOT_IDENTIFIED_ABOVE]
+        if len(open_) == len(self.names):
+            return f"No parameter of the soil is determined by {count}: measure other slips."
+        fits = "" if np.isnan(self.misfit) else "The model fits these rows; "
+        text = f"{fits}{count} determine{'s' if self.rows_used == 1 else ''} "
+        text += "the soil" if not open_ else f"the soil, but not {', '.join(open_)}"
+        return f"{text[0].upper()}{text[1:]}."
+
+    def summary(self) -> str:
+        """The verdict, then each parameter with its 90 % interval."""
+        left = [self.remaining_fraction.get(name) for name in self.names]
+        lines = parameter_lines(self.names, self.units, self.values, self.std, *self.interval, left)
+        return "\n".join([self.verdict, *(line.sentence for line in lines)])
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each parameter: mean, standard deviation, 90 % interval, unit."""
+        low, high = self.interval
+        return {
+            "parameter": list(self.names),
+            "mean": self.values,
+            "std": self.std,
+            "low": low,
+            "high": high,
+            "unit": list(self.units),
+        }
 
     def intervals(
         self, prior: Mapping[str, Prior] | None = None, label: str = ""
@@ -189,6 +211,7 @@ class Fit:
         """The content of the file that `soilml identify` writes."""
         correlation = self.correlation
         content = {
+            "verdict": self.verdict,
             "method": self.method,
             "parameters": self._parameters(),
             "correlation": {
@@ -228,7 +251,7 @@ class Fit:
     def use_of_exact(self) -> Remark:
         """When to use this fit, which takes model and sensors as exact, in place of the average."""
         if any(remark.code in AGAINST_EXACT for remark in self.warnings):
-            text = "the rows speak against exact_model: do not use it"
+            text = "the model misfits these rows: do not use exact_model"
         else:
             text = (
                 "use exact_model only where this model and these sensors were verified on a known "

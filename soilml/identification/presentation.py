@@ -47,10 +47,13 @@ class Identification:
         """The content of the file, for one fit."""
         return self.fit.as_json() | dict(self.advice) | dict(self.soil)
 
-    def text(self) -> str:
-        """The fit as a table, its warnings, the exact model, and the advice."""
+    def text(self, details: bool = False) -> str:
+        """The verdict, the fit as a table, its warnings, and the advice.
+
+        details: Whether the exact model is shown too.
+        """
         exact = self.fit.exact_model
-        second = [] if exact is None else ["", _exact_text(self.fit, exact)]
+        second = [] if exact is None or not details else ["", _exact_text(self.fit, exact)]
         messages = ["", *texts(self.next_rows)] if self.next_rows else []
         return "\n".join([_fit_text(self.fit), *second, *messages])
 
@@ -92,10 +95,14 @@ def identify_report(
     every = [line for own in list(lines.values())[: len(found)] for line in own]
     first = next(iter(found.values())).fit
     known, total = sum(line.known for line in every), len(every)
+    fits = all(one.fit.fits for one in found.values())
     badge = "identified" if known == total else "partly identified" if known else "not identified"
     head = {name: f"{by} {name}: " if by else "" for name in (*found, *failed)}
+    if not fits:
+        badge = "the model does not fit"
     if len(found) <= _MOST_SENTENCES:
-        answer = [
+        answer = [head[name] + one.fit.verdict for name, one in found.items()]
+        answer += [
             (f"{numbers.capitalised(label)}: " if label else "") + headline(own)
             for label, own in list(lines.items())[: len(found)]
         ]
@@ -123,7 +130,7 @@ def identify_report(
         badge=badge,
         meaning=f"from {rows} rows by the method {first.method}; channels: {channels}",
         answer=answer,
-        tone="named" if known == total else "suspected",
+        tone="named" if known == total and fits else "suspected",
         pictures=[_picture(case, answers)],
         tables=[parameter_table(lines, "answer" if len(answers) > 1 else None)],
         warnings=warnings,
@@ -191,8 +198,7 @@ def _fit_text(found: Fit) -> str:
     ]
     head = ("parameter", "value", "std", "90 % interval", "unit", "posterior/prior")
     first = f"{found.method}, {found.rows_used} rows, channels: {', '.join(found.channels)}"
-    if len(unknown) == len(found.names):
-        first = f"nothing is determined by these rows\n\n{first}"
+    first = f"{found.verdict}\n\n{first}"
     by = ""
     if found.explanations:
         shown = stated_explanations(found.explanations)[:_MOST_EXPLANATIONS]

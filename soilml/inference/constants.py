@@ -63,7 +63,7 @@ NEAR_SET = 4.0
 #: Decrease of -2 ln p by a linearised step that counts without a fit; what promises more is fitted.
 TRUSTED = 4.0
 #: Fits of one round, of an explanation in turn with its hyperparameters, and rounds.
-FITS_PER_ROUND, FITS_IN_TURN, ROUNDS = 8, 4, 7
+FITS_PER_ROUND, FITS_IN_TURN, ROUNDS = 8, 6, 7
 #: Single effects that are fitted in the first round in any case.
 FIRST_SINGLES = 4
 #: Amplitude of a discrepancy, in usual ones, from which it can hide an effect that explains nearly

@@ -47,6 +47,11 @@ class Explanation:
         return min(self.beside, self.without, key=lambda own: own.value)
 
     @property
+    def hoped(self) -> float:
+        """The value if the step to the optimum gives what it promises."""
+        return self.value - self.best.trusted + min(self.best.trusted, self.promising.value)
+
+    @property
     def share_without(self) -> float:
         """Probability that there is no discrepancy, given the hypothesis."""
         logs = np.log([1.0 - constants.DISCREPANCY_PRIOR, constants.DISCREPANCY_PRIOR])

@@ -252,7 +252,8 @@ class Search:
                 target = node.promising.at
                 moved = _distance(self.terms, job.at, target) > constants.MOVED
                 moved = moved or bool((node.outliers != job.outliers).any())
-                if node.value < lowest + margin and (moved or turn == 0):
+                promised = node.promising.promised > constants.TRUSTED
+                if node.hoped < lowest + margin and (moved or promised or turn == 0):
                     start, near = fit.start_values(), fit.linearisation
                     again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
             jobs = again

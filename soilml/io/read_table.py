@@ -33,8 +33,8 @@ Limits = tuple[float, float, str]  # Lower and upper bound, and what is needed i
 #: column -> (lower, upper, what is needed); a number must lie strictly between.
 _LIMITS: dict[str, Limits] = {
     "slip": (
-        -1.0,
-        1.0,
+        -1.0 - 1e-9,
+        1.0 + 1e-9,
         "a slip ratio, between -1 and 1, as a fraction and not in percent: 1 - v/(r omega); "
         "(r omega - v)/v = q is q/(1 + q)",
     ),
@@ -61,8 +61,12 @@ _LIMITS: dict[str, Limits] = {
     "outer_radius_m": (0.0, 10.0, "a radius above zero and below 10, in m"),
     "shear_displacement_m": (-1.0, 10.0, "a displacement in m"),
 }
+#: Slip at which a wheel that spins on the spot, or is locked, is computed: its forces are those of
+#: a slip of 1 to a thousandth, and the model is defined below 1.
+_SPINNING = 0.9999
 _MOST = 1e30  # Magnitude of any other number; squares and products of such are finite
-Rows = Table | ArrowStream | Mapping[str, ArrayLike]  # What the analyses take as rows
+# What the analyses take as rows: a table, a data frame, columns, or the path of a file
+Rows = Table | ArrowStream | Mapping[str, ArrayLike] | str | os.PathLike[str]
 
 
 def read_table(
@@ -105,7 +109,9 @@ def read_table(
     ------
     TableError
         For the first error in the file: a missing file, column or value, an unknown column, a cell
-        that is not a number, or a value outside the limits of its quantity, such as a slip of 1.
+        that is not a number, or a value outside the limits of its quantity, such as a slip of 2.
+        A slip of 1 or -1, of a wheel that spins on the spot or is locked, is read as 0.9999 or
+        -0.9999.
     MissingLibraryError
         For a Parquet file where pyarrow is not installed, a spreadsheet without python-calamine.
 
@@ -162,6 +168,9 @@ def check_table(
     if len(table) == 0:
         raise TableError(f"{file}: the table has a header but no row")
     _check_values(table, filled, _LIMITS | dict(limits or {}))
+    if "slip" in table and (np.abs(table["slip"]) > _SPINNING).any():
+        whole = np.clip(table["slip"], -_SPINNING, _SPINNING)
+        table = replace(table, columns={**table.columns, "slip": whole})
     return table
 
 
@@ -279,8 +288,8 @@ def _read_parquet(file: Path, ignore_extra: bool) -> Table:
 def as_table(rows: Rows) -> Table:
     """The table of rows; data frames, columns and tables made of them are checked as files are.
 
-    rows: A `Table`; a data frame of pandas, polars or pyarrow; or a mapping of columns (rows,) by
-        names such as load_N, numbers and, for runs, text.
+    rows: A `Table`; the path of a file; a data frame of pandas, polars or pyarrow; or a mapping of
+        columns (rows,) by names such as load_N, numbers and, for runs, text.
 
     Raises `TableError` for another object, columns of different lengths, and what `read_table`
     refuses.
@@ -293,7 +302,7 @@ def as_table(rows: Rows) -> Table:
     if isinstance(rows, Table):
         # the rows of files have been checked, and have the lines of their file
         return rows if len(rows.line) else _checked(rows.columns, rows.source, rows.metadata)
-    if isinstance(rows, ArrowStream):
+    if isinstance(rows, str | os.PathLike | ArrowStream):
         return read_table(rows)
     if not isinstance(rows, Mapping):
         raise TableError(

@@ -13,6 +13,7 @@ from soilml.errors import TableError
 from soilml.io.bounds import MOST_TEXT
 from soilml.io.cell_text import is_plain, read_number
 from soilml.optional_imports import need
+from soilml.results import data_frame
 from soilml.row_status import Status
 
 Column = NDArray[Any]
@@ -75,6 +76,11 @@ class Table:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()))) if self.columns else 0
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """The rows as dictionaries by column, so that `pandas.DataFrame(table)` works."""
+        for row in zip(*self.columns.values(), strict=True):
+            yield dict(zip(self.columns, row, strict=True))
 
     def __contains__(self, name: str) -> bool:
         return name in self.columns
@@ -142,6 +148,20 @@ class Table:
         members = np.split(order, ends[:-1])
         for position in np.argsort(first):
             yield str(values[position]), self.rows(members[position])
+
+    def to_frame(self) -> Any:
+        """The columns as a data frame of pandas; `MissingLibraryError` without it."""
+        return data_frame(self.columns)
+
+    @staticmethod
+    def from_frame(frame: Any) -> Table:
+        """The rows of a data frame of pandas, polars or pyarrow, checked as files are.
+
+        Raises `TableError` as `read_table` does.
+        """
+        from soilml.io.read_table import as_table
+
+        return as_table(frame)
 
     def to_arrow(self) -> Any:
         """The columns as a pyarrow table, which pandas, polars and others take.

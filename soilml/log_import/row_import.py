@@ -19,6 +19,7 @@ from soilml.log_import.channels.wheel_quantities import slope_of
 from soilml.log_import.checks.column_units import unit_hints
 from soilml.log_import.checks.map_hints import map_hints
 from soilml.log_import.checks.table_hints import table_hints
+from soilml.log_import.guesses.columns import words_of
 from soilml.log_import.guesses.other_columns import with_other_columns
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import LogMap, WheelMap
@@ -35,10 +36,13 @@ from soilml.log_import.rows import (
     values_of,
     without_torque,
 )
+from soilml.log_import.units import dimension
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
 from soilml.remarks import Remark
 
+_OF_THE_WHEEL = ("wheel_radius_m", "wheel_width_m")  # Columns of logs that rows keep
+_SIZES = {"radius", "diameter", "durchmesser", "radio", "rayon", "raggio", "dia", "diam", "width"}
 _OF_SAMPLES = ("wheel_angle", "position")  # Channels that only samples over time can be
 
 
@@ -88,11 +92,13 @@ def import_rows(
     if not groups:
         raise InputError(f"{log_map.source}: no row can be used: {left[0] if left else 'empty'}")
     table = rows_as_table(groups, log_map)
-    table = Table({k: v for k, v in table.columns.items() if k != "time_s"}, table.source)
+    kept = {k: v for k, v in table.columns.items() if k != "time_s"}
+    table = Table(kept | _geometry(groups), table.source)
     bias, parts = largest_errors(errors)
     radii = {wheel.radius.value if wheel.radius else None for wheel, _, _ in groups}
     radius = radii.pop() if len(radii) == 1 else None
     remarks = [*left[:5], *without_torque(table), *_without_errors(table)]
+    remarks += _several_wheels(table, logs)
     remarks += table_hints(table.columns, table.columns.get("wheel_radius_m"))
     return ImportedLog(
         table=table,
@@ -174,6 +180,43 @@ def _channel(run: Run, channel: ChannelMap, count: int) -> tuple[Floats, Floats]
         return given, error
     ours = our_slip(given, channel.definition)
     return ours, np.abs(our_slip(given + error, channel.definition) - ours)
+
+
+def _geometry(
+    groups: Sequence[tuple[WheelMap, Run, Sequence[WindowRow]]],
+) -> dict[str, Floats]:
+    """Radius and width of the wheel of each row, where the logs have columns of these names."""
+    found = {}
+    for name in _OF_THE_WHEEL:
+        values = [
+            float(recording.columns[name][int(row.window.start)])
+            if name in recording.columns else np.nan
+            for _, run, rows in groups for recording in run.recordings[:1] for row in rows
+        ]  # fmt: skip
+        if np.isfinite(values).any():
+            found[name] = np.asarray(values)
+    return found
+
+
+def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[Remark]:
+    """A remark on columns that say that the rows are of wheels of several sizes."""
+    if "gear" in table:
+        return []
+    for recording in (own for log in logs for own in log):
+        for name, values in recording.columns.items():
+            words = {*words_of(name)}
+            sizes = np.unique(values[np.isfinite(values)])
+            plate = recording.units.get(name, "m")
+            if not words & _SIZES or sizes.size < 2 or dimension(plate) != "m":
+                continue
+            shown = ", ".join(f"{size:g}" for size in sizes[:4])
+            text = (
+                f"the column {name!r} says {shown}: rows of several wheels. Give each a gear "
+                "([wheel] gear_from, [gears.NAME]), or a table of its own; one model of one wheel "
+                "is no model of them all"
+            )
+            return [Remark("several-wheels", text, ("wheel_radius",))]
+    return []
 
 
 def _without_errors(table: Table) -> list[Remark]:

@@ -31,6 +31,7 @@ _TIMES, _LEAST_ERROR = 6.0, 0.01
 _FEWEST = 4  # Fewest windows that tell what is usual
 #: Wandering of a pull over the load, and of a slip, s^0.5, that no steady window has.
 _MOST_WANDERING = 0.15
+_NO_SCATTER = 1e-9  # Share of a value below which a scatter is that of rounding
 #: Largest slip of a row: at 1 the wheel spins on the spot, and r omega and v say no more.
 _MOST_SLIP = 0.995
 
@@ -295,7 +296,10 @@ def rows_as_table(
             for name in ("slip", "load", "torque", "drawbar_pull", "sinkage", "vibration"):
                 if name in row.values:
                     line[column(name)] = row.values[name]
-                    line[f"{column(name)}_std"] = row.std.get(name, float("nan"))
+                    std = row.std.get(name, float("nan"))
+                    # a channel that was set has no scatter: its error is not known, and not zero
+                    some = std > _NO_SCATTER * max(abs(row.values[name]), _NO_SCATTER)
+                    line[f"{column(name)}_std"] = std if some else float("nan")
             if "speed" in row.values:
                 line[column("speed")] = row.values["speed"]
             line[column("time")] = (row.window.start + row.window.stop) / 2.0

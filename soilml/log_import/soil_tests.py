@@ -1,16 +1,19 @@
-"""Tables of plate and shear tests under other names and in other units."""
+"""Tables of plate, shear and triaxial tests under other names and in other units."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import InputError, SoilmlError
-from soilml.io.table import Table, text_column
-from soilml.log_import.guesses.columns import words_of
+from soilml.io.table import TEXT, Table, text_column
+from soilml.log_import.guesses.columns import parts_of, words_of
+from soilml.log_import.guesses.constants import agreed_constants, stated_radius
 from soilml.log_import.readers import read_log
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor, unit_in_name
@@ -19,20 +22,25 @@ from soilml.quantities import COLUMNS
 #: Words of the columns of a table of shear tests, and of a ring.
 _SHEAR = {"tau", "shear", "scher", "scherspannung", "schub", "taglio", "corte", "cisaillement"}
 _RING = {"angle", "winkel", "theta", "rotation"}
+_VERTICAL = {"vertical", "vertikal", "axial", "settlement", "dilation", "setzung"}
+_WAYS = {"displacement", "verschiebung", "weg"}
+_DIAMETER = {"d", "diameter", "dia", "durchmesser"}
+_CONFINING = {"confining", "cell", "zelldruck", "zell", "seitendruck", "lateral", "radial"}
+_DEVIATOR = {"deviator", "deviatoric", "deviatorspannung"}
 #: Our column, its unit, and the words of which a name must have one; the first that fits counts.
 _QUANTITIES: tuple[tuple[str, str, set[str]], ...] = (
     ("shear_stress_Pa", "Pa", _SHEAR | {"t", "strength"}),
-    ("normal_stress_Pa", "Pa", {"sigma", "normal", "normalspannung", "sn", "s", "vertical"}),
-    ("pressure_Pa", "Pa", {"p", "pressure", "druck", "contact", "stress", "q"}),
+    ("normal_stress_Pa", "Pa", {"sigma", "normal", "normalspannung", "sn", "s", *_VERTICAL}),
+    ("pressure_Pa", "Pa", {"p", "pressure", "druck", "pressung", "contact", "stress", "q"}),
     ("shear_displacement_m", "m", _SHEAR | {"j", "x", "horizontal", "scherweg"}),
-    ("inner_radius_m", "m", {"inner", "innen", "ri"}),
-    ("outer_radius_m", "m", {"outer", "aussen", "außen", "ro", "ra"}),
-    ("plate_diameter", "m", {"d", "diameter", "dia", "durchmesser"}),
-    ("plate_radius_m", "m", {"r", "radius", "b"}),
+    ("inner_radius_m", "m", {"inner", "innen", "ri", "id"}),
+    ("outer_radius_m", "m", {"outer", "aussen", "außen", "ro", "ra", "od"}),
+    ("plate_diameter", "m", _DIAMETER),
     ("plate_width_m", "m", {"width", "breite", "w"}),
     ("plate_length_m", "m", {"length", "länge", "laenge", "l"}),
+    ("plate_radius_m", "m", {"r", "radius", "b"}),
     ("sinkage_m", "m", {"z", "sinkage", "depth", "penetration", "einsinkung", "tiefe", "h"}),
-    ("displacement", "m", {"displacement", "verschiebung", "weg", "travel"}),
+    ("displacement", "m", {"displacement", "verschiebung", "weg", "travel", *_VERTICAL}),
     ("plate_area_m2", "m^2", {"area", "fläche", "flaeche", "a"}),
     ("load_N", "N", {"load", "force", "f", "w", "fz", "kraft", "last", "n"}),
     ("torque_Nm", "N m", {"torque", "moment", "t", "m", "drehmoment"}),
@@ -47,6 +55,9 @@ _OF_TESTS = (
 _SECOND = {"pre", "preshear", "consolidation", "consol", "residual", "rest", "ultimate", "end"}
 _PLATES = {"plate_radius_m", "plate_diameter", "plate_width_m", "plate_area_m2"}
 _TEST = {"test", "run", "trial", "probe", "sample", "versuch", "specimen", "no", "id", "name"}
+#: How far a test advances, what is constant in it, and the share by which these jump to the next.
+_ADVANCE = ("shear_displacement_m", "sinkage_m", "displacement", "angle_rad")
+_CONSTANT, _BACK, _OTHER, _SELDOM = ("normal_stress_Pa", *sorted(_PLATES)), 0.5, 0.1, 0.25
 
 
 @dataclass(frozen=True)
@@ -63,12 +74,17 @@ class SoilTests:
 
 
 def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
-    """Plate or shear tests whose columns have other names and state their units.
+    """Plate, shear or triaxial tests whose columns have other names and state their units.
+
+    A second column of a quantity that is taken is left out. Without a column that names the test, a
+    new one begins where the displacement starts again, or the stress or the plate is another one.
+    A triaxial test gives the point at which its circle of failure touches the common line.
 
     None where the columns are those of soilml, where none is of tests, and where the file cannot
     be read.
 
-    Raises `InputError` where a column that seems to be of tests states no unit.
+    Raises `InputError` where a column that seems to be of tests states no unit, and for vane tests,
+    which have no normal stress.
     """
     try:
         recordings = read_log(Path(path))
@@ -77,18 +93,25 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
     if len(recordings) != 1 or not recordings[0].columns:
         return None
     own = recordings[0]
-    if any(name.removesuffix("_std") in COLUMNS for name in own.columns):
+    if any(n not in TEXT and n.removesuffix("_std") in COLUMNS for n in own.columns):
         return None
-    found: dict[str, np.ndarray] = {}
+    if any({"vane", "flügel", "fluegel"} & {*parts_of(words_of(n))} for n in own.columns):
+        raise InputError(
+            f"{path}: vane tests are not read: they give the undrained strength alone; needed are "
+            "plate, shear or triaxial tests"
+        )
+    found: dict[str, Floats] = {}
     taken, left_out = [], []
+    sheared = any({*parts_of(words_of(name))} & _SHEAR for name in own.columns)
+    if circles := _circles(path, own):
+        return circles
     # of two stresses, the strength comes before the residual one, and the shearing before what
     # consolidated the sample
     ordered = sorted(own.columns.items(), key=lambda c: bool({*words_of(c[0])} & _SECOND))
     for name, values in ordered:
-        unit = own.units.get(name, "")
-        unit = unit if dimension(unit) else unit_in_name(name)
-        words = {*words_of(name)}
-        column = _quantity(words, dimension(unit) if unit else None, {*found})
+        unit, words = _unit(own, name), {*parts_of(words_of(name)), *words_of(name)}
+        kind = dimension(unit) if unit else None
+        column = _quantity(words, kind, {*found}, sheared)
         if column and not unit:
             raise InputError(
                 f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
@@ -96,54 +119,163 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
             )
         if column:
             ours = next(u for c, u, _ in _QUANTITIES if c == column)
-            found[column] = values * factor(unit, ours, f"{path}, column {name!r}")
-            taken.append(f"{_our_name(column, own)} = {name!r} ({unit})")
+            half = column.endswith("r_radius_m") and words & (_DIAMETER | {"id", "od"})
+            share = 0.5 if half else 1.0
+            found[column] = share * values * factor(unit, ours, f"{path}, column {name!r}")
+            taken.append(f"{'2 ' * bool(half)}{_our_name(column, sheared)} = {name!r} ({unit})")
         elif not (words & _TEST and "test" not in found):
             left_out.append(repr(name))
+    if "plate_radius_m" in found and "plate_length_m" in found and "plate_width_m" not in found:
+        found["plate_width_m"] = found.pop("plate_radius_m")  # b of a strip is its width
+    if "pressure_Pa" in found and "plate_width_m" in found:
+        found.setdefault("plate_length_m", found["plate_width_m"])  # a pressure needs no area
+    of_plates = not sheared and {"sinkage_m", "displacement"} & found.keys()
+    if of_plates and not _PLATES & found.keys():
+        radius = stated_radius(agreed_constants([recordings]).common)
+        if radius:
+            found["plate_radius_m"] = np.full(len(own), radius)
+            taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
     plates = "load_N" in found and bool(_PLATES & found.keys())
     if not plates and not any(needed <= found.keys() for needed in _OF_TESTS):
         return None
-    label, names = _names(own)
-    taken.insert(0, f"test = {label!r}" if label else "one test")
+    label, names = _names(own, found)
+    taken.insert(0, f"test = {label!r}" if label else _counted(names))
     if "plate_diameter" in found:
         found["plate_radius_m"] = found.pop("plate_diameter") / 2.0
     if "displacement" in found:
-        found[_our_name("displacement", own)] = found.pop("displacement")
+        ours, values = _our_name("displacement", sheared), found.pop("displacement")
+        found.setdefault(ours, values)
     tests = text_column(names, lambda i: f"{path}, row {i + 1} of the tests, column {label!r}")
     columns = {"test": tests, **found}
     lines = np.arange(1, len(own) + 1)
     return SoilTests(Table(columns, str(path), lines), tuple(taken), tuple(left_out))
 
 
-def _quantity(words: set[str], kind: str | None, have: set[str]) -> str:
-    """The column that a name and the kind of its unit mean; "" for none.
+def _unit(own: Recording, name: str) -> str:
+    unit = own.units.get(name, "")
+    return unit if dimension(unit) else unit_in_name(name)
+
+
+def _quantity(words: set[str], kind: str | None, have: set[str], sheared: bool) -> str:
+    """The column that a name and the kind of its unit mean; "" for none, and for one that is taken.
 
     Without a unit only words of more than one letter count, so that the column is asked for it.
+    Beside a shear stress a vertical displacement is none of the shear.
     """
+    across = words & (_VERTICAL | {"normal"}) - {"axial"}
+    if sheared and across and (kind == "m" or (kind is None and words & _WAYS)):
+        return ""
     for column, unit, known in _QUANTITIES:
-        if column in have or (kind is not None and kind != unit):
+        if kind is not None and kind != unit:
             continue
         if words & {word for word in known if kind is not None or len(word) > 4}:
-            return column
+            if column not in have:
+                taken = {"displacement", "shear_displacement_m" if sheared else "sinkage_m"} & have
+                return "" if column == "displacement" and taken else column
+            if not words & (_SHEAR | _SECOND | _VERTICAL) or kind != "Pa":
+                continue
+            return ""
     return ""
 
 
-def _our_name(column: str, own: Recording) -> str:
+def _our_name(column: str, sheared: bool) -> str:
     """The name in soilml; a displacement is that of the shear where there is a shear stress."""
     if column == "plate_diameter":
         return "2 plate_radius_m"
     if column != "displacement":
         return column
-    sheared = any({*words_of(name)} & _SHEAR for name in own.columns)
     return "shear_displacement_m" if sheared else "sinkage_m"
 
 
-def _names(own: Recording) -> tuple[str, list[str]]:
-    """The column that names the test of each row, and the names."""
+def _names(own: Recording, found: dict[str, Floats]) -> tuple[str, list[str]]:
+    """The column that names the test of each row, "" for none, and the names."""
     for name, cells in own.texts.items():
         if {*words_of(name)} & _TEST or len(own.texts) == 1:
             return name, [cell or "unnamed" for cell in cells]
     for name, values in own.columns.items():
-        if {*words_of(name)} & _TEST and np.isfinite(values).all():
+        if {*words_of(name)} & _TEST and np.isfinite(values).all() and _in_groups(values, found):
             return name, [f"{value:g}" for value in values]
-    return "", ["test"] * len(own)
+    number = np.cumsum(_starts(found, len(own)))
+    if not number.size or number[-1] == 0:
+        return "", [own.file.stem] * len(own)
+    return "", [f"{own.file.stem}_{n + 1}" for n in number]
+
+
+def _in_groups(values: Floats, found: dict[str, Floats]) -> bool:
+    """Whether a column numbers tests and not samples: of strengths each row is a test."""
+    curves = any(name in found for name in _ADVANCE)
+    return not curves or np.unique(values).size < values.size
+
+
+def _starts(found: dict[str, Floats], count: int) -> np.ndarray:
+    """Whether a new test starts at each row (rows,)."""
+    starts = np.zeros(count, dtype=bool)
+    advance = next((found[name] for name in _ADVANCE if name in found), None)
+    if advance is None or count < 2:
+        return starts
+    size = np.maximum.accumulate(np.nan_to_num(np.abs(advance)))[:-1]
+    starts[1:] |= np.diff(np.abs(advance)) < -_BACK * size
+    for name in _CONSTANT:
+        if name in found:
+            own = found[name]
+            jumps = np.abs(np.diff(own)) > _OTHER * np.abs(own[:-1])
+            if np.mean(jumps) < _SELDOM:
+                starts[1:] |= jumps
+    return starts
+
+
+def _counted(names: list[str]) -> str:
+    count = len({*names})
+    return "one test" if count == 1 else f"{count} tests, divided where they start again"
+
+
+def _circles(path: str | os.PathLike[str], own: Recording) -> SoilTests | None:
+    """Triaxial tests as points of failure; None where the columns are of no triaxial test."""
+    columns = dict(_triaxial(own))
+    if "cell" not in columns or not {"deviator", "axial"} & columns.keys():
+        return None
+
+    def read(key: str) -> Floats:
+        name = columns[key]
+        return own.columns[name] * factor(_unit(own, name), "Pa", f"{path}, column {name!r}")
+
+    cell, pore = read("cell"), read("pore") if "pore" in columns else 0.0
+    deviator = read("deviator") if "deviator" in columns else read("axial") - cell
+    label, names = _names(own, {"displacement": cell} if len(own) > np.unique(cell).size else {})
+    if not label:
+        names = [f"{round(pressure / 100.0) / 10:g} kPa" for pressure in cell]
+    tests = list(dict.fromkeys(names))
+    peaks = [max((i for i, n in enumerate(names) if n == test), key=lambda i: deviator[i])
+             for test in tests]  # fmt: skip
+    radius = deviator[peaks] / 2.0
+    centre = (cell - pore)[peaks] + radius
+    if len(tests) < 2 or float(np.ptp(centre)) < _OTHER * float(np.max(centre)):
+        raise InputError(f"{path}: needed are triaxial tests at two or more cell pressures")
+    # eq. of the tangent: (s1 - s3)/2 = c cos(phi) + (s1 + s3)/2 sin(phi)
+    sine = float(np.clip(np.polyfit(centre, radius, 1)[0], 0.0, 0.99))
+    points = {
+        "test": text_column(tests, lambda i: f"{path}, test {i + 1}"),
+        "normal_stress_Pa": centre - radius * sine,
+        "shear_stress_Pa": radius * np.sqrt(1.0 - sine**2),
+    }
+    said = ", ".join(f"{key} = {name!r}" for key, name in columns.items())
+    taken = (f"{len(tests)} triaxial tests, of which the circles of failure count", said)
+    left = tuple(repr(n) for n in own.columns if n not in columns.values() and n != label)
+    return SoilTests(Table(points, str(path), np.arange(1, len(tests) + 1)), taken, left)
+
+
+def _triaxial(own: Recording) -> Iterator[tuple[str, str]]:
+    """The columns of a triaxial test: cell, deviator or axial stress, and pore pressure."""
+    for name in reversed([*own.columns]):
+        if dimension(_unit(own, name)) != "Pa":
+            continue
+        words = {*parts_of(words_of(name)), *words_of(name)}
+        sigma = bool(words & {"sigma", "σ", "s"})
+        if words & {"pore", "porewater", "poren", "u"}:
+            yield "pore", name
+        elif words & _DEVIATOR or (sigma and {"1", "3"} <= words):
+            yield "deviator", name
+        elif words & _CONFINING or (sigma and "3" in words):
+            yield "cell", name
+        elif sigma and "1" in words:
+            yield "axial", name

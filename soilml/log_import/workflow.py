@@ -26,10 +26,11 @@ from soilml.log_import.checks.sensors import (
 )
 from soilml.log_import.checks.table_hints import table_hints
 from soilml.log_import.guesses.columns import liveliest
-from soilml.log_import.guesses.map_text import log_files
 from soilml.log_import.guesses.other_columns import with_other_columns
 from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
 from soilml.log_import.readers import read_log
+from soilml.log_import.readers.side_files import log_files
+from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.row_import import import_rows
 from soilml.log_import.rows import (
@@ -101,6 +102,16 @@ def import_log(
         tell("reading logs", i, len(files))
         recordings.append(read_log(Path(file)))
     tell("reading logs", len(files), len(files))
+    return import_recordings(recordings, found, accept, tell)
+
+
+def import_recordings(
+    recordings: Sequence[Sequence[Recording]],
+    found: LogMap,
+    accept: bool = False,
+    tell: Progress = lambda stage, done, total: None,
+) -> ImportedLog:
+    """What `import_log` gives, of logs that are read already; raises as it does."""
     if found.each_row:
         return import_rows(recordings, found, accept)
     runs = runs_of(recordings, found)
@@ -137,7 +148,7 @@ def import_log(
         remarks=tuple(dict.fromkeys(remarks)),
         implausible=tuple(wrong),
         radius=radius or float("nan"),
-        sources=tuple(str(file) for file in files),
+        sources=tuple(str(log[0].file) for log in recordings),
         map_name=found.source,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, ClassVar
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.errors import InputError
-from soilml.onboard.features import as_numbers
 from soilml.onboard.held_out_errors import HeldOutErrors
-from soilml.onboard.narrower_prior import LEAST_MASS, within_box
+from soilml.onboard.narrower_prior import LEAST_MASS, box_ends, within_box
 from soilml.onboard.set_contract import Floats
-from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90
+from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90, column
+from soilml.results import LEVEL, EstimatedValue, Result, ends_at
 
 #: A mean closer to an end of the prior than so many standard deviations is at the edge.
 EDGE_STDS = 1.5
@@ -60,8 +60,8 @@ class PriorSummary:
     upper: Floats
 
 
-@dataclass(frozen=True)
-class Estimate:
+@dataclass(frozen=True, repr=False)
+class Estimate(Result):
     """Posterior mean, standard deviation and covariance of q quantities, in SI units.
 
     The leading dimensions ``...`` are those of the readings; an estimate from several readings of
@@ -225,6 +225,10 @@ class Estimate:
         own = {key: value.reshape((*shape, *value.shape[1:])) for key, value in parts.items()}
         return replace(estimate, **own)
 
+    def at(self, index: Any) -> Estimate:
+        """The estimate of one reading, or of several, by an index of the leading dimensions."""
+        return replace(self, **{key: np.asarray(getattr(self, key))[index] for key in self.ARRAYS})
+
     @property
     def abstains(self) -> NDArray[np.bool_]:
         """Whether each quantity is still mostly the prior, (..., q), or the row is out of range."""
@@ -295,7 +299,7 @@ class Estimate:
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
         771 Pa, 174 Pa
         """
-        lower, upper = _box_ends(self, box)
+        lower, upper = box_ends(self.names, self.units, (self.prior.lower, self.prior.upper), box)
         prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)
         given = Estimate.from_prior(self.names, self.units, prior, np.shape(self.in_range))
         outer = (self.prior.lower, self.prior.upper)
@@ -314,29 +318,80 @@ class Estimate:
             arrays["in_range"][at] &= found is not given
         return replace(self, prior=prior, **arrays)
 
-    def __getitem__(self, name: str) -> tuple[Floats, Floats]:
-        """Mean and standard deviation (...) of one quantity; `InputError` for another name."""
+    def __getitem__(self, name: str) -> EstimatedValue:
+        """One quantity (...), which unpacks to mean and standard deviation.
+
+        Raises `InputError` for another name.
+        """
         if name not in self.names:
             raise InputError(f"{name!r} is not estimated; there are: {', '.join(self.names)}")
         i = self.names.index(name)
-        return self.mean[..., i], self.std[..., i]
+        parts = (self.mean[..., i], self.std[..., i], self.low[..., i], self.high[..., i])
+        mean, std, low, high = parts
+        return EstimatedValue(mean, std, self.units[i], low, high)
 
+    def interval(self, level: float = LEVEL) -> tuple[Floats, Floats]:
+        """Ends (..., q) of the central interval of this probability, inside the prior's range.
 
-def _box_ends(estimate: Estimate, box: Mapping[str, tuple[float, float]]) -> tuple[Floats, Floats]:
-    """Ends (q,) of the box; raises `InputError` where they are not in the prior and in order."""
-    lower, upper = estimate.prior.lower.copy(), estimate.prior.upper.copy()
-    for name, ends in box.items():
-        if name not in estimate.names:
-            raise InputError(f"{name!r} is not estimated; there are: {', '.join(estimate.names)}")
-        i = estimate.names.index(name)
-        given = as_numbers(name, ends)
-        if given.shape != (2,):
-            raise InputError(f"{name} within {ends!r}; needed are two values, (least, largest)")
-        low, high = float(given[0]), float(given[1])
-        if not lower[i] <= low < high <= upper[i]:
-            raise InputError(
-                f"{name} within {low:g} to {high:g} {estimate.units[i]}; needed are two values in "
-                f"order within the prior, {lower[i]:g} to {upper[i]:g} {estimate.units[i]}"
-            )
-        lower[i], upper[i] = low, high
-    return lower, upper
+        See `soilml.results.ends_at`.
+        """
+        low, high = ends_at(level, self.mean, self.low, self.high)
+        return np.maximum(low, self.prior.lower), np.minimum(high, self.prior.upper)
+
+    @property
+    def verdict(self) -> str:
+        """Whether the readings determine the quantities, in one sentence."""
+        known, total = np.asarray(self.in_range), int(np.size(self.in_range))
+        if total != 1:
+            return f"{int(known.sum())} of {total} readings are in the training range."
+        if not known.all():
+            reason = str(np.atleast_1d(self.explanation).ravel()[0])
+            return f"No estimate: {reason}; the values are not a measurement."
+        if bool(np.any(self.disagrees)):
+            return "The rows disagree with the exact model: run `soilml gap`."
+        vague = [name for name, no in zip(self.names, self.abstains.reshape(-1), strict=True) if no]
+        if len(vague) == len(self.names):
+            return "The readings determine no quantity: measure other slips and loads."
+        if vague:
+            return f"The readings do not determine {', '.join(vague)}; they determine the rest."
+        return "The readings determine all quantities."
+
+    def summary(self) -> str:
+        """The verdict, then each quantity of a single estimate."""
+        if np.size(self.in_range) != 1:
+            return self.verdict
+        found = [
+            f"{name} = {EstimatedValue(mean, std, unit)} (90 %: {low:.4g} to {high:.4g})"
+            for name, unit, mean, std, low, high in self._rows()
+        ]
+        return "\n".join([self.verdict, *found])
+
+    def _rows(self) -> Iterable[tuple[Any, ...]]:
+        q = len(self.names)
+        parts = (self.mean, self.std, self.low, self.high)
+        return zip(self.names, self.units, *(x.reshape(-1, q)[0] for x in parts), strict=True)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each quantity of a single estimate; for each reading of several.
+
+        Columns of readings are those of the file that `soilml estimate` writes: the mean, and what
+        ends in _std, _p05 and _p95, with the unit in the name.
+        """
+        if np.ndim(self.in_range) == 0:
+            keys = ("quantity", "unit", "mean", "std", "low", "high")
+            found = dict(zip(keys, zip(*self._rows(), strict=True), strict=True))
+            return {key: list(found[key]) for key in (*keys[:1], *keys[2:], "unit")}
+        columns: dict[str, Any] = {"reading": np.arange(np.size(self.in_range))}
+        return columns | self.reading_columns()
+
+    def reading_columns(self) -> dict[str, Any]:
+        """Mean, std and interval of every quantity, and in_range, (readings,) by column name."""
+        columns: dict[str, Any] = {}
+        for i, name in enumerate(self.names):
+            key = column(name)
+            for ending, values in (
+                ("", self.mean), ("_std", self.std), ("_p05", self.low), ("_p95", self.high)
+            ):  # fmt: skip
+                columns[key + ending] = values[..., i].ravel()
+        columns["in_range"] = np.asarray(self.in_range).ravel()
+        return columns

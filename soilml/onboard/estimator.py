@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, NoReturn, final
+from typing import Any, NoReturn, final, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.exact_check import with_exact_check
-from soilml.onboard.features import flatten_readings, without_copies
+from soilml.onboard.features import flatten_readings, readings_of_frame, without_copies
 from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
 from soilml.onboard.model_file import Session, find_model, open_model
-from soilml.onboard.set_contract import Floats
+from soilml.onboard.set_contract import OPTIONAL_READINGS, Floats
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
 NoiseModels = Mapping[str, tuple[float, float]]
@@ -121,11 +121,18 @@ class Estimator:
         sets = self.sets.with_context(given, {} if noise is None else noise)
         return replace(self, sets=sets, prior=read_prior(self.metadata, sets.context_values))
 
-    def __call__(self, **measured: Any) -> Estimate:
+    @overload
+    def __call__(self, frame: None = None, /, **measured: Any) -> Estimate: ...
+    @overload
+    def __call__(self, frame: Any, /) -> Any: ...
+    def __call__(self, frame: Any = None, /, **measured: Any) -> Any:
         """Estimates from readings, each by itself, with the broadcast shape of the readings.
 
         Parameters
         ----------
+        frame : data frame of pandas
+            In place of `measured`: rows with columns such as load_N. Returned is then a frame with
+            the same index, as `Estimate.to_frame` has it.
         **measured : float or array_like
             Every quantity in `inputs`, in SI units; arrays broadcast.
 
@@ -144,6 +151,10 @@ class Estimator:
         >>> estimate.in_range
         array([ True,  True])
         """
+        if frame is not None:
+            sets_only = self.sets is not None and self.sets.sets_only
+            readings = readings_of_frame(frame, self.inputs, self._optional if sets_only else ())
+            return self(**readings).to_frame().set_axis(frame.index)
         if self.sets is not None and self.sets.sets_only:
             return self._rows_as_sets(self.sets, measured)
         flat, shape = flatten_readings(self.inputs, measured)
@@ -163,7 +174,11 @@ class Estimator:
         load = dict(zip(self.inputs, flat, strict=True)).get("load")
         return estimate if load is None else replace(estimate, load=load.reshape(shape))
 
-    def run(self, **measured: Any) -> Estimate:
+    @overload
+    def run(self, frame: None = None, /, **measured: Any) -> Estimate: ...
+    @overload
+    def run(self, frame: Any, /) -> Any: ...
+    def run(self, frame: Any = None, /, **measured: Any) -> Any:
         """One estimate from all readings (rows,) of one soil.
 
         Uses the set posterior where the file has one. Other files pool their estimates of single
@@ -175,6 +190,9 @@ class Estimator:
 
         Parameters
         ----------
+        frame : data frame of pandas
+            In place of `measured`: the rows of one soil, with columns such as load_N. Returned is
+            then a frame with a row for each quantity, as `Estimate.to_frame` has it.
         **measured : array_like, shape (rows,)
             Every quantity in `inputs`, in SI units. A set posterior also takes ``sinkage`` and
             ``drawbar_pull``, NaN in rows without them, and ``torque_std``, ``sinkage_std`` and
@@ -198,6 +216,8 @@ class Estimator:
         >>> f"{mean:.2f} +- {std:.2f} rad"
         '0.51 +- 0.07 rad'
         """
+        if frame is not None:
+            return self.run(**readings_of_frame(frame, self.inputs, self._optional)).to_frame()
         if self.sets is not None:
             rows = without_copies(self._configured_sets.rows(measured))
             if rows["slip"].size == 0:
@@ -213,6 +233,14 @@ class Estimator:
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
         return pool_run(self(**rows), rows, self.pooling)
+
+    @property
+    def _optional(self) -> list[str]:
+        """Readings that the set posterior also takes, and standard deviations of all readings."""
+        if self.sets is None:
+            return []
+        more = [name for name in OPTIONAL_READINGS if name in self.sets.noise]
+        return [*more, *(f"{name}_std" for name in (*self.inputs, *more))]
 
     def rows_in_range(self, **measured: Any) -> NDArray[np.bool_]:
         """Whether each reading of a run lies in the training domain, (rows,)."""

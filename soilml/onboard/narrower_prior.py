@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from soilml.errors import InputError
+from soilml.onboard.features import as_numbers
 from soilml.onboard.set_contract import Floats
 
 POINTS = 2048  # Points drawn
@@ -148,3 +151,28 @@ def _without_prior(
     pull = precision @ ((mean - lower) / width) - 12.0 * 0.5
     centre = np.clip(found @ pull, -NO_INFORMATION, NO_INFORMATION)
     return lower + width * centre, found * np.outer(width, width)
+
+
+def box_ends(
+    names: Sequence[str],
+    units: Sequence[str],
+    prior: tuple[Floats, Floats],
+    box: Mapping[str, tuple[float, float]],
+) -> tuple[Floats, Floats]:
+    """Ends (q,) of the box; raises `InputError` where they are not in the prior and in order."""
+    lower, upper = prior[0].copy(), prior[1].copy()
+    for name, ends in box.items():
+        if name not in names:
+            raise InputError(f"{name!r} is not estimated; there are: {', '.join(names)}")
+        i = names.index(name)
+        given = as_numbers(name, ends)
+        if given.shape != (2,):
+            raise InputError(f"{name} within {ends!r}; needed are two values, (least, largest)")
+        low, high = float(given[0]), float(given[1])
+        if not lower[i] <= low < high <= upper[i]:
+            raise InputError(
+                f"{name} within {low:g} to {high:g} {units[i]}; needed are two values in "
+                f"order within the prior, {lower[i]:g} to {upper[i]:g} {units[i]}"
+            )
+        lower[i], upper[i] = low, high
+    return lower, upper

@@ -74,14 +74,22 @@ def _prior_text(low: float, high: float, unit: str) -> str:
 
 def estimate_columns(estimate: Estimate) -> dict[str, NDArray[np.float64]]:
     """Mean, std and interval of every parameter, by column name."""
-    columns = {}
-    for i, name in enumerate(estimate.names):
-        key = column(name)
-        columns[key] = estimate.mean[:, i]
-        columns[f"{key}_std"] = estimate.std[:, i]
-        columns[f"{key}_p05"] = estimate.low[:, i]
-        columns[f"{key}_p95"] = estimate.high[:, i]
+    columns = estimate.reading_columns()
+    del columns["in_range"]
     return columns
+
+
+def verdict(columns: Mapping[str, Any], by: str | None, remarks: Sequence[Remark]) -> str:
+    """How many rows or groups are estimated, and what they do not determine, in one sentence."""
+    known = np.asarray(columns["in_range"])
+    what = f"{by or 'row'}{'' if known.size == 1 else 's'}" if by != "all" else "set of all rows"
+    are = "is" if known.size == 1 else "are"
+    head = f"{int(known.sum())} of {known.size} {what} {are} estimated"
+    if any(remark.code == "rows-disagree" for remark in remarks):
+        return f"{head}; rows disagree with the model: run `soilml gap`."
+    vague = [name for remark in remarks if remark.code == "not-identified" for name in remark.about]
+    names = " and ".join(_words(name) for name in dict.fromkeys(vague))
+    return f"{head}; {names} mostly from the prior." if vague else f"{head}."
 
 
 def _relative_width(estimate: Estimate) -> NDArray[np.float64]:

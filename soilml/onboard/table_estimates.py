@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import combinations
 from typing import Any
@@ -9,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.errors import InputError
-from soilml.io.table import Table
+from soilml.errors import InputError, TableError
+from soilml.io.read_table import Rows, as_table
+from soilml.io.table import ALL, Table
 from soilml.onboard.estimate import Estimate
 from soilml.onboard.estimator import ROWS_PER_CALL, Estimator
 from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
@@ -24,6 +26,7 @@ from soilml.onboard.set_contract import (
 from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
+from soilml.results import is_frame
 
 
 def complete_rows(estimator: Estimator, table: Table) -> NDArray[np.bool_]:
@@ -108,6 +111,52 @@ def estimates_of_runs(
             yield found.within(**box) if box else found
 
     return in_range, Estimate.stack(estimates(), (len(readings),))
+
+
+def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | None = None) -> Any:
+    """Estimates of measured rows by a trained model, as on board.
+
+    Parameters
+    ----------
+    rows
+        A table, a data frame, columns, or the path of a file, as for `identify`.
+    model
+        The trained model or the path of its file. One for wheels of any size is given its wheel by
+        `Estimator.on`.
+    by
+        Column, such as run, of whose groups each has one soil; `all` for one soil of all rows; by
+        default each row is estimated by itself.
+
+    Returns
+    -------
+    Estimate or data frame
+        Of a data frame of pandas, one with the index of the rows, or with the groups as index.
+        Otherwise an `Estimate` (rows,) or (groups,), without dimension for `all`.
+
+    Raises
+    ------
+    InputError, TableError, ModelFileError
+        As `read_table`, `Estimator.load` and `Estimator.run`; also where no row is complete.
+    """
+    table = as_table(rows)
+    estimator = model if isinstance(model, Estimator) else Estimator.load(model)
+    usable = complete_rows(estimator, table) & table.answered
+    if not usable.any():
+        wanted = ", ".join(column(name) for name in estimator.inputs)
+        raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
+    if by is None:
+        alone = estimator.sets is not None and estimator.sets.sets_only
+        own = joint_readings if alone else row_readings
+        readings = own(estimator, table.rows(usable))
+        found = estimates_of_rows(estimator, readings, usable, lambda _: None)
+        return found.to_frame().set_axis(rows.index) if is_frame(rows) else found  # type: ignore[union-attr]
+    groups = list(table.rows(usable).groups(by))
+    _, found = estimates_of_runs(
+        estimator, [joint_readings(estimator, own) for _, own in groups], {}
+    )
+    if is_frame(rows):
+        return found.to_frame().set_axis([name for name, _ in groups]).rename_axis(by)
+    return found.at(0) if by == ALL else found
 
 
 def check_independent(estimators: Sequence[Estimator]) -> None:

@@ -13,7 +13,7 @@ from soilml.report.figure_style import picture
 from soilml.report.page import Report, ReportPicture, ReportTable
 from soilml.report.terminal import shown_unit, significant
 from soilml.rover_design.figures import SIZE, axis_label
-from soilml.rover_design.report import DesignReport, SoilOutcome
+from soilml.rover_design.report import DesignReport, SoilOutcome, number
 from soilml.rover_design.search import QUANTILES, RESULTS
 from soilml.rover_design.study import DIMENSIONS
 
@@ -46,7 +46,7 @@ _WHERE_CLIMBED = ("slip", "energy_J_per_m", "torque_Nm", "lugs_needed")
 
 def design_text(report: DesignReport) -> str:
     """The verdict in one line, tables of designs, of uncertainties and tests, and remarks."""
-    parts = [verdict(report), _designs_table(report)]
+    parts = [report.summary(), _designs_table(report)]
     if report.by_soil:
         cells = [(one.name, *_soil_cells(one)) for one in report.by_soil]
         parts.append(format_table(("best on", "goal_%", "margin_N", "p05", "p95"), cells))
@@ -82,28 +82,6 @@ def _designs_table(report: DesignReport) -> str:
     return f"{table}\nnot shown here, but with --out: {', '.join(header[shown:])}"
 
 
-def verdict(report: DesignReport) -> str:
-    """What the best design is, with what probability and margin it climbs, in one line."""
-    goal, best = report.study.goal, report.best
-    named = report.study.varied or ["radius", "width", "lug_height"]
-    sizes = ", ".join(_size(name, report.best_dimensions[name]) for name in named)
-    slope = f"{significant(math.degrees(goal.slope), 3)} deg"
-    margin = (
-        f"margin {_number(best['margin_N'])} N ({_number(best['margin_N_p05'])} to "
-        f"{_number(best['margin_N_p95'])})"
-    )
-    near = abs(best["probability"] - 1.0 + goal.risk) < 0.01
-    chance = f"{100.0 * best['probability']:.{1 if near else 0}f} %"
-    if goal.margin > 0.0 or min(goal.torque_limit, goal.energy_limit) < math.inf:
-        slope += " within its limits"
-    if report.met:
-        return f"{sizes}: climbs {slope} with {chance}, {margin}"
-    return (
-        f"none is sure enough: the likeliest, {sizes}, climbs {slope} with {chance}, not "
-        f"{significant(100.0 * (1.0 - goal.risk), 3)} %, {margin}"
-    )
-
-
 def _named(report: DesignReport) -> list[str]:
     return report.study.varied or ["radius", "width", "lug_height"]
 
@@ -123,19 +101,7 @@ def _columns(report: DesignReport) -> list[tuple[str, str, str, float]]:
 
 def _soil_cells(one: SoilOutcome) -> list[str]:
     low, middle, high = one.margin
-    return [f"{100.0 * one.probability:.0f}", *(_number(value) for value in (middle, low, high))]
-
-
-def _size(name: str, value: float) -> str:
-    factor, unit = shown_unit(DIMENSIONS[name].unit)
-    return f"{name.replace('_', ' ')} {significant(factor * value, 3)} {unit}".rstrip()
-
-
-def _number(value: float) -> str:
-    """A number to a tenth; words where it is none."""
-    if math.isinf(value):
-        return "not carried"
-    return f"{value:.1f}" if math.isfinite(value) else "-"
+    return [f"{100.0 * one.probability:.0f}", *(number(value) for value in (middle, low, high))]
 
 
 def _rows(report: DesignReport) -> Iterator[Sequence[str]]:
@@ -188,13 +154,13 @@ def design_page(report: DesignReport, file: str) -> Report:
         title = "tests that would reduce the spread, at most by"
         header = ["test", "of the variance, %", "standard deviation left, %"]
         tables.append(ReportTable(title, header, tests))
-    image = picture(report.plot, 2, 2, SIZE, verdict(report))
+    image = picture(report.plot, 2, 2, SIZE, report.summary())
     return Report(
         kind="design",
         title=f"Design of {Path(file).name} for {significant(math.degrees(goal.slope), 3)}°",
         badge="meets the goal" if report.met else "does not meet the goal",
         meaning=f"at a risk of {100.0 * goal.risk:.0f} %, gravity {report.study.gravity:.4g} m/s²",
-        answer=[verdict(report)],
+        answer=[report.summary()],
         tone="no-gap" if report.met else "bad-data",
         pictures=[ReportPicture("designs", image, "White line: where the goal is met.")],
         tables=tables,

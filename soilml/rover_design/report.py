@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.remarks import Remark
+from soilml.report.terminal import shown_unit, significant
+from soilml.results import Result
 from soilml.rover_design.figures import plot_designs
 from soilml.rover_design.performance import Outcomes, evaluate
 from soilml.rover_design.search import (
@@ -29,7 +31,7 @@ from soilml.rover_design.search import (
     tried,
 )
 from soilml.rover_design.search import at_fractions as dimensions_at
-from soilml.rover_design.study import DesignStudy
+from soilml.rover_design.study import DIMENSIONS, DesignStudy
 from soilml.rover_design.uncertainty import (
     DRAWS,
     PossibleTest,
@@ -58,8 +60,8 @@ class SoilOutcome:
     margin: tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class DesignReport:
+@dataclass(frozen=True, repr=False)
+class DesignReport(Result):
     """Designs that were tried, the best of them, and what its margin depends on.
 
     Attributes
@@ -104,6 +106,15 @@ class DesignReport:
         """Draw probability, margin at risk, front and shares; see `plot_designs`."""
         return plot_designs(self, ax)
 
+    def summary(self) -> str:
+        """What the best design is, with what probability and margin it climbs."""
+        return verdict(self)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each design that was tried: its dimensions and results, SI units."""
+        columns = {**self.designs.dimensions, **self.designs.results}
+        return {"design": np.arange(self.designs.count), **columns}
+
     def as_json(self) -> dict[str, Any]:
         """The content of the JSON file, in SI units."""
         goal, designs = self.study.goal, self.designs
@@ -137,6 +148,40 @@ class DesignReport:
             ],
             "warnings": [remark.as_json() for remark in self.remarks],
         }  # fmt: skip
+
+
+def verdict(report: DesignReport) -> str:
+    """What the best design is, with what probability and margin it climbs, in one line."""
+    goal, best = report.study.goal, report.best
+    named = report.study.varied or ["radius", "width", "lug_height"]
+    sizes = ", ".join(_size(name, report.best_dimensions[name]) for name in named)
+    slope = f"{significant(math.degrees(goal.slope), 3)} deg"
+    margin = (
+        f"margin {number(best['margin_N'])} N ({number(best['margin_N_p05'])} to "
+        f"{number(best['margin_N_p95'])})"
+    )
+    near = abs(best["probability"] - 1.0 + goal.risk) < 0.01
+    chance = f"{100.0 * best['probability']:.{1 if near else 0}f} %"
+    if goal.margin > 0.0 or min(goal.torque_limit, goal.energy_limit) < math.inf:
+        slope += " within its limits"
+    if report.met:
+        return f"{sizes}: climbs {slope} with {chance}, {margin}"
+    return (
+        f"none is sure enough: the likeliest, {sizes}, climbs {slope} with {chance}, not "
+        f"{significant(100.0 * (1.0 - goal.risk), 3)} %, {margin}"
+    )
+
+
+def _size(name: str, value: float) -> str:
+    factor, unit = shown_unit(DIMENSIONS[name].unit)
+    return f"{name.replace('_', ' ')} {significant(factor * value, 3)} {unit}".rstrip()
+
+
+def number(value: float) -> str:
+    """A number to a tenth; words where it is none."""
+    if math.isinf(value):
+        return "not carried"
+    return f"{value:.1f}" if math.isfinite(value) else "-"
 
 
 def design_report(

@@ -24,11 +24,11 @@ WIDE, TALL, TALL_FROM = (2, 2, (11.0, 8.5)), (1, 4, (14.0, 5.5)), 1.3
 FILES = ("map.tif", "headings.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 
 
-def map_text(found: SoilMap) -> str:
-    """The verdict in few lines, the soil of each patch, the score and the remarks."""
+def map_verdict(found: SoilMap) -> str:
+    """What was driven, where the soil changes, and over what length it varies."""
     drive, soils = found.drive, found.soils
     span = drive.station.max() - drive.station.min()
-    wheels, names = len(np.unique(drive.wheel)), [QUANTITIES[c.path].column for c in soils.free]
+    wheels = len(np.unique(drive.wheel))
     changes = ", ".join(f"{s:.1f}" for s in found.changes)
     lines = [
         f"{len(drive.station)} rows of {wheels} wheel{'s' * (wheels > 1)} over {span:.3g} m, "
@@ -37,8 +37,15 @@ def map_text(found: SoilMap) -> str:
         f"within a patch it varies over about {found.field.length:.2g} m"
         if found.field.local > 0.05 and np.isfinite(found.field.length)
         else "within a patch no variation is found",
-        "",
     ]
+    return "\n".join(lines)
+
+
+def map_text(found: SoilMap) -> str:
+    """The verdict in few lines, the soil of each patch, the score and the remarks."""
+    soils = found.soils
+    names = [QUANTITIES[c.path].column for c in soils.free]
+    lines = [map_verdict(found), ""]
     factors = [shown_column(name) for name in names]
     rows = []
     for patch in np.unique(soils.patch):

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.config.given_case import GivenCase, as_case
 from soilml.errors import InputError
 from soilml.identification.trained_estimator import estimators_for_case
 from soilml.io.read_table import Rows
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES
 from soilml.remarks import Remark
+from soilml.results import Result
 from soilml.soil_maps.ability import MapAbility, map_ability
 from soilml.soil_maps.drive import MapDrive, read_map_drive
 from soilml.soil_maps.field import SoilField
@@ -42,8 +44,8 @@ NORMALS = 256  # Normal quantiles from which mean and spread of a parameter are 
 Progress = Callable[[str, int, int], None]
 
 
-@dataclass(frozen=True)
-class SoilMap:
+@dataclass(frozen=True, repr=False)
+class SoilMap(Result):
     """The soil along a drive, and what a rover does on it.
 
     Attributes
@@ -120,6 +122,29 @@ class SoilMap:
             found |= {f"pitch_{name}_rad": self.pitch[:, j]} | _bands_of(self.by_heading, j, name)
         return {name: self.grid.spread(values, self.known) for name, values in found.items()}
 
+    def summary(self) -> str:
+        """The verdict in three lines."""
+        from soilml.soil_maps.presentation import map_verdict
+
+        return map_verdict(self)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each known cell: its middle in m, and the soil with standard deviations."""
+        centres = self.grid.centres[self.known]
+        columns: dict[str, Any] = {"cell": np.flatnonzero(self.known)}
+        columns |= {"x_m": centres[:, 0], "y_m": centres[:, 1]}
+        mean, std = self.moments
+        for i, coordinate in enumerate(self.soils.free):
+            name = QUANTITIES[coordinate.path].column
+            columns |= {name: mean[:, i], f"{name}_std": std[:, i]}
+        return columns
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw the map; see `soilml.soil_maps.presentation.plot_map`."""
+        from soilml.soil_maps.presentation import plot_map
+
+        return plot_map(self, ax)
+
     def remarks(self) -> Iterator[Remark]:
         """What to know of the map, by code."""
         yield from self.notes
@@ -153,7 +178,7 @@ class SoilMap:
 
 
 def soil_map(
-    case: Case,
+    case: GivenCase,
     rows: Rows,
     estimator: Estimator | None = None,
     *,
@@ -169,7 +194,8 @@ def soil_map(
     Parameters
     ----------
     case
-        Gear, soil and noise; priors for a file that needs them; with a rover for slopes.
+        Gear, soil and noise, or the path of a model file; priors for a file that needs them; with a
+        rover for slopes.
     rows
         A table as `read_map_drive` takes it.
     estimator
@@ -198,7 +224,7 @@ def soil_map(
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
-    low, high = SIZES
+    case, (low, high) = as_case(case), SIZES
     if not (low <= cell <= high and low <= reach <= high):
         raise InputError(
             f"cell is {cell:g} m and reach {reach:g} m; needed are {low:g} to {high:g} m"

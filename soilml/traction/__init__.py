@@ -9,6 +9,9 @@ from soilml.traction.pull_and_slope import Traction, predict_traction
 from soilml.traction.report import PullReport, pull_report
 from soilml.traction.soil_draws import estimated_draws, posterior_draws, prior_draws
 
+#: The name under which `soilml` has it
+pull = pull_report
+
 __all__ = [
     "LoadPrediction",
     "PullReport",
@@ -20,6 +23,7 @@ __all__ = [
     "predict_traction",
     "predictions_by_load",
     "prior_draws",
+    "pull",
     "pull_report",
     "quantile_band",
 ]

@@ -142,6 +142,14 @@ def _load_text(one: LoadPrediction) -> str:
     return "\n".join([f"load {known.load:.4g} N", table, *best, *_efficiency(known), *doubts])
 
 
+def load_sentence(one: LoadPrediction) -> str:
+    """Largest pull and steepest slope under a load, with 90 % bands."""
+    known, (no_pull, no_slope) = one.posterior, _not_known(one)
+    pulled = _value(quantile_band(known.largest_pull), 1.0, no_pull)
+    climbed = _value(quantile_band(known.steepest_slope), DEGREES, no_slope)
+    return f"At {known.load:.4g} N the wheel pulls {pulled} N at most and climbs {climbed} deg."
+
+
 def _efficiency(known: Traction) -> list[str]:
     """Both efficiencies, and the class, where the drive is used best."""
     i = known.most_efficient

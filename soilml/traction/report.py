@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.config.case import Case
+from soilml.config.given_case import GivenCase, as_case
 from soilml.fitting.operating_points import operating_points
 from soilml.io.read_table import Rows, as_table
 from soilml.numerics.quantiles import QuantileBand, quantile_band
@@ -21,6 +21,7 @@ from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.figure_style import take_axes
+from soilml.results import Result
 from soilml.traction.by_load import (
     SAME_LOAD,
     LoadPrediction,
@@ -43,8 +44,8 @@ ROWS = 3  # Panels of each load
 PRIOR, POSTERIOR, MEASURED = "#d9d9d9", "#005b96", "#cc7a00"
 
 
-@dataclass(frozen=True)
-class PullReport:
+@dataclass(frozen=True, repr=False)
+class PullReport(Result):
     """Predictions under each load.
 
     Attributes
@@ -76,9 +77,21 @@ class PullReport:
         """
         return plot_pull(self, ax)
 
+    def summary(self) -> str:
+        """The largest pull and the steepest slope under each load."""
+        from soilml.traction.presentation import load_sentence
+
+        return "\n".join(load_sentence(one) for one in self.by_load)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each load and slip: medians and ends of 90 % bands, SI units."""
+        from soilml.traction.presentation import pull_columns
+
+        return pull_columns(self)
+
 
 def pull_report(
-    case: Case,
+    case: GivenCase,
     table: Rows,
     *,
     free: Sequence[str] | None = None,
@@ -93,7 +106,7 @@ def pull_report(
     Parameters
     ----------
     case
-        Model, soil, priors and noise.
+        Model, soil, priors and noise, or the path of a model file.
     table
         Measured rows of one soil, as for `identify`. Speed, pass number and slip angle of the
         prediction are their medians.
@@ -125,7 +138,7 @@ def pull_report(
     FitError, TableError
         As `identify`.
     """
-    table = as_table(table)
+    case, table = as_case(case), as_table(table)
     soil = measured_soil(case, table, free, estimator, exact_model)
     draws, unknown, warnings = soil.draws, soil.unknown, [*soil.warnings, *excluded_effects(case)]
     table = table.rows(table.answered)

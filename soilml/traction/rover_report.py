@@ -12,16 +12,18 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.config.given_case import GivenCase, as_case
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
-from soilml.numerics.quantiles import quantile_band
+from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.figure_style import take_axes
+from soilml.results import Result
 from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
 from soilml.traction.draws import DrawnErrors, SoilDraws
 from soilml.traction.gravity import (
@@ -42,8 +44,8 @@ EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
 SIZE = (10.0, 6.4)  # Width and height of the figure, inches
 
 
-@dataclass(frozen=True)
-class RoverReport:
+@dataclass(frozen=True, repr=False)
+class RoverReport(Result):
     """A rover's performance by the posterior, the steepest slope by the prior (rad), warnings."""
 
     rows: int
@@ -61,9 +63,20 @@ class RoverReport:
         """
         return plot_rover(self, ax)
 
+    def summary(self) -> str:
+        """The steepest slope with its 90 % band."""
+        low, middle, high = np.rad2deg(np.nanquantile(self.performance.steepest_slope, QUANTILES))
+        return f"The rover climbs {middle:.1f} deg (90 %: {low:.1f} to {high:.1f} deg)."
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each slope: medians and ends of 90 % bands, SI units."""
+        from soilml.traction.rover_presentation import rover_columns
+
+        return rover_columns(self)
+
 
 def rover_report(
-    case: Case,
+    case: GivenCase,
     table: Rows,
     *,
     free: Sequence[str] | None = None,
@@ -91,6 +104,7 @@ def rover_report(
     Raises `InputError` as `rover_performance` does, or for a slip limit outside (0, 1); `FitError`,
     `TableError` as `identify`.
     """
+    case = as_case(case)
     if case.rover is None:
         raise InputError("the model file has no [rover]")
     if slopes is None:

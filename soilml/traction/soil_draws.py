@@ -220,7 +220,7 @@ def measured_soil(
         first = stated_explanations(known)[0]
         likeliest = str(first) if first.effect else "errors of sensors and model"
         text = (
-            f"the rows speak against the model as in its file, and first for {likeliest} "
+            f"the model misfits these rows, which are likelier with {likeliest} "
             f"(probability {format_probability(first.probability)}), which the bands leave out: "
             "run soilml gap"
         )

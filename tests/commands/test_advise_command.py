@@ -97,7 +97,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, command, s
 
 def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, capsys):
     command = ["identify", "model.toml", "runs.csv", "--method", "posterior"]
-    assert main(command) == 0
+    assert main([*command, "--format", "json"]) == 0
     captured = capsys.readouterr()
     content = json.loads(captured.out)
     assert content["identified"] == {
@@ -117,7 +117,7 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     )  # least squares: no samples, no advice
     assert "identified" not in json.loads((folder / "o.json").read_text())
     capsys.readouterr()
-    assert main([*command, "--by", "run"]) == 0
+    assert main([*command, "--by", "run", "--format", "json"]) == 0
     assert "advice" in json.loads(capsys.readouterr().out)["runs"]["a"]
 
 

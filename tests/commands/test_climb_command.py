@@ -53,7 +53,7 @@ def folder(tmp_path, tables, monkeypatch):
 
 @pytest.mark.slow
 def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
-    assert main([*COMMAND, "--slip-limit", "0.3"]) == 0
+    assert main([*COMMAND, "--slip-limit", "0.3", "--format", "json"]) == 0
     found = json.loads(capsys.readouterr().out)
     best = found["steepest_slope_rad"]
     assert best["p05"] - 0.01 < true.steepest < best["p95"] + 0.01

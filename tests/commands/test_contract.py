@@ -53,11 +53,11 @@ def test_simulate_leaves_blanks_and_a_reason_where_there_is_no_equilibrium(model
 
 def test_identify_each_run_on_its_own(model_file, runs_file, capsys):
     command = ["identify", str(model_file), str(runs_file), "--method", "posterior"]
-    assert main([*command, "--by", "run"]) == 0
+    assert main([*command, "--by", "run", "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["by"] == "run" and set(content["runs"]) == {"run_0", "run_1"}
     assert content["runs"]["run_0"]["rows_used"] == 8
-    assert main(command) == 0
+    assert main([*command, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert "runs-as-one-soil" in {one["code"] for one in content["warnings"]}
 
@@ -74,7 +74,7 @@ def test_identify_finds_the_model_s_own_soil(model_file, runs_file, tmp_path, ca
     assert content["parameters"]["friction_angle"]["unit"] == "rad"
     assert set(content) >= {"method", "parameters", "correlation", "warnings", "rows_used"}
     capsys.readouterr()
-    assert main(command[:-2]) == 0
+    assert main([*command[:-2], "--format", "json"]) == 0
     assert json.loads(capsys.readouterr().out) == content
 
 
@@ -109,7 +109,7 @@ def test_soils_and_effects_list_their_catalogues(capsys):
     assert "wong1989/dry_sand" in listed and "kphi" in listed
     assert main(["soils", "comin2017/es-3"]) == 0
     assert "published as -830" in capsys.readouterr().out
-    assert main(["soils", "--json"]) == 0
+    assert main(["soils", "--format", "json"]) == 0
     assert json.loads(capsys.readouterr().out)["wong1989/dry_sand"]["values"]["n"] == 1.1
     assert main(["effects"]) == 0
     listed = capsys.readouterr().out

@@ -40,7 +40,7 @@ def study(tmp_path):
 
 @pytest.mark.slow
 def test_the_answer_is_json_in_a_pipe(study, capsys):
-    assert main(["design", str(study), *FEW]) == 0
+    assert main(["design", str(study), *FEW, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert content["goal"]["slope_rad"] == pytest.approx(0.05236, abs=1e-5)
     assert content["soils"] == ["ding2015/hit_lss1"]
@@ -61,7 +61,7 @@ def test_the_soil_of_measured_rows(study, tmp_path, model_file, capsys):
     study.write_text(STUDY[:start] + text + STUDY[end:])
     if model_file.parent != tmp_path:
         (tmp_path / model_file.name).write_text(model_file.read_text())
-    assert main(["design", str(study), *FEW]) == 0
+    assert main(["design", str(study), *FEW, "--format", "json"]) == 0
     content = json.loads(capsys.readouterr().out)
     assert any(one["code"] == "errors-before-rows" for one in content["warnings"])
     assert content["soils"] == [str(tmp_path / model_file.name), str(tmp_path / "runs.csv")]

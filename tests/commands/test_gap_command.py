@@ -151,10 +151,11 @@ def test_the_model_that_was_written_carries_what_was_named(done):
 
 def analysed(inputs, tmp_path, capsys, *arguments):
     """Status of an analysis that ran, and its gap.json."""
-    assert main(["gap", *arguments, "--out", str(tmp_path / "out")]) == 0
+    status = main(["gap", *arguments, "--out", str(tmp_path / "out")])
     written = {p.name for p in (tmp_path / "out").iterdir()}
     assert written == set(FILES)
     found = content(tmp_path / "out")
+    assert status == (3 if found["status"] == "bad-data" else 0)
     assert capsys.readouterr().out.startswith(f"{found['status']}: ")
     return found
 

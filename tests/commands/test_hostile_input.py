@@ -84,7 +84,7 @@ def test_covariates_beyond_their_bounds_name_row_and_column(folder, capsys, colu
 def test_noise_that_no_sensor_has_is_bad_data(folder, capsys):
     text = THREE_CHANNEL_MODEL.replace('torque_Nm = "2 %"', "torque_Nm = 1e-9")
     (folder / "exact.toml").write_text(text)
-    assert main(["gap", "exact.toml", "runs.csv", "--out", "found"]) == 0
+    assert main(["gap", "exact.toml", "runs.csv", "--out", "found"]) == 3
     assert json.loads((folder / "found" / "gap.json").read_text())["status"] == "bad-data"
     assert "bad-data: the noise of torque_Nm" in capsys.readouterr().out
 

@@ -37,9 +37,9 @@ Progress = Callable[[str, int, int], None]
 #: Most sets of one size that are scored, and how many of these the slower analytic methods get.
 MAX_SETS = 2000
 ANALYTIC_SETS = 120
-#: Wall time, s, that the analytic methods take about where no number of sets is asked for, and the
-#: sets of each that tell how long one takes: they are the fewest that are scored.
-ANALYTIC_SECONDS, PILOT = 75.0, 4
+#: Wall time, s, that the analytic methods take about where no number of sets is asked for, the
+#: sets of each that tell how long one takes, and the fewest that are scored.
+ANALYTIC_SECONDS, PILOT, LEAST = 75.0, 4, 8
 #: Fewest sets of a size that are scored: the standard error of 90 % coverage is then 7 %.
 MIN_SETS = 20
 
@@ -182,9 +182,9 @@ def compare(
 
 
 def _affordable(method: Method, sets: Sequence[Table], q: int, seconds: float) -> int:
-    """How many sets a method can estimate in a time, by the time of the first; at least these."""
+    """How many sets a method can estimate in a time, s, by the time of the first."""
     each = float(np.mean(method.estimate_sets(sets[:PILOT], q).seconds)) / usable_cores()
-    return int(np.clip(seconds / max(each, 1e-6) - PILOT, PILOT, ANALYTIC_SETS))
+    return int(np.clip(seconds / max(each, 1e-6) - PILOT, LEAST, ANALYTIC_SETS))
 
 
 def _check_parameters(estimators: Mapping[str, Estimator]) -> None:

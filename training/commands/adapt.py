@@ -55,7 +55,7 @@ LEAST_ROWS, MOST_ROWS = 2000, 10**9  # Synthetic rows of a file
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser)
-    parser.add_argument("--out", metavar="DIR", required=True, help="folder for all files")
+    parser.add_argument("-o", "--out", metavar="DIR", required=True, help="folder for all files")
     parser.add_argument(
         "--suspected",
         action="store_true",

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: the released models)",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
+        "-o", "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
     )
     parser.add_argument(
         "--sets",

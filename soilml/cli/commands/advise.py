@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
@@ -23,10 +21,10 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
-    from soilml.experiment_design import Advice, ParameterSamples, RatedRow
-    from soilml.fitting.readings import Readings
+    from soilml.experiment_design import ParameterSamples
     from soilml.remarks import Remark
 
+FORMATS = ("table", "csv", "json")
 HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
 Rank the operating points (slip, load) and sensors of a next measurement by how
@@ -75,7 +73,6 @@ TRANSFER = {
     "scaled_error_N": "scaled_error",
     "speed_ratio": "speed_ratio",
 }
-COUNT = 3  # Default number of rows in the sequence
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -114,38 +111,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _with_noise_of_rows(case: Case, readings: Readings) -> Case:
-    """The case with the noise of the rows' columns where it declares none: their median."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from soilml.config.measurement_noise import Noise
-    from soilml.quantities import column
-
-    noise = dict(case.noise)
-    for i, name in enumerate(readings.channels):
-        key, own = column(name), readings.channel == i
-        if key not in noise and key not in readings.undeclared:
-            std = float(np.median(readings.std[own]))
-            noise[key] = Noise(constant=std)
-            print(f"the noise of further {key} is taken from {key}_std: {std:.3g}", file=sys.stderr)
-    return replace(case, noise=noise)
-
-
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
     import numpy as np
 
     from soilml.cli.options import available_effects, parse_names, parse_numbers
-    from soilml.cli.output import tell, write_columns
+    from soilml.cli.output import show_verdict, tell, write_columns
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
-    from soilml.experiment_design import advise, candidate_grid, samples_of_prior, samples_of_rows
+    from soilml.experiment_design import advise, candidate_grid
     from soilml.experiment_design.advice_after_results import mean_covariates
-    from soilml.experiment_design.presentation import next_row_remarks
-    from soilml.fitting.coordinates import select_free
-    from soilml.fitting.usable_readings import usable_readings
+    from soilml.experiment_design.next_rows import COUNT, known_soil
+    from soilml.experiment_design.presentation import advice_columns, best_rows, next_row_remarks
     from soilml.io.read_table import RUNS
     from soilml.remarks import Remark, texts
 
@@ -163,14 +140,13 @@ def run(args: argparse.Namespace) -> int:
         for option, text in (("--slips", args.slips), ("--loads", args.loads))
     )
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
-    free = select_free(case, parse_names(args.free))
     change = gravity_change(args, case)
-    at, driven, notes = None, np.empty(0), list[Remark]()
     if table is not None:
         print_table_hints(table, case)
-        readings = usable_readings(case, table)
-        case = _with_noise_of_rows(case, readings)
-        at, driven, notes = readings.at, readings.row_load, list(readings.notes)
+    with working("taking the rows into account"):
+        known = known_soil(case, table, parse_names(args.free), args.exact_model)
+    case, at, samples, notes = known.case, known.measured, known.samples, list(known.notes)
+    driven = known.loads
     if change is not None and loads is None:
         driven = np.ones(1)  # loads of tests follow from that of the target
     ranges = candidate_grid(slips, loads, driven)
@@ -180,30 +156,27 @@ def run(args: argparse.Namespace) -> int:
             f"at most {MAX_POINTS} operating points are possible"
         )
     with working("rating the rows that could be next"):
-        if at is None:
-            samples = samples_of_prior(free, case=case)
-        else:
-            samples = samples_of_rows(case, readings, free, exact_model=args.exact_model)
-        known = {} if at is None else mean_covariates(at)
+        covariates = {} if at is None else mean_covariates(at)
         if change is not None:
             columns, found = _tests_elsewhere(
-                args, case, samples, change=change, loads=loads, slips=slips, covariates=known
+                args, case, samples, change=change, loads=loads, slips=slips, covariates=covariates
             )
             write_columns(columns, args.out)
             tell("\n".join(texts([*found, *notes])))
             return 0
         advice = advise(
-            case, samples, ranges, measured=at, count=args.count or COUNT, covariates=known
+            case, samples, ranges, measured=at, count=args.count or COUNT, covariates=covariates
         )
     if args.picture is not None:
         from soilml.experiment_design.presentation import save_maps
 
         save_maps(args.picture, advice, at)
+    show_verdict(advice.summary(), args.out)
     if args.all:
         ranked = sorted(advice.choices, key=lambda c: c.overall)
-        write_columns(_columns(advice, [("candidate", c) for c in ranked]), args.out)
+        write_columns(advice_columns(advice, [("candidate", c) for c in ranked]), args.out)
     else:
-        write_columns(_columns(advice, _best_rows(advice)), args.out)
+        write_columns(advice_columns(advice, best_rows(advice)), args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *notes]
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
@@ -249,39 +222,3 @@ def _tests_elsewhere(
     for key, name in TRANSFER.items():
         columns[key] = np.asarray([getattr(test, name) for test in tests])
     return columns, list(found.remarks())
-
-
-def _best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:
-    """The rows of the table: reason and candidate."""
-    rows = [("best in all", advice.best())]
-    rows += [
-        (f"best in all with {own[1]}", advice.best(None, own)) for own in advice.channel_sets[1:]
-    ]
-    rows += [(f"best for {name}", advice.best(name)) for name in advice.names]
-    repeat = advice.best_repetition()
-    if repeat is not None:
-        rows.append(("best repeat", repeat))
-    if len(advice.sequence) > 1:
-        rows += [
-            (f"row {i} of {len(advice.sequence)}", c) for i, c in enumerate(advice.sequence, 1)
-        ]
-    return rows
-
-
-def _columns(advice: Advice, rows: Sequence[tuple[str, RatedRow]]) -> dict[str, Any]:
-    """The table's columns."""
-    import numpy as np
-
-    from soilml.experiment_design.design import channel_label
-
-    choices = [choice for _, choice in rows]
-    columns: dict[str, Any] = {
-        "row": [why.replace("_", " ") for why, _ in rows],
-        "channels": [channel_label(c.candidate.channels) for c in choices],
-        "slip": np.asarray([c.candidate.slip for c in choices]),
-        "load_N": np.asarray([c.candidate.load for c in choices]),
-    }
-    for i, name in enumerate(advice.names):
-        columns[f"{name}_left"] = np.asarray([c.remaining_fraction[i] for c in choices])
-    columns["all_left"] = np.asarray([c.overall for c in choices])
-    return columns

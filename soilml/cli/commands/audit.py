@@ -13,6 +13,7 @@ from soilml.cli.options import (
 )
 from soilml.io.atomic_files import save_text
 
+FORMATS = ("table", "json")
 HELP = "missing effects that planned runs could identify"
 DESCRIPTION = """\
 Determine which missing effects the planned runs of DESIGN.csv could identify
@@ -53,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
     from soilml.cli.options import available_effects, parse_costs, parse_names
-    from soilml.cli.output import show, tell
+    from soilml.cli.output import show_result, tell
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
@@ -70,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
         found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
-    show(audit_text(found))
+    show_result(audit_text(found, args.verbose), found.as_json())
     for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
         tell(line.text)
     return 0

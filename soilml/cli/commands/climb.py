@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 #: Files of the folder of --out.
 FILES = ("report.html", "climb.json", "curve.csv", "climbs.csv")
+FORMATS = ("table", "json")
 HELP = "the steepest slope a rover with force-sensor wheels can climb"
 DESCRIPTION = """\
 Identify cohesion, friction angle and shear modulus of the ground from climbs
@@ -66,7 +67,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_seed_option(parser)
     add_ignore_extra_option(parser)
-    parser.add_argument("--out", metavar="DIR", help="folder for four files, or FILE.json alone")
+    parser.add_argument(
+        "-o", "--out", metavar="DIR", help="folder for four files, or FILE.json alone"
+    )
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -85,7 +88,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Identify, predict and deliver."""
-    from soilml.cli.output import is_terminal, origin_of, show, write_stdout
+    from soilml.cli.output import origin_of, show_result
     from soilml.cli.progress import working
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
@@ -104,9 +107,6 @@ def run(args: argparse.Namespace) -> int:
     with working(f"identifying from {len(data.climbs)} climbs"):
         report = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
     content = report.as_json()
-    if args.out is None and not is_terminal():
-        write_stdout(json_text(content))
-        return 0
     if folder:
         page = climb_report(report, (args.rover, args.runs))
         html, result, curve, climbs = FILES
@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
         write_files(contents, folders=[args.out])
     elif args.out is not None:
         save_text(args.out, json_text(content))
-    show(climb_text(report))
+    show_result(climb_text(report), content)
     return 0
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
+FORMATS = ("table", "json")
 HELP = "which wheels climb a slope, with what margin"
 DESCRIPTION = """\
 Find the wheels with which a rover climbs a slope: sizes within limits are
@@ -102,7 +103,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compare the designs and write the result."""
-    from soilml.cli.output import is_terminal, show, write_stdout, write_with_report
+    from soilml.cli.output import show_result, write_with_report
     from soilml.cli.progress import stage_progress
     from soilml.optional_imports import need
 
@@ -131,10 +132,7 @@ def run(args: argparse.Namespace) -> int:
         lambda: (design_page(found, args.study), content),
         study.soil.files,
     )
-    if args.out is not None or args.report is not None or is_terminal():
-        show(design_text(found))
-    else:
-        write_stdout(text)
+    show_result(design_text(found), content)
     return 0
 
 

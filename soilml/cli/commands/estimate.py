@@ -33,6 +33,7 @@ FUSION_RULES = (
     "inverse-variance",
     "pairwise",
 )
+FORMATS = ("table", "csv", "json")
 HELP = "soil parameters or slip from measured rows, by a trained model"
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
@@ -124,7 +125,14 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     import numpy as np
 
-    from soilml.cli.output import save_columns, show, tell, tell_columns, write_with_report
+    from soilml.cli.output import (
+        save_columns,
+        show,
+        show_verdict,
+        tell,
+        tell_columns,
+        write_with_report,
+    )
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
     from soilml.experiment_design.advice_after_results import trained_case
@@ -198,6 +206,7 @@ def run(args: argparse.Namespace) -> int:
     write_with_report(
         args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
     )
+    show_verdict(presentation.verdict(columns, args.by, remarks), args.out)
     tell_columns(columns, args.out)
     tell("\n".join(texts(remarks)))
     return 0

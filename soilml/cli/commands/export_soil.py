@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to", required=True, help="chrono, chrono-crm, gazebo, isaac or csv", metavar="TARGET"
     )
-    parser.add_argument("--out", required=True, metavar="FOLDER", help="folder for the files")
+    parser.add_argument("-o", "--out", required=True, metavar="FOLDER", help="folder for the files")
     parser.add_argument(
         "--draws",
         type=whole_number_from(0),

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 #: Files of the folder.
 FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
+#: Exit status where the data cannot be analysed; the report is written and says why
+BAD_DATA = 3
+FORMATS = ("table", "json")
 HELP = "find where a model and measured runs disagree, and name the missing effect"
 DESCRIPTION = """\
 Compare MODEL.toml with measured runs. Where they disagree by more than noise
@@ -60,7 +63,9 @@ ranked by what they discriminate per cost.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser)
-    parser.add_argument("--out", metavar="DIR", required=True, help="folder for the four files")
+    parser.add_argument(
+        "-o", "--out", metavar="DIR", required=True, help="folder for the four files"
+    )
     parser.add_argument(
         "--holdout",
         metavar="COLUMN=VALUE",
@@ -90,7 +95,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
     from soilml.cli.options import available_effects, parse_costs, parse_names
-    from soilml.cli.output import origin_of, show, tell
+    from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.case import read_case
@@ -125,9 +130,9 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.out)
     files = {folder / name: text for name, text in texts.items()}
     write_files(files, folders=[folder])
-    show(gap_text(report))
+    show_result(gap_text(report), report.as_json())
     tell(f"\n{', '.join(str(name) for name in files)}")
-    return 0
+    return BAD_DATA if report.status == "bad-data" else 0
 
 
 def _calibration(texts: list[str], effects: dict[str, type[Effect]]) -> dict[str, float]:

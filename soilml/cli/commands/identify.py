@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from soilml.report.page import Report
     from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
+FORMATS = ("table", "json")
 HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
 Identify the soil parameters with which MODEL.toml explains the rows of
@@ -102,7 +103,7 @@ def run(args: argparse.Namespace) -> int:
     from dataclasses import replace
 
     from soilml.cli.options import available_effects, parse_names
-    from soilml.cli.output import is_terminal, show, write_stdout, write_with_report
+    from soilml.cli.output import show_result, write_with_report
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
@@ -172,14 +173,11 @@ def run(args: argparse.Namespace) -> int:
         return replace(report, pictures=[*report.pictures, extra])
 
     write_with_report(args, {args.out: text}, lambda: (page(), content))
-    if args.out is not None or args.report is not None or is_terminal():
-        heads = {name: f"{args.by} {name}: " if name else "" for name in shown}
-        parts = [heads[name] + result.text() for name, result in shown.items()]
-        if lines is not None:
-            parts.append(regression_text(lines, Path(args.fresh).name))
-        show("\n\n".join(parts))
-    else:
-        write_stdout(json_text({key: content[key] for key in content if key != "draws"}))
+    heads = {name: f"{args.by} {name}: " if name else "" for name in shown}
+    parts = [heads[name] + result.text(args.verbose) for name, result in shown.items()]
+    if lines is not None:
+        parts.append(regression_text(lines, Path(args.fresh).name))
+    show_result("\n\n".join(parts), {k: content[k] for k in content if k != "draws"})
     tell_failures(args.by, failed)
     return 0
 

@@ -31,7 +31,8 @@ as BOOK.xlsx#SHEET), MATLAB files, MCAP and bags of ROS 1 and 2
 MAP.toml says which column or topic is which quantity, in which unit,
 and what stands between: radius, gear ratio, torque constant, tare, each with
 its uncertainty. --init writes one with guesses and their reasons; without --out
-it prints it.
+it prints it. A guess that neither its name and unit nor another channel supports
+is marked with CHANGE; --explain prints what speaks for each.
 
 Beside RUNS.csv stand RUNS.report.html (pictures, what was left out and why),
 RUNS.report.json, and RUNS.bias.toml: the errors that all rows share, as [bias]
@@ -51,9 +52,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--init", action="store_true", help="write a commented map with guesses, and no table"
     )
+    parser.add_argument(
+        "--explain", action="store_true", help="with --init: print what speaks for each guess"
+    )
     parser.add_argument("--map", type=InputFile, metavar="MAP.toml", help="how the logs are read")
     parser.add_argument(
-        "--out", metavar="RUNS.csv", help="write the table and its report; with --init, the map"
+        "-o",
+        "--out",
+        metavar="RUNS.csv",
+        help="write table and report; with --init, the map",
     )
     parser.add_argument("--accept", action="store_true", help="import although the map looks wrong")
 
@@ -66,6 +73,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
         if args.out is not None and Path(args.out).exists():
             raise InputError(f"{args.out} exists; --init would overwrite it: give another name")
         return output_files(args.out, ".toml")
+    if args.explain:
+        raise InputError("--explain prints what speaks for each guess of --init; give both")
     if args.map is None:
         raise InputError("--map is missing; soilml import --init LOG... --out MAP.toml writes one")
     # `import *.csv` a second time finds the table of the first time among the logs
@@ -88,8 +97,9 @@ def _is_that_table(file: str, out: str | None) -> bool:
 
 def run(args: argparse.Namespace) -> int:
     """Write the map, or the table and its report."""
-    from soilml.cli.output import is_terminal, origin_of, tell
+    from soilml.cli.output import origin_of, tell
     from soilml.cli.progress import stage_progress
+    from soilml.cli.screen import is_terminal
     from soilml.io.text_tables import csv_text
     from soilml.log_import.workflow import import_log
     from soilml.optional_imports import need
@@ -140,9 +150,11 @@ def _init(args: argparse.Namespace) -> int:
     import shlex
 
     from soilml.cli.output import tell, write_stdout
-    from soilml.log_import.guesses.map_text import draft_map
+    from soilml.log_import.new_map import draft_map
 
     draft = draft_map(args.files)
+    if args.explain:
+        tell(draft.evidence.rstrip())
     if args.out is None:
         write_stdout(draft.text)
         return 0
@@ -167,7 +179,8 @@ def _print_remarks(found: ImportedLog) -> None:
 
 
 def _print_table(found: ImportedLog) -> None:
-    from soilml.cli.output import format_columns, is_terminal, write_stdout
+    from soilml.cli.output import format_columns, write_stdout
+    from soilml.cli.screen import is_terminal
     from soilml.io.text_tables import csv_text
 
     table = found.table

@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     add_effects_option(parser)
     add_row_options(parser)
-    parser.add_argument("--out", metavar="FOLDER", help="folder for the files")
+    parser.add_argument("-o", "--out", metavar="FOLDER", help="folder for the files")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from soilml.papers.published import Comparison
     from soilml.report.page import Content
 
+FORMATS = ("table", "csv", "json")
 HELP = "printed numbers of the source papers next to the computed ones"
 DESCRIPTION = """\
 Compute the numbers that the source papers print, and compare them.
@@ -62,8 +63,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Compute, compare and write the table."""
-    from soilml.cli.output import is_terminal, save_columns, tell, tell_columns, write_stdout
+    from soilml.cli.output import save_columns, tell, tell_columns, write_stdout
     from soilml.cli.progress import progress_bar
+    from soilml.cli.screen import SCREEN
     from soilml.io.atomic_files import write_files
     from soilml.optional_imports import need
     from soilml.papers.published import count_statuses, printed_numbers
@@ -83,12 +85,13 @@ def run(args: argparse.Namespace) -> int:
     if args.json is not None:
         files[Path(args.json)] = json_text(_as_json(found, counts))
     write_files(files)
-    if args.out is not None or not (args.summary or args.json or is_terminal()):
+    as_text = SCREEN.form_of_rows() == "table"
+    if args.out is not None or not (args.summary or args.json or as_text):
         tell_columns(columns, args.out)
-    elif not args.summary and is_terminal():
+    elif not args.summary and as_text:
         papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
         write_stdout("\n\n".join(_page(p, its, args.all) for p, its in papers.items()) + "\n\n")
-    if args.summary or is_terminal():
+    if args.summary or as_text:
         write_stdout(f"{_summary(found, counts)}\n")
     tell(_said(counts))
     return 1 if any(c.status == "wrong" for c in found) else 0

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 Result = TypeVar("Result", bound="Plotted")
 
+FORMATS = ("table", "csv", "json")
 HELP = "drawbar pull against slip, and the slope that can be climbed"
 DESCRIPTION = """\
 Predict the drawbar pull of a running gear against slip on the soil of the
@@ -207,7 +208,8 @@ def _write_results(
     """
     import numpy as np
 
-    from soilml.cli.output import is_terminal, show, tell, write_stdout, write_with_report
+    from soilml.cli.output import show, tell, tell_columns, write_with_report
+    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import tell_failures
     from soilml.io.text_tables import csv_text
     from soilml.report.figure_style import save_png
@@ -238,8 +240,8 @@ def _write_results(
     table = csv_text(columns)
     write_with_report(args, {args.out: table, args.picture: draw}, build)
     heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
-    if args.out is None and args.report is None and not is_terminal():
-        write_stdout(table)
+    if args.out is None and args.report is None and SCREEN.form_of_rows() != "table":
+        tell_columns(columns, None)
         for name, one in found.items():
             for remark in how.warnings(one):
                 tell(f"{heads[name]}{remark}")

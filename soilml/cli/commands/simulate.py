@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from soilml.io.table import Table
     from soilml.report.column_panels import ColumnPanels
 
+FORMATS = ("table", "csv", "json")
 HELP = "forces and sinkage against slip and load, from a model"
 DESCRIPTION = """\
 Solve the equilibrium of gear and soil of MODEL.toml at every combination of

@@ -13,6 +13,7 @@ from soilml.cli.options import (
     add_output,
 )
 
+FORMATS = ("table", "csv", "json")
 HELP = "slip of a rover without odometry, from torque and pitch"
 DESCRIPTION = """\
 Infer body speed, slip of each wheel and the soil along a drive whose speed
@@ -54,8 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
     from soilml.cli.options import available_effects
-    from soilml.cli.output import is_terminal, show, tell, write_stdout
+    from soilml.cli.output import show, tell, tell_columns
     from soilml.cli.progress import working
+    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
     from soilml.io.atomic_files import write_files
@@ -87,8 +89,8 @@ def run(args: argparse.Namespace) -> int:
         args.json: json_text(drive_json(found)),
     }
     write_files({Path(path): content for path, content in contents.items() if path is not None})
-    if args.out is None and args.json is None and not is_terminal():
-        write_stdout(table)
+    if args.out is None and args.json is None and SCREEN.form_of_rows() != "table":
+        tell_columns(drive_columns(found), None)
         for remark in found.remarks():
             tell(f"! {remark}")
     else:

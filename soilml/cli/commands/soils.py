@@ -11,6 +11,7 @@ from soilml.errors import InputError, did_you_mean
 if TYPE_CHECKING:
     from soilml.physics.soils import SoilEntry
 
+FORMATS = ("table", "json")
 HELP = "list the published soils, or show one with its source"
 DESCRIPTION = """\
 List the catalogue of published soils. Values are in SI units; * marks a value
@@ -24,7 +25,7 @@ that is not printed in the paper and is assumed.
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument("name", nargs="?", help="PAPER/SOIL, the name of the soil to show")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--json", action="store_true", help=argparse.SUPPRESS)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
             f"no soil {args.name!r}; {did_you_mean(args.name, catalogue)}`soilml soils` lists them"
         )
     chosen = catalogue if args.name is None else {args.name: catalogue[args.name]}
-    if args.json:
+    if args.json or args.format == "json":
         print(json.dumps({name: _as_json(entry) for name, entry in chosen.items()}, indent=1))
     elif args.name is None:
         print(_list(list(chosen.values())))
@@ -59,7 +60,7 @@ def _list(entries: list[SoilEntry]) -> str:
         rows.append((entry.name, *values, entry.text))
     notes = (
         "* not printed in the paper: assumed. `soilml soils NAME` has kc, kphi, and the source; "
-        "--json all."
+        "--format json all."
     )
     return f"{format_table(header, rows, last_left=True)}\n{notes}"
 

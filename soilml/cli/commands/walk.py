@@ -14,6 +14,7 @@ from soilml.errors import InputError
 if TYPE_CHECKING:
     from soilml.systems.wheel_legs.resistive_force import LinearGround
 
+FORMATS = ("table", "csv", "json")
 HELP = "a wheel-leg walking over soft ground: slip, sinkage, torque"
 DESCRIPTION = """\
 Simulate wheel-legs by resistive-force theory (Li, Zhang and Goldman 2013; Comin

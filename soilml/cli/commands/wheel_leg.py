@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from soilml.io.table import Table
     from soilml.report.parameter_figure import ParameterIntervals
 
+FORMATS = ("table", "csv", "json")
 HELP = "soil, or slip, from torque, vibration and sinkage of a wheel-leg"
 DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil

@@ -14,7 +14,7 @@ from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.report.gap_figure import gap_bars
 from soilml.gap.report.listed_explanations import likelier_than_first, needed_sizes
 from soilml.gap.report.prediction_curves import prediction_curves
-from soilml.gap.report.results import STATUSES, EstimatedValue, GapReport
+from soilml.gap.report.results import STATUSES, GapReport
 from soilml.optional_imports import need
 from soilml.physics.effects import EFFECTS
 from soilml.quantities import Z_90
@@ -33,6 +33,7 @@ from soilml.report.numbers import (
     with_unit,
 )
 from soilml.report.page import Provenance, Report, render
+from soilml.results import EstimatedValue
 
 
 def page(

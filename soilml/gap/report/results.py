@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, NamedTuple
 
@@ -11,22 +10,15 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.errors import InputError
 from soilml.gap.report.remainder_cause import RemainderCause
-from soilml.physics.soils.soil_tests import SoilTest, deviations
+from soilml.gap.report.soil_test_agreement import SoilTestAgreement, soil_test_agreement
 from soilml.remarks import Remark
 from soilml.report.numbers import format_log_density, format_residual
+from soilml.results import EstimatedValue, Result
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
-
-
-@dataclass(frozen=True)
-class EstimatedValue:
-    """An estimated parameter with its standard deviation."""
-
-    value: float
-    std: float
-    unit: str
 
 
 class BeforeAfter(NamedTuple):
@@ -198,48 +190,6 @@ class ReadingsAndPredictions:
     after_std: Floats
 
 
-@dataclass(frozen=True)
-class SoilTestAgreement:
-    """A plate or shear test, and the same quantity by the soil before and after.
-
-    `sigma_before` and `sigma_after` are the distances in standard deviations of the logarithm.
-    """
-
-    label: str
-    unit: str
-    measured: float
-    before: float
-    after: float
-    sigma_before: float
-    sigma_after: float
-
-
-def soil_test_agreement(
-    case: Case, before: Mapping[str, EstimatedValue], after: Mapping[str, EstimatedValue]
-) -> list[SoilTestAgreement]:
-    """The agreement of each test of the case, with the soil's estimates by name."""
-
-    def distance(test: SoilTest, soil: Mapping[str, EstimatedValue]) -> float:
-        values = np.asarray([estimate.value for estimate in soil.values()])
-        return float(deviations([test], case.soil, list(soil), values)[0])
-
-    found = []
-    for test in case.soil_tests:
-        first, last = distance(test, before), distance(test, after)
-        found.append(
-            SoilTestAgreement(
-                label=test.label(),
-                unit=test.unit,
-                measured=test.measured,
-                before=test.measured * float(np.exp(first * test.scatter)),
-                after=test.measured * float(np.exp(last * test.scatter)),
-                sigma_before=first,
-                sigma_after=last,
-            )
-        )
-    return found
-
-
 #: Status of a report, and its meaning.
 STATUSES = {
     "no-gap": "model and measurements agree within the noise",
@@ -255,8 +205,8 @@ STATUSES = {
 }
 
 
-@dataclass(frozen=True)
-class GapReport:
+@dataclass(frozen=True, repr=False)
+class GapReport(Result):
     """The result of a gap analysis, made by `soilml.gap.gap`.
 
     Attributes
@@ -365,6 +315,40 @@ class GapReport:
         from soilml.gap.report.gap_figure import plot_gap
 
         return plot_gap(self.gap, ax, part)
+
+    def __getitem__(self, name: str) -> EstimatedValue:
+        """A parameter of the soil after, or of an effect by EFFECT.PARAMETER.
+
+        Raises `InputError` for another name.
+        """
+        found = self._parameters()
+        if name not in found:
+            raise InputError(f"{name!r} is not identified; there are: {', '.join(found)}")
+        return found[name]
+
+    def _parameters(self) -> dict[str, EstimatedValue]:
+        """Parameters of the soil after, and of the effects that were added."""
+        added = {f"{e.name}.{k}": v for e in self.effects for k, v in e.parameters.items()}
+        return {**(self.soil_after or self.soil_before), **added}
+
+    def summary(self) -> str:
+        """The verdict, then at most five lines."""
+        return "\n".join([self.sentence, *(line.text for line in self.lines)])
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each parameter, SI units; `_before` is that of the soil alone."""
+        found, old = self._parameters(), self.soil_before
+        ends = np.asarray([v.interval() for v in found.values()]).reshape(-1, 2).T
+        return {
+            "parameter": list(found),
+            "mean": [v.value for v in found.values()],
+            "std": [v.std for v in found.values()],
+            "low": ends[0],
+            "high": ends[1],
+            "mean_before": [old[k].value if k in old else np.nan for k in found],
+            "std_before": [old[k].std if k in old else np.nan for k in found],
+            "unit": [v.unit for v in found.values()],
+        }
 
     @property
     def soil_tests(self) -> list[SoilTestAgreement]:

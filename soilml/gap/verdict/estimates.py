@@ -11,12 +11,12 @@ from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
-from soilml.gap.report.results import EstimatedValue
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import Prior
 from soilml.report.numbers import significant
+from soilml.results import EstimatedValue
 
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
 

@@ -31,6 +31,9 @@ _SLOW_ROTATION = (
 #: Largest pull over load, lever arm of torque over load, m, and sinkage, m, of any wheel.
 _MOST_PULL, _MOST_LEVER, _MOST_SINKAGE = 1.2, 0.8, 0.7
 _FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
+#: Share of the rim speed from which a wheel moves, fewest windows, and how near to 1 and how
+#: constant travel over rim speed is where one is computed from the other.
+_MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 4, 0.03, 1e-3
 _TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
 
 
@@ -95,6 +98,9 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
     middle, fastest = float(np.median(ratio)), float(np.max(ratio))
     rotation = roles[0]
     travel = "position" if "position" in wheel.channels else "ground_speed"
+    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good]):
+        yield Remark("one-sensor", why, (rotation, travel))
+        return
     if middle < -0.02:
         yield Remark(
             "sign",
@@ -128,6 +134,35 @@ def _ratio(log_map: LogMap, wheel: WheelMap, windows: dict[str, Floats]) -> Iter
         )
 
 
+def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats) -> str:
+    """Why rotation and travel are one measurement, from which no slip follows; "" where two are.
+
+    rim, ground: Means of windows or samples (n,), m/s. The travel of an odometry of the wheels is r
+    omega within its resolution, also where the speed changes.
+    """
+    ours, theirs = wheel.channels[rotation].columns, wheel.channels[travel].columns
+    needed = "needed is a travel from another sensor, or [slip]"
+    if {*ours} & {*theirs}:
+        return (
+            f"[{rotation}] and [{travel}] are both of the column {theirs[0]!r}: slip is a constant "
+            f"by construction; {needed}"
+        )
+    moves = np.abs(rim) > _MOVES * float(np.max(np.abs(rim), initial=0.0))
+    if not ours or not theirs or moves.sum() < _FEWEST:
+        return ""
+    ratio = ground[moves] / rim[moves]
+    middle = float(np.median(ratio))
+    alike = abs(middle - 1.0) < _ODOMETRY and float(np.std(ratio)) < _RESOLUTION
+    changes = float(np.std(rim[moves])) > 10.0 * _RESOLUTION * float(np.median(np.abs(rim[moves])))
+    if not (alike and (changes or float(np.ptp(ratio)) == 0.0)):
+        return ""
+    return (
+        f"the travel is {middle:.4g} times the rim speed in all {int(moves.sum())} windows: "
+        f"[{travel}] seems to be computed from the rotation, so that slip is 0 by construction; "
+        f"{needed}"
+    )
+
+
 def _by_speeds(wheel: WheelMap, windows: dict[str, Floats]) -> tuple[str, str] | None:
     """The definition of slip that the speeds of a map confirm; None for the stated one."""
     if not {"slip", "rim_speed", "speed"} <= windows.keys():
@@ -147,7 +182,10 @@ def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
     if wheel.radius is not None and wheel.radius.value > 2.0:
         return "probably the radius is in mm"
     if rotation == "rim_speed":
-        return "probably [rim_speed] is in mm/s"
+        # at a slip of 0 to 0.5 the rim is up to twice as fast as the travel
+        near = [u for f, u in _TRAVEL if 0.9 * f <= excess <= 2.0 * f]
+        unit = {"mm": "mm/s", "cm": "cm/s"}.get(near[0], near[0]) if near else "another unit"
+        return f"probably [rim_speed] is in {unit}, or [ground_speed] in a larger one"
     return (
         f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio "
         f"in [{rotation}]), or its unit is wrong"

@@ -22,6 +22,7 @@ from soilml.remarks import Remark
 #: Range of T / (W r) of driving wheels on soil, and its usual value.
 LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 _SLIPS = 0.05  # Slip from which a driving wheel has a torque worth judging
+_NO_SLIP = 1e-6  # Slip of rows whose travel and rotation are one measurement
 _USUAL_SINKAGE = (0.02, 0.7)  # Range of the usual sinkage over the radius
 _LEAST_LOAD = 1.0  # Load, N, below which no wheel is driven: it is then rather in kN
 #: Mistakes that make T / (W r) too large, by factor. One of thousand is of the torque, or where the
@@ -196,7 +197,13 @@ def _slip(columns: Mapping[str, Floats], radius: Floats | float | None) -> Itera
             "exchanged, or is the radius too small?",
             ("slip",),
         )
-    elif 0.0 < float(np.max(np.abs(slip))) < 0.01:
+    elif float(np.max(np.abs(slip))) < _NO_SLIP:
+        yield Remark(
+            "one-sensor",
+            "slip is 0 in all rows: was the travel computed from the rotation of the wheel?",
+            ("slip",),
+        )
+    elif float(np.max(np.abs(slip))) < 0.01:
         yield Remark(
             "slip-unit", "slip is below 0.01 in all rows: was it divided by 100 twice?", ("slip",)
         )

@@ -84,24 +84,22 @@ def _wrap(own: Floats, steps: Floats) -> float:
     return 0.0
 
 
-def looks_like_time(values: Floats, named: bool = False) -> float:
-    """How much a column looks like a clock, 0 to 1: it rises by even steps.
-
-    One whose name says that it is a time may show the same time several times.
-    """
+def rises(values: Floats) -> float:
+    """1 for a column that rises as a clock does, which may show one time several times; else 0."""
     own = values[np.isfinite(values)]
-    if own.size < 8:
-        return 0.0
     steps = np.diff(own)
-    if named:
-        steps = steps[steps != 0.0]
-    if steps.size < 8:
-        return 0.0
-    if np.mean(steps > 0.0) < 0.97:
+    steps = steps[steps != 0.0]
+    return float(steps.size >= 8 and np.mean(steps > 0.0) >= 0.97)
+
+
+def looks_like_time(values: Floats) -> float:
+    """How much a column looks like a clock, 0 to 1: it rises by even steps."""
+    own = values[np.isfinite(values)]
+    steps = np.diff(own)
+    if steps.size < 8 or np.mean(steps > 0.0) < 0.97:
         return 0.0
     middle = float(np.median(steps))
-    even = float(np.mean(np.abs(steps - middle) < 0.5 * middle))
-    return even if middle > 0.0 else 0.0
+    return float(np.mean(np.abs(steps - middle) < 0.5 * middle))
 
 
 def time_unit(values: Floats) -> str:

@@ -11,6 +11,7 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
 from soilml.log_import.guesses.constants import stated_radius, stated_scale
 from soilml.log_import.guesses.draft import Draft, Marked, inputs_of
+from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.guesses.signs_and_tares import (
     far_sinkage,
@@ -27,6 +28,7 @@ from soilml.log_import.units import dimension, is_raw_signal
 _USUAL_RADIUS, _RADII = 0.12, (0.02, 0.6)
 #: Masses that a scale shows, as forces; any other is taken for kg.
 _AS_FORCE = {"g": "gf", "gram": "gf", "grams": "gf", "lb": "lbf", "pound": "lbf", "pounds": "lbf"}
+_FAR_IN_M = 4.0  # A height of so many m is rather one in mm
 #: Words that say that a column counts the pulses of an encoder.
 _COUNTS = {"count", "counts", "tick", "ticks", "enc", "encoder", "qc", "pulses"}
 #: What several columns of a channel are.
@@ -64,7 +66,7 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
         return column.unit, ""
     words = words_of(column.name)
     if role in ("wheel_angle", "wheel_speed") and _COUNTS & {*words}:
-        return "count" if role == "wheel_angle" else "count/s", "by its name"
+        return "count" if role == "wheel_angle" else "count/s", BY_NAME
     if role == "wheel_angle":
         if column.about.wraps_at:
             if abs(column.about.wraps_at - 2.0 * math.pi) < 0.01:
@@ -81,14 +83,14 @@ def guess_unit(role: str, column: Candidate, moving: float) -> tuple[str, str]:
         "torque": ((300.0, "mN m"), (0.0, "N m")),
         "motor_current": ((60.0, "mA"), (0.0, "A")),
         "slope": ((1.2, "deg"), (0.0, "rad")),
-        "slip": ((1.2, "%"), (0.0, "1")),
+        "slip": ((LEAST_PERCENT, "%"), (0.0, "1")),
         "load": ((0.0, "N"),),
         "drawbar_pull": ((0.0, "N"),),
         "wheel_speed": ((0.0, "rad/s"),),
     }[role]
     unit = next(unit for least, unit in large if moving >= least)
-    if "rpm" in words:
-        unit = "rpm"
+    if "rpm" in words and role == "wheel_speed":
+        return "rpm", BY_NAME
     why = "not stated; by the size of the values" if len(large) > 1 else "not stated"
     return unit, why
 
@@ -128,6 +130,8 @@ def draft_of(
     if role in ("position", "wheel_angle", "sinkage") and known.size:
         moving = max(float(np.nanmax(v) - np.nanmin(v)) for v in
                      (run.find(c.address)[1] for c in (column, *more)))  # fmt: skip
+        if role == "sinkage":  # no wheel sinks in by metres, however little that changes
+            moving = max(moving, float(np.nanmedian(np.abs(known))) / _FAR_IN_M)
     if role == "slope" and more:
         return draft  # an angle, whatever the unit of accelerations
     unit, why = guess_unit(role, column, moving)
@@ -162,7 +166,13 @@ def draft_of(
     if role == "slope" and column.address.endswith("orientation.pitch"):
         why = "of a quaternion (REP 103): there the nose is down where it is positive"
         draft.put("reverse", True, why)
-    if role == "slip" and _OF_TYRES & {*words_of(column.name)}:
+    if role == "slip" and MOST_FRACTION < moving < LEAST_PERCENT and column.kind is None:
+        why = Marked(
+            f"CHANGE: it goes to {moving:.2g}, which 1 - v/(r omega) cannot be; where it is in per "
+            "cent, write unit = '%' and remove this line"
+        )
+        draft.put("definition", "(r omega - v)/v", why)
+    elif role == "slip" and _OF_TYRES & {*words_of(column.name)}:
         why = "as of tyres, and of Chrono's rigs; remove this line where it is 1 - v/(r omega)"
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import math
 from collections.abc import Sequence
 from itertools import pairwise
@@ -12,6 +13,7 @@ from soilml.errors import InputError
 from soilml.log_import.channels.runs import alike_structs, key_words, matched_files, run_names
 from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.columns import WHEEL_WORDS, candidates_of, name_scores, words_of
+from soilml.log_import.guesses.draft import Marked
 from soilml.log_import.mapping.log_map import FileKind
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
@@ -23,6 +25,7 @@ _OF_A_WHEEL = {"wheel", "wheels", "motor", "joint", "axle", "drive", "corner", "
 _NUMBERED = {"id", "no", "nr", "number", "index", "idx", "name", "wheel", "num"}
 _MOST_WHEELS, _TURNS = 12, 0.2
 Log = Sequence[Recording]
+_SINCE_1970 = 5e8  # Seconds, and what is larger, of a clock that counts from 1970
 _MOST = 400  # Most rows of a table that somebody has made of runs
 
 
@@ -39,6 +42,24 @@ def guess_clock(recordings: Sequence[Recording]) -> tuple[str, str]:
                 values = recording.columns[candidate.name]
                 best = (score, candidate.name, unit or time_unit(values))
     return best[1], best[2]
+
+
+def why_time_unit(recordings: Sequence[Recording], column: str, unit: str) -> str:
+    """The comment of a unit of time: a mark where the log does not state it, and no size shows it.
+
+    Clocks since 1970, days of spreadsheets and seconds with steps below one are clear.
+    """
+    for recording in recordings:
+        if column not in recording.columns or recording.clock is not None:
+            continue
+        own = next(c for c in candidates_of([recording]) if c.name == column)
+        values = recording.columns[column]
+        steps = np.diff(values[np.isfinite(values)])
+        clear = abs(own.about.low) > _SINCE_1970 or unit == "d"
+        if own.kind == "s" or clear or (unit == "s" and float(np.median(steps)) < 1.0):
+            return ""
+        return Marked("CHANGE: not stated; by the size of its steps")
+    return ""
 
 
 def guess_run_column(recordings: Sequence[Recording]) -> tuple[str, int]:
@@ -142,7 +163,8 @@ def refuse_a_table_of_runs(log: Sequence[Recording]) -> None:
 def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     """Kinds of files with different columns that have one run in common; empty for one kind.
 
-    The word that the names of all files of a kind share, and no other file has, is its pattern.
+    The words that the names of all files of a kind share, and not those of all kinds, are its
+    pattern.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, log in enumerate(logs):
@@ -151,17 +173,19 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     if len(groups) < 2:
         return ()
     names = run_names([log[0].file for log in logs])
-    words = [set(key_words(name, set())) for name in names]
+    words = [key_words(name, set()) for name in names]
+    shared = [set.intersection(*({*words[i]} for i in members)) for members in groups.values()]
+    of_all = set.intersection(*shared)
     kinds = []
-    for members in groups.values():
-        others = [i for i in range(len(logs)) if i not in members]
-        own = set.intersection(*(words[i] for i in members))
-        own -= {word for i in others for word in words[i]}
-        if not own:
+    for members, common in zip(groups.values(), shared, strict=True):
+        # in their order, with those that two kinds share: what is left says which run it is
+        own = [w for w in dict.fromkeys(words[members[0]]) if w in common - of_all]
+        others = [{*words[i]} for i in range(len(logs)) if i not in members]
+        if not own or any({*own} <= other for other in others):
             return ()
-        word = max(sorted(own), key=len)
         # a dot in the name of a table of TOML would begin another one
-        kinds.append(FileKind(word.replace(".", "_"), f"*{word}*"))
+        name = "_".join(own).replace(".", "_")
+        kinds.append(FileKind(name, "*".join(["", *map(glob.escape, own), ""])))
     try:
         runs = matched_files(logs, kinds)
     except InputError:

@@ -12,7 +12,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time
+from soilml.log_import.guesses.behaviour import Behaviour, behaviour, looks_like_time, rises
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, is_raw_signal, spelling, unit_in_name
@@ -51,12 +51,33 @@ _UNIT_SUFFICES = {
 _LEAST_LOAD, _MOST_SINKAGE = 1.0, 900.0
 _FEWEST_PLACES = 10  # Fewest different values of a travel
 _CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
+_WORD_SCORE, _FULL = 4.0, 4  # Least weight of a full word of a role, and its letters
+#: Words whose number is that of a bus, a port or an input, and of no wheel.
+_BUSES = {"can", "bus", "port", "node", "adc", "ch", "channel", "ai", "uart", "com", "usb", "dev"}
+#: Words of counters of lines, which are no clock however evenly they rise.
+COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index", "idx", "frame",
+            "id", "no", "nr", "number", "row", "line", "record"}  # fmt: skip
+#: Last parts of German compounds.
+_HEADS = ("geschwindigkeit", "drehzahl", "spannung", "pressung", "verschiebung", "durchmesser",
+          "radius", "einsinkung", "tiefe", "breite", "länge", "laenge", "fläche", "flaeche",
+          "druck", "kraft", "last", "moment", "strom", "winkel", "weg")  # fmt: skip
+_SIDE = re.compile(r"(?:(?<=[a-z_. ])[LR]|[_. ]?(?:[lr]|left|right)(?![a-z])|\d)$")
+_UNCLEAR = 0.5  # What puts a speed of a side, without another word, before other guesses
 _MOST_TEXTS = 12  # Most columns of text that are listed
 
 
 def words_of(name: str) -> list[str]:
     """The words of a column's name in small letters: `WheelSpeed_FL` -> wheel, speed, fl."""
     return [word.lower() for word in _WORD.findall(_CAMEL.sub(" ", name))]
+
+
+def parts_of(words: Sequence[str]) -> list[str]:
+    """Words with German compounds as their two parts: raddrehzahl -> rad, drehzahl."""
+    found = []
+    for word in words:
+        head = next((h for h in _HEADS if word.endswith(h) and len(word) > len(h) + 2), "")
+        found += [word.removesuffix(head), head] if head else [word]
+    return found
 
 
 @cache
@@ -74,7 +95,8 @@ def name_scores(name: str) -> dict[str, float]:
     words = words_of(name)
     # "velocity front left wheel" is a velocity of a wheel: words of the place stand between
     texts = {
-        " ".join(word for word in words if word not in left_out)
+        " ".join(word for word in own if word not in left_out)
+        for own in (words, parts_of(words))
         for left_out in ((), _PLACES, _FILLERS, (*_PLACES, *_FILLERS))
     }
     scores = {}
@@ -86,9 +108,33 @@ def name_scores(name: str) -> dict[str, float]:
     return scores
 
 
+def says_role(role: str, name: str) -> bool:
+    """Whether a name has a full word of a role, and not only a letter, an axis or a short sign."""
+    if name_scores(name).get(role, 0.0) < _WORD_SCORE:
+        return False
+    words = words_of(name)
+    text = " ".join(word for word in words if word not in (*_PLACES, *_FILLERS))
+    texts = (" ".join(words), text, " ".join(parts_of(words)))
+    found = (
+        match[0]
+        for weight, pattern in _patterns()[role]
+        for match in (m for own in texts for m in pattern.finditer(own))
+        if weight >= _WORD_SCORE
+    )
+    return any(len(w) >= _FULL or not w.isascii() for text in found for w in text.split())
+
+
 def wheel_word(name: str) -> tuple[str, ...]:
-    """The words of a name that say which wheel it belongs to, such as ("front", "left")."""
-    return tuple(word for word in words_of(name) if word in WHEEL_WORDS)
+    """The words of a name that say which wheel it belongs to, such as ("front", "left").
+
+    The number of a bus or of an input is none.
+    """
+    words = words_of(name)
+    before = ["", *words]
+    return tuple(
+        word for word, last in zip(words, before, strict=False)
+        if word in WHEEL_WORDS and not (word.isdigit() and last in _BUSES)
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -109,11 +155,33 @@ def candidates_of(recordings: Sequence[Recording], steady: bool = False) -> list
     for recording in recordings:
         for name in recording.columns:
             counts[name] = counts.get(name, 0) + 1
-    return [
-        _candidate(recording, name, counts[name] > 1, steady)
-        for recording in recordings
-        for name in recording.columns
-    ]
+    return _of_sides(
+        [
+            _candidate(recording, name, counts[name] > 1, steady)
+            for recording in recordings
+            for name in recording.columns
+        ]
+    )
+
+
+def _of_sides(columns: list[Candidate]) -> list[Candidate]:
+    """The columns, of which speeds of a left and a right side, or with numbers, are of wheels.
+
+    A vehicle has one speed of travel: `velL` and `velR`, `velocity0` and `velocity1` turn.
+    """
+    frames: dict[str, list[Candidate]] = {}
+    for c in columns:
+        best = max(c.scores, key=lambda role: c.scores[role], default="")
+        if best == "ground_speed" and (match := _SIDE.search(c.address)):
+            frames.setdefault(c.address[: match.start()], []).append(c)
+    of_wheels = {c.address for own in frames.values() if len(own) > 1 for c in own}
+    found = []
+    for c in columns:
+        if c.address in of_wheels:
+            role = "rim_speed" if c.kind == "m/s" else "wheel_speed"
+            c = replace(c, scores={role: c.scores["ground_speed"] + _UNCLEAR})
+        found.append(c)
+    return found
 
 
 def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -> Candidate:
@@ -161,8 +229,10 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
     if role == "time":
         if kind not in (None, "s"):
             return 0.0
-        even = looks_like_time(values, score > 0.0)
-        return even * (score + (2.0 if kind == "s" else 0.0) + 1.0)
+        if score > 0.0 or kind == "s":
+            # a named clock may jitter: that it rises is enough
+            return rises(values) * (score + (2.0 if kind == "s" else 0.0) + 1.0)
+        return 0.0 if COUNTERS & {*words_of(column.name)} else looks_like_time(values)
     wanted = (ROLES[role][0], *_ALSO.get(role, ()))
     if is_raw_signal(column.unit) and role in CALIBRATED and (kind == "1" or kind not in wanted):
         kind = None  # the name decides

@@ -60,6 +60,11 @@ class Draft:
         if why:
             self.comments[key] = why
 
+    @property
+    def is_marked(self) -> bool:
+        """Whether a line of it says that a person must look."""
+        return any(isinstance(why, Marked) for why in self.comments.values())
+
     def without(self, shared: Draft) -> Draft:
         """The keys that are not in another draft."""
         return Draft({k: v for k, v in self.keys.items() if k not in shared.keys}, self.comments)

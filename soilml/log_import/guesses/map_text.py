@@ -1,14 +1,11 @@
-"""A commented map for logs that nobody has described: `soilml import --init`."""
+"""The text of a commented map for logs that nobody has described."""
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from soilml.errors import InputError
 from soilml.io.cell_text import one_line
 from soilml.log_import.channels.runs import Run, matched_files, run_names, runs_of
 from soilml.log_import.guesses.channel_drafts import add_errors, draft_channels, is_error
@@ -25,12 +22,14 @@ from soilml.log_import.guesses.clocks_and_runs import (
     rows_are_runs,
     run_of_rows,
     structs_are_runs,
+    why_time_unit,
 )
 from soilml.log_import.guesses.columns import (
     candidates_of,
     describe,
     describe_texts,
     liveliest,
+    name_scores,
     words_of,
 )
 from soilml.log_import.guesses.constants import agreed_constants, stated_radius
@@ -41,16 +40,15 @@ from soilml.log_import.guesses.draft import (
     key_line,
     keys_alike,
 )
+from soilml.log_import.guesses.evidence import as_table, mark, weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.missing_channels import absent_lines, load_lines
 from soilml.log_import.guesses.roles import Assignment, assign, axle_of
-from soilml.log_import.guesses.support import mark_unsupported
 from soilml.log_import.guesses.wheel_radius import wheel_lines
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap
-from soilml.log_import.readers import read_log
-from soilml.log_import.readers.side_files import is_side_file
 from soilml.log_import.recording import Recording
+from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
 _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
@@ -85,38 +83,10 @@ class DraftedMap:
 
     text: str
     marked: int
+    evidence: str = ""  # What speaks for each guess, as lines of text
 
 
-def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> str:
-    """Look at logs and write a map with guesses, each with its reason, as TOML with comments.
-
-    Guesses come from names, units and the behaviour of the values. What no log shows, such as
-    the radius, is marked with CHANGE or NEEDED.
-
-    Raises `InputError` where a file cannot be read or has no columns.
-    """
-    return draft_map(logs).text
-
-
-def draft_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> DraftedMap:
-    """What `init_map` gives, with the number of lines that are marked."""
-    files = log_files(logs)
-    recordings = [read_log(Path(file)) for file in files]
-    return _MapDrafting(recordings).draft()
-
-
-def log_files(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Path]:
-    """The files, without those that state constants of the others.
-
-    Raises `InputError` where there is none.
-    """
-    files = [Path(f) for f in ([logs] if isinstance(logs, str | os.PathLike) else logs)]
-    if not files:
-        raise InputError("no log was given; needed is at least one file")
-    return [file for file in files if not is_side_file(file)] or files
-
-
-class _MapDrafting:
+class MapDrafting:
     """The draft of a map of some logs, section by section."""
 
     def __init__(self, logs: Sequence[Sequence[Recording]]) -> None:
@@ -130,6 +100,7 @@ class _MapDrafting:
             self.run_count = len(self.labels)
             first = lines_of_first(first, self.run_column) if self.labels else first
         self.time_column, self.time_unit = ("", "") if self.steady else guess_clock(first)
+        self.time_why = why_time_unit(first, self.time_column, self.time_unit)
         self.restarts = restarts(logs[0], self.time_column) if not self.run_column else 0
         self.structs = structs_are_runs(logs[0], self.time_column)
         self.pauses, self.longest = pauses(logs[0], self.time_column, self.time_unit)
@@ -184,8 +155,8 @@ class _MapDrafting:
             return tuple(replace(kind, clock="start") for kind in named)
         return tuple(named)
 
-    def draft(self) -> DraftedMap:
-        """The whole map."""
+    def draft(self, doubts: Mapping[str, str] | None = None) -> DraftedMap:
+        """The whole map, with a mark on the channels that its own rows put in doubt, by role."""
         lines = self._head()
         lines += self._files() + self._time_lines() + self._run_lines()
         groups = self.found.wheels or {"": {}}
@@ -196,13 +167,20 @@ class _MapDrafting:
             for name, own in groups.items()
         }
         first = next(iter(drafts.values()))
-        clear = [role for role, why in self.reasons.items() if not isinstance(why, Marked)]
-        radius = stated_radius(self.stated.common)
+        constants = self._constants()
+        explained: list[str] = []
         for group in drafts.values():
-            mark_unsupported(group, inputs_of(group, self.run), radius, clear)
+            evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
+                             self.columns, self.reasons)  # fmt: skip
+            for one in evidence:
+                if not group[one.role].is_marked:  # one mark suffices
+                    one.against = one.against or (doubts or {}).get(one.role, "")
+            mark(group, evidence)
+            explained.append(as_table(evidence))
         add_errors(first, self.found, self.errors)
         for role, why in self.reasons.items():
-            if role in first and (isinstance(why, Marked) or "column" not in first[role].comments):
+            known = role in first and isinstance(first[role].comments.get("column"), Marked)
+            if role in first and not (known and not isinstance(why, Marked)):
                 first[role].comments["column"] = why
         lines += wheel_lines(first, self.found, self.run, self.stated.common, self.run_names)
         lines += load_lines(self.found, self.stated, self.run_names, len(self.labels))
@@ -226,7 +204,20 @@ class _MapDrafting:
             lines += _window_lines(self.runs)
         # values are plain already; names and lines of the log also stand in comments
         text = "\n".join(one_line(line) for line in lines) + "\n"
-        return DraftedMap(text, sum(isinstance(line, Marked) for line in lines))
+        names = [f"wheel {name}\n" if name else "" for name in drafts]
+        why = "".join(name + own for name, own in zip(names, explained, strict=True))
+        return DraftedMap(text, sum(isinstance(line, Marked) for line in lines), why)
+
+    def _constants(self) -> dict[str, float]:
+        """Radius (m) and weight on each wheel (N), as far as the logs state them."""
+        stated, found = self.stated.common, {}
+        if radius := stated_radius(stated):
+            found["radius"] = radius
+        if "mass" in stated:
+            count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
+            mass, _, unit = stated["mass"][0].partition(" ")
+            found["weight"] = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
+        return found
 
     def _head(self) -> list[str]:
         names = run_names([log[0].file for log in self.logs])
@@ -269,8 +260,10 @@ class _MapDrafting:
         if self.steady:
             return []
         if self.time_column:
-            column = key_line("column", self.time_column)
-            return ["", "[time]", column, key_line("unit", self.time_unit)]
+            named = "time" in name_scores(self.time_column)
+            why: str = "" if named else Marked("CHANGE: its name is of no time; it rises evenly")
+            column = key_line("column", self.time_column, why)
+            return ["", "[time]", column, key_line("unit", self.time_unit, self.time_why)]
         if not self.rate:
             return ["", "# Time comes from the messages."]
         why = "stated in the log"

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from soilml.log_import.guesses.columns import Candidate, words_of
 from soilml.log_import.guesses.constants import StatedConstants, number_in_names
 from soilml.log_import.guesses.draft import Marked, key_line, toml_value
+from soilml.log_import.guesses.evidence import unused_of, used_columns
 from soilml.log_import.guesses.roles import Assignment
-from soilml.log_import.guesses.support import unused_of, used_columns
 from soilml.log_import.mapping.channel_map import ROLES
 
 _GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}  # Words of a place in degrees

@@ -15,6 +15,7 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.bounds import LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
+from soilml.log_import.readers.program_heads import known_header, with_labview_head
 from soilml.log_import.readers.text_layout import (
     BLOCK,
     MISSING,
@@ -23,7 +24,6 @@ from soilml.log_import.readers.text_layout import (
     decode_text,
     find_blocks,
     find_layout,
-    known_header,
     split_line,
 )
 from soilml.log_import.recording import Recording
@@ -37,6 +37,7 @@ _DOTS = re.compile(r"[+-]?[1-9]\d{0,2}(\.\d{3})+(,\d*)?", re.ASCII)
 _GROUPED = re.compile(r"(?<=\d)[\u00a0\u202f\u2009'\u2019](?=\d{3}(?!\d))", re.ASCII)
 _SPACED = re.compile(r"[+-]?[1-9]\d{0,2}( \d{3})+([.,]\d*)?", re.ASCII)
 _CLOCK = re.compile(r"(\d{1,3}):(\d{2}):(\d{2}(?:[.,]\d*)?)(?:\s*([AaPp][Mm]))?", re.ASCII)
+_LONG = 2000  # Lines from which a log is read at once
 _MOST, _FEWEST = 200, 8  # Most signals, and fewest readings of each
 _CHANGES = 0.2  # Share of the lines at which the name changes; runs and states change seldom
 
@@ -73,8 +74,14 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
             f"{path}: no line of this file looks like samples; needed is a table of numbers, one "
             "sample a line, separated by comma, semicolon, tab or spaces"
         )
-    layout = known_header(path, layout)
+    layout = with_labview_head(known_header(path, layout))
     LOG_VALUES.check(path, len(lines) * len(layout.names))
+    if (columns := _by_arrow(lines, layout)) is not None:
+        if layout.decimal_comma:
+            notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
+        units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
+        own = Recording("", path, columns, {}, units, about=layout.about, notes=tuple(notes))
+        return signals_of(own)
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
     if layout.decimal_comma:
@@ -91,6 +98,36 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
     units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
     whole = Recording("", path, columns, texts, units, about=layout.about, notes=tuple(notes))
     return signals_of(whole)
+
+
+def _by_arrow(lines: Sequence[str], layout: TextLayout) -> dict[str, Floats] | None:
+    """The columns of a long log of numbers alone, read at once; None for any other.
+
+    What is not plain, such as a second header, a date or a line of another width, is left to the
+    reader of lines, which says what it finds.
+    """
+    if len(lines) - layout.first < _LONG or layout.separator == " ":
+        return None
+    try:
+        import pyarrow as pa
+        from pyarrow import csv as arrow
+    except ImportError:
+        return None
+    missing = [spelt for cell in MISSING for spelt in {cell, cell.upper(), cell.title(), "NaN"}]
+    try:
+        table = arrow.read_csv(
+            pa.py_buffer("\n".join(lines[layout.first :]).encode()),
+            arrow.ReadOptions(column_names=list(layout.names), use_threads=False),
+            arrow.ParseOptions(delimiter=layout.separator, quote_char=False),
+            arrow.ConvertOptions(
+                column_types=dict.fromkeys(layout.names, pa.float64()),
+                null_values=missing,
+                decimal_point="," if layout.decimal_comma else ".",
+            ),
+        )
+    except (pa.ArrowInvalid, pa.ArrowKeyError):
+        return None
+    return {name: table[name].to_numpy().astype(np.float64) for name in layout.names}
 
 
 def _rows(lines: list[str], layout: TextLayout) -> tuple[list[tuple[list[str], int]], int]:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import csv
+import os
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
-from soilml.errors import SoilmlError
+from soilml.errors import InputError, SoilmlError
 from soilml.log_import.readers.text_layout import decode_text
 
 _WORDS = "run_?parameters?|test_?parameters?|parameters?|params|meta_?data|meta|settings|config"
@@ -22,6 +24,17 @@ _MARKS = re.compile(r"[{}\"]|,\s*$")  # What JSON writes around names and values
 def is_side_file(file: Path) -> bool:
     """Whether a file states constants, by its name, and is no log."""
     return file.suffix.lower() in _ENDINGS and bool(_OF_FOLDER.fullmatch(file.stem))
+
+
+def log_files(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[Path]:
+    """The files, without those that state constants of the others.
+
+    Raises `InputError` where there is none.
+    """
+    files = [Path(f) for f in ([logs] if isinstance(logs, str | os.PathLike) else logs)]
+    if not files:
+        raise InputError("no log was given; needed is at least one file")
+    return [file for file in files if not is_side_file(file)] or files
 
 
 def side_lines(log: Path) -> tuple[str, ...]:

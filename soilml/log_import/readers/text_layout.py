@@ -7,7 +7,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from soilml.errors import InputError
@@ -52,15 +52,6 @@ _UNITS_FOLLOW = re.compile(r"^(units?|einheit(en)?|unidades|unités?)\s*[:=]\s*"
 _SEPARATORS = (";", "\t", ",", "|")
 #: Lines looked at, and how many of them must follow each other like samples.
 _LOOKED, _IN_A_ROW = 400, 3
-#: Files that a program writes without a header: name of the file -> columns with their units.
-#: DBP.dat is of the drawbar-pull rig in Chrono::Vehicle's co-simulation (OutputData of
-#: ChVehicleCosimWheeledMBSNode.cpp), whose slip is 1 - v/(r omega).
-_HEADERS: dict[str, tuple[tuple[str, str], ...]] = {
-    "DBP.dat": (
-        ("time", "s"), ("lin_vel", "m/s"), ("ang_vel", "rad/s"), ("slip", "1"),
-        ("slip_filtered", "1"), ("DBP", "N"), ("DBP_filtered", ""),
-    ),
-}  # fmt: skip
 BLOCK = "block"  # Name of the column that distinguishes the blocks
 _SHORTEST, _MOST = 20, 1000  # Fewest samples of a block, and most blocks
 
@@ -134,16 +125,6 @@ def find_layout(lines: Sequence[str]) -> TextLayout | None:
     return TextLayout(
         separator=separator, decimal_comma=comma, names=names, units=units, first=first, about=about
     )
-
-
-def known_header(file: Path, layout: TextLayout) -> TextLayout:
-    """The layout with the names that a program is known to give this file, which has no header."""
-    header = _HEADERS.get(file.name, ())
-    unnamed = layout.names == tuple(f"column_{i + 1}" for i in range(len(layout.names)))
-    if not unnamed or len(header) != len(layout.names):
-        return layout
-    names, units = zip(*header, strict=True)
-    return replace(layout, names=names, units=units)
 
 
 def check_columns(file: Path, lines: Sequence[str]) -> None:

@@ -15,7 +15,7 @@ from soilml.log_import.guesses.draft import toml_value
 from soilml.optional_imports import tomllib
 from soilml.physics.soils import soil_catalogue
 from soilml.report.page import Provenance, report_texts
-from soilml.rover_design.presentation import design_page, verdict
+from soilml.rover_design.presentation import design_page
 from soilml.rover_design.report import design_report
 from soilml.rover_design.study import LEAST, DesignStudy, read_study
 from soilml.serve.answers.job_files import MODEL_FILE, Tell, setting_file, write_files
@@ -235,7 +235,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     return {
         "met": found.met,
         "badge": page.badge,
-        "verdict": verdict(found),
+        "verdict": found.summary(),
         "next": page.next_steps[0] if page.next_steps else "",
         "picture": {"image": page.pictures[0].image.image, "alt": page.pictures[0].image.alt},
         "tables": [_table(t.caption, t.header, t.rows) for t in page.tables],

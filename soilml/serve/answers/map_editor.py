@@ -21,10 +21,11 @@ from soilml.log_import.guesses.map_edits import (
     set_unit,
     set_value,
 )
-from soilml.log_import.guesses.map_text import draft_map, log_files
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
+from soilml.log_import.new_map import draft_map
 from soilml.log_import.readers import read_log
+from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import WheelSeries

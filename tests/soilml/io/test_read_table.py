@@ -45,7 +45,7 @@ FAULTS = {
     "text in a number": (GOOD.replace("0.013", "deep"), "line 3, column sinkage_m: 'deep'"),
     "NaN": (GOOD.replace("0.013", "nan"), "line 3, column sinkage_m: 'nan'"),
     "infinity": (GOOD.replace("2.5", "inf"), "line 4, column torque_Nm: 'inf'"),
-    "slip of one": (GOOD.replace("0.3,80", "1.0,80"), "line 4, column slip: 1 given"),
+    "slip above one": (GOOD.replace("0.3,80", "1.1,80"), "line 4, column slip: 1.1 given"),
     "slip in percent": (GOOD.replace("0.3,80", "30,80"), "line 4, column slip: 30 given"),
     "slip blank": (GOOD.replace("0.3,80", ",80"), "line 4, column slip: the cell is blank"),
     "negative load": (GOOD.replace("0.3,80", "0.3,-80"), "line 4, column load_N: -80 given"),
@@ -109,3 +109,9 @@ def test_a_quote_that_is_not_closed_in_a_column_that_is_passed_over_loses_no_row
     text = "\n".join(lines).replace(",o", ',"o (open') + "\n"
     with pytest.raises(TableError, match="quotation marks must stand in pairs"):
         read_table(written(tmp_path, text), RUNS, ignore_extra=True)
+
+
+def test_a_wheel_that_spins_on_the_spot_or_is_locked_is_read(tmp_path):
+    file = tmp_path / "runs.csv"
+    file.write_text("run,slip,load_N,torque_Nm\na,1,60,5\na,-1,60,-4\na,0.3,60,3\n")
+    assert read_table(file)["slip"].tolist() == [0.9999, -0.9999, 0.3]

@@ -67,7 +67,7 @@ def test_tests_of_a_soil_as_columns():
     [
         ([[0.1, 60.0]], "rows are list; needed is a Table"),
         (None, "rows are NoneType"),
-        ("runs.csv", "rows are str; needed is a Table, as read_table returns it"),
+        ("no_runs.csv", "no_runs.csv: there is no such file"),
         ({"slip": [0.1, 0.2], "load_N": [60.0]}, "differ in length: slip has 2, load_N has 1"),
         ({"slip": [[0.1, 0.2]]}, r"column slip: has shape \(1, 2\)"),
         ({"slip": ["much"]}, "column slip: needed are numbers"),

@@ -138,3 +138,25 @@ def test_a_column_in_digits_of_another_script_is_text(tmp_path):
     (tmp_path / "log.csv").write_text("t,F,M\n" + rows, "utf-8")
     (recording,) = read_log(tmp_path / "log.csv")
     assert list(recording.texts) == ["M"]
+
+
+@pytest.mark.parametrize("mark", [".", ","])
+def test_a_long_log_of_numbers_is_read_as_its_lines_are(mark, tmp_path):
+    """A text at its end leaves it to the reader of lines, and the numbers are the same."""
+    rng = np.random.default_rng(9)
+    separator = "," if mark == "." else ";"
+    rows = [
+        separator.join([f"{t:.2f}", f" {v:.6e}", "NaN" if t % 7 == 0 else f"{v:.3f}"])
+        for t, v in zip(np.arange(3000) / 4, rng.normal(size=3000), strict=True)
+    ]  # fmt: skip
+    lines = [separator.join(["t [s]", "Fz [N]", "T [Nm]"]), *rows]
+    plain, odd = tmp_path / "plain.csv", tmp_path / "odd.csv"
+    lines = [line.replace(".", mark) for line in lines]
+    plain.write_text("\n".join(lines))
+    odd.write_text("\n".join([*lines, separator.join(["stopped", "by", "hand"])]))
+    (fast,), (slow,) = read_log(plain), read_log(odd)
+    for name in ("t", "Fz", "T"):
+        np.testing.assert_array_equal(fast.columns[name], slow.columns[name][:3000])
+    assert fast.units == slow.units and [n.code for n in fast.notes] == [
+        n.code for n in slow.notes if n.code != "lines-left-out"
+    ]

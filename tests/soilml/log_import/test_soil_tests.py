@@ -138,3 +138,89 @@ def test_a_bad_table_does_not_take_the_others_along(tmp_path, capsys):
     assert len({t["test"] for t in json.loads(out.read_text())["shear_tests"]}) == 6
     assert main(["bevameter", str(good), str(good)]) == 2
     assert "given twice" in capsys.readouterr().err
+
+
+def curves(tests, shape="{s},{x},{tau}", stresses=(25, 50, 100)):
+    """Rows of shear tests of 1.5 kPa, 33 degrees and a K of 0.9 mm; displacements in mm."""
+    rows = []
+    for s in stresses:
+        for x in np.arange(0.25, 8.0):
+            tau = (1.5 + s * np.tan(np.radians(33))) * (1 - np.exp(-x / 0.9))
+            row = shape.format(s=s, x=x, tau=round(tau, 4), up=round(0.02 * x + 0.04, 4))
+            rows.append(f"N{s},{row}" if tests else row)
+    return rows
+
+
+def triaxial(curve):
+    """Rows of three triaxial tests of the same soil, with the way to failure or without."""
+    sine, cosine = np.sin(np.radians(33)), np.cos(np.radians(33))
+    rows = []
+    for s3 in (25.0, 50.0, 100.0):
+        q = 2 * (1.5 * cosine + s3 * sine) / (1 - sine)
+        rows += [f"{e},{s3},{q * (1 - np.exp(-e)):.4f}" for e in range(1, 12)] if curve else [
+            f"{s3},{s3 + q:.4f}"]  # fmt: skip
+    return rows
+
+
+SHEAR = {
+    "a vertical displacement beside": [
+        "Test,Normal Stress (kPa),Horizontal Displacement (mm),Shear Stress (kPa),"
+        "Vertical Displacement (mm)", *curves(True, "{s},{x},{tau},{up}")],
+    "the vertical one first": [
+        "Vertical Displacement (mm),Normal Stress (kPa),Displacement (mm),Shear Stress (kPa)",
+        *curves(False, "{up},{s},{x},{tau}")],
+    "no column of tests": ["Normal Stress (kPa),Horizontal Displacement (mm),Shear Stress (kPa)",
+                           *curves(False)],
+    "German compounds": ["Normalspannung [kPa],Scherweg [mm],Scherspannung [kPa]",
+                         *curves(False)],
+    "deviator stress": ["Axial strain (%),Cell pressure (kPa),Deviator stress (kPa)",
+                        *triaxial(True)],
+    "principal stresses": ["sigma3 [kPa],sigma1 [kPa]", *triaxial(False)],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", SHEAR.values(), ids=SHEAR)
+def test_shear_and_triaxial_tests_of_strangers(lines, tmp_path):
+    path, out = written(tmp_path, "\n".join(lines)), tmp_path / "soil.json"
+    assert main(["bevameter", str(path), "--json", str(out)]) == 0
+    found = {k: e["value"] for k, e in json.loads(out.read_text())["estimates"].items()}
+    assert found["cohesion"] == pytest.approx(1500.0, rel=0.02)
+    assert found["friction_angle"] == pytest.approx(np.radians(33), rel=0.01)
+    if "shear_modulus" in found:
+        assert found["shear_modulus"] == pytest.approx(0.9e-3, rel=0.02)
+
+
+PLATES = {
+    "numbered": ("test,plate diameter (mm),sinkage (mm),pressure (kPa)", "{k},{two},{z},{p}"),
+    "German": ("Versuch,Plattendurchmesser (mm),Eindringtiefe (mm),Bodenpressung (kPa)",
+               "V{k},{two},{z},{p}"),
+    "a strip": ("test,strip width (mm),sinkage (mm),pressure (kPa)", "{k},{b},{z},{p}"),
+    "not numbered": ("plate radius (mm),z (mm),p (kPa)", "{b},{z},{p}"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("header", "shape"), PLATES.values(), ids=PLATES)
+def test_plate_tests_of_strangers(header, shape, tmp_path):
+    rows = [
+        shape.format(k=k, b=b, two=2 * b, z=z, p=round((9 / b + 1.3) * z**1.1, 5))
+        for k, b in enumerate((30, 60, 90)) for z in (4, 8, 16, 30)
+    ]  # fmt: skip
+    path, out = written(tmp_path, "\n".join([header, *rows])), tmp_path / "soil.json"
+    assert main(["bevameter", str(path), "--json", str(out)]) == 0
+    found = json.loads(out.read_text())
+    assert found["estimates"]["n"]["value"] == pytest.approx(1.1, rel=1e-3)
+    assert len(found["plate_tests"]) == 3
+
+
+def test_one_plate_of_a_simulation_states_its_size_in_the_head(tmp_path):
+    rows = [f"{i},{i / 100},{i / 1000},{900 * (i / 1000) ** 1.1:.6f}" for i in range(1, 40)]
+    lines = ["# plate radius: 50 mm", "step,time [s],z [m],Fz [N]", *rows]
+    out = tmp_path / "soil.json"
+    assert main(["bevameter", str(written(tmp_path, "\n".join(lines))), "--json", str(out)]) == 0
+    assert json.loads(out.read_text())["estimates"]["n"]["value"] == pytest.approx(1.1, rel=1e-3)
+
+
+def test_vane_tests_are_said_not_to_be_read(tmp_path, capsys):
+    path = written(tmp_path, "depth (mm),vane torque (Nm)\n10,0.2\n20,0.3\n30,0.4")
+    assert main(["bevameter", str(path)]) == 2
+    assert "vane tests are not read" in capsys.readouterr().err

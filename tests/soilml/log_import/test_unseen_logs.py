@@ -37,7 +37,8 @@ def test_a_place_in_x_y_and_z_is_one_place(tmp_path):
              ('# mass = "6.1', 'mass = "24.5'), ("# wheels = 4", "wheels = 4")]  # fmt: skip
     found, text = imported(tmp_path, write_csv(tmp_path / "rover.csv", columns), edits)
     assert 'column = ["vo_x", "vo_y", "vo_z"]' in text and "[sinkage]" not in text
-    assert text.count("CHANGE") == 4 + 1  # and the line that explains the word
+    # four of the motor, the place whose unit nothing states, and the line that explains the word
+    assert text.count("CHANGE") == 4 + 1 + 1
     assert len(found.table) == 12
     np.testing.assert_allclose(found.table["slip"], np.tile(SLIPS, 4), atol=0.02)
     np.testing.assert_allclose(found.table["torque_Nm"], np.tile(torque_law(SLIPS), 4), rtol=0.08)

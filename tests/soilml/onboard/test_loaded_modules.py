@@ -39,4 +39,5 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
         "soilml.onboard.set_posterior",
         "soilml.onboard.state_checksum",
         "soilml.quantities",
+        "soilml.results",
     }

@@ -3,6 +3,9 @@
 import numpy as np
 import pytest
 from sklearn.base import clone
+from sklearn.model_selection import GridSearchCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
 from training.regressors.exact_solution import KernelEigensystem
@@ -100,3 +103,21 @@ def test_training_stops_early_when_held_out_rows_get_worse():
     x, y, _ = curve(40, noise=1.0)
     regressor = GaussianMLP(hidden=(64, 64), epochs=400, patience=5, batch=8).fit(x, y)
     assert len(regressor.history_) < 400
+
+
+def test_the_public_regressors_work_in_pipelines_and_searches():
+    import soilml.regressors
+    from soilml.regressors import FixedSizeLSSVM as Public
+
+    assert Public is FixedSizeLSSVM
+    assert dir(soilml.regressors) == soilml.regressors.__all__
+    assert all(getattr(soilml.regressors, name) for name in soilml.regressors.__all__)
+    with pytest.raises(AttributeError, match="has no 'Forest'"):
+        _ = soilml.regressors.Forest
+    x, y, _ = curve(200)
+    pipeline = make_pipeline(StandardScaler(), Public(centres=20))
+    search = GridSearchCV(pipeline, {"fixedsizelssvm__centres": [3, 40]}, cv=3).fit(x, y)
+    assert search.best_params_ == {"fixedsizelssvm__centres": 40}
+    mean, std = search.best_estimator_.predict(x, return_std=True)
+    assert mean.shape == std.shape == y.shape and (std > 0.0).all()
+    np.testing.assert_array_equal(mean, search.predict(x))

@@ -1,0 +1,220 @@
+"""A guess stands without a mark only with evidence, and what an import writes is read again."""
+
+import numpy as np
+import pytest
+from described_rigs import drive, noisy, write
+from foreign_rigs import RADIUS
+from guessed_channels import RIGHT, SILENT, is_marked, judged_rigs
+
+from soilml.cli import main
+from soilml.optional_imports import tomllib
+
+ROLES = ("wheel_speed", "wheel_angle", "rim_speed", "ground_speed", "position", "slip", "torque",
+         "motor_current", "load", "drawbar_pull", "sinkage", "slope")  # fmt: skip
+MODEL = """[gear]
+type = "wheel"
+radius = 0.13
+width = 0.1
+[soil]
+name = "wong1989/dry_sand"
+[soil.prior]
+friction_angle = ["20 deg", "45 deg"]
+[noise]
+torque_Nm = "3 %"
+"""
+#: Columns that are no channel of a wheel, by names that share a letter or a word with one.
+DECOYS = ("gyr_z", "quat_z", "temp_z", "vel_z", "rate_z", "acc_z", "velL", "field.velocity0",
+          "CAN1_current", "adc_torque", "torque_raw", "cell_voltage", "motor_load", "cpu_load",
+          "laser_intensity", "camera_depth", "yaw", "kappa", "effort", "height", "z", "h", "s",
+          "x")  # fmt: skip
+
+
+def init(folder, logs, *more):
+    """The text of a new map, by the command."""
+    out = folder / "map.toml"
+    out.unlink(missing_ok=True)
+    assert main(["import", "--init", *map(str, logs), "--out", str(out), *more]) == 0
+    return out.read_text(encoding="utf-8")
+
+
+def imported(folder, logs, text=None):
+    """The rows of an import, by the command."""
+    if text is not None:
+        (folder / "map.toml").write_text(text, encoding="utf-8")
+    words = ["import", *map(str, logs), "--map", str(folder / "map.toml")]
+    return main([*words, "--out", str(folder / "runs.csv")])
+
+
+def silent(text):
+    """Columns of the channels of a map that no line marks, by role."""
+    content = tomllib.loads(text)
+    found = {r: content[r].get("column") for r in ROLES if r in content}
+    return {r: c for r, c in found.items() if c and not is_marked(text, (r,))}
+
+
+def log_of(folder, seed=5, **more):
+    rng = np.random.default_rng(seed)
+    d = drive(rng, (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    own = {"time [s]": d.t, "omega [rad/s]": d.omega, "v [m/s]": d.v}
+    own |= {"torque [Nm]": noisy(rng, d.torque, 0.03), "Fz [N]": noisy(rng, d.load, 0.4)}
+    return write(folder / "log.csv", own | {k: make(rng, d) for k, make in more.items()}), d
+
+
+@pytest.mark.slow
+def test_no_guess_over_all_rigs_is_wrong_without_a_mark():
+    """Right or wrong, and marked or not: `python guessed_channels.py described_rigs`."""
+    kinds = [
+        kind
+        for module in ("described_rigs", "set_aside_rigs")
+        for own in judged_rigs(module).values()
+        for kind in own.values()
+    ]
+    assert kinds.count(SILENT) == 0
+    assert kinds.count(RIGHT) > 0.95 * len(kinds)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DECOYS)
+def test_a_letter_or_a_size_is_no_evidence(name, tmp_path):
+    for make in (
+        lambda rng, d: rng.normal(0, 0.02, d.t.size),
+        lambda rng, d: 800 + 300 * np.sin(d.t / 5),
+        lambda rng, d: 3.1 * d.t,
+    ):
+        log, _ = log_of(tmp_path, **{name: make})
+        assert name not in silent(init(tmp_path, [log])).values()
+
+
+def test_a_clear_log_has_no_mark_and_its_evidence_is_printed(tmp_path, capsys):
+    log, _ = log_of(tmp_path, gyr_z=lambda rng, d: rng.normal(0, 0.03, d.t.size))
+    text = init(tmp_path, [log], "--explain")
+    assert silent(text) == {"wheel_speed": "omega", "ground_speed": "v", "torque": "torque",
+                            "load": "Fz"}  # fmt: skip
+    said = capsys.readouterr().err
+    assert "[ground_speed] v: no mark" in said and "travel over rotation is 0.12 m" in said
+    assert "[sinkage]" not in said and "--init; give both" not in said
+    assert main(["import", str(log), "--explain"]) == 2
+
+
+def test_the_mark_names_the_next_column(tmp_path):
+    log, _ = log_of(tmp_path, M=lambda rng, d: noisy(rng, 0.5 * d.torque, 0.1))
+    log.write_text(log.read_text().replace("torque [Nm]", "T"))
+    text = init(tmp_path, [log])
+    assert "CHANGE: its name alone does not say so, and no unit is stated; else perhaps 'M'" in text
+
+
+def test_a_named_clock_that_jitters_beats_a_counter(tmp_path):
+    log, d = log_of(tmp_path, seq=lambda rng, d: np.arange(d.t.size))
+    text = log.read_text().replace("time [s]", "timestamp")
+    jitter = np.random.default_rng(1).exponential(1.0, d.t.size).cumsum() * d.t[1]
+    head, *lines = text.splitlines()
+    rows = [f"{t:.4f},{line.split(',', 1)[1]}" for t, line in zip(jitter, lines, strict=True)]
+    log.write_text("\n".join([head, *rows]))
+    assert tomllib.loads(init(tmp_path, [log]))["time"]["column"] == "timestamp"
+
+
+def test_a_slip_above_one_without_unit_is_no_per_cent(tmp_path):
+    slip = np.array([0.05, 0.15, 0.3, 0.45, 0.6])
+    columns = {"test": np.arange(5), "slip": slip / (1 - slip), "torque [Nm]": 40 * slip}
+    log = write(tmp_path / "t.csv", columns | {"Fz [N]": np.full(5, 300.0)})
+    text = init(tmp_path, [log])
+    assert "slip" not in silent(text)
+    assert imported(tmp_path, [log], text) == 0
+    rows = np.genfromtxt(
+        tmp_path / "runs.csv", delimiter=",", names=True, dtype=None, encoding=None
+    )
+    np.testing.assert_allclose(rows["slip"], slip, atol=1e-4)
+
+
+def test_a_slip_that_was_set_is_identified_without_an_edit(tmp_path, capsys):
+    rng = np.random.default_rng(2)
+    t = np.arange(0, 12, 0.1)
+    slip = np.where(t < 4, 0.2, np.where(t < 8, 0.4, 0.6))
+    log = write(tmp_path / "log.csv", {
+        "time [s]": t, "slip [-]": slip, "torque [Nm]": noisy(rng, 2 + 4 * slip, 0.05),
+        "Fz [N]": noisy(rng, 60 + 0 * t, 0.5)})  # fmt: skip
+    init(tmp_path, [log])
+    assert imported(tmp_path, [log]) == 0
+    assert "slip_std" not in (tmp_path / "runs.csv").read_text().splitlines()[0]
+    (tmp_path / "model.toml").write_text(MODEL)
+    capsys.readouterr()
+    assert main(["identify", str(tmp_path / "model.toml"), str(tmp_path / "runs.csv")]) == 0
+
+
+@pytest.mark.parametrize("same", [True, False])
+def test_one_sensor_for_rotation_and_travel_gives_no_slip(same, tmp_path, capsys):
+    rng = np.random.default_rng(3)
+    t = np.arange(0, 60, 0.1)
+    rim = noisy(rng, np.choose((t // 10).astype(int), [0.1, 0.2, 0.15, 0.25, 0.12, 0.22]), 1e-3)
+    columns = {"time": t, "rim": rim, "odom": 1.002 * rim, "T": 3 + 0.02 * rng.normal(size=t.size)}
+    log = write(tmp_path / "log.csv", columns, digits=6)
+    travel = "rim" if same else "odom"
+    text = f"""[time]
+column = "time"
+[wheel]
+radius = 0.13
+[rim_speed]
+column = "rim"
+[ground_speed]
+column = "{travel}"
+[torque]
+column = "T"
+[load]
+value = 60
+"""
+    assert imported(tmp_path, [log], text) == 2
+    assert "slip is" in (said := capsys.readouterr().err) and "by construction" in said
+    assert not (tmp_path / "runs.csv").exists()
+
+
+def test_rows_of_several_wheels_keep_their_sizes_and_are_refused(tmp_path, capsys):
+    log = write(tmp_path / "t.csv", {
+        "wheel_radius_m": [0.13, 0.13, 0.2, 0.2], "load_N": [60, 60, 90, 90],
+        "slip": [0.1, 0.3, 0.1, 0.3], "torque_Nm": [1.3, 2, 3, 5]})  # fmt: skip
+    text = init(tmp_path, [log])
+    assert imported(tmp_path, [log], text) == 0
+    assert "rows of several wheels" in capsys.readouterr().err
+    (tmp_path / "model.toml").write_text(MODEL)
+    assert main(["identify", str(tmp_path / "model.toml"), str(tmp_path / "runs.csv")]) == 2
+    assert "wheel_radius_m" in capsys.readouterr().err
+
+
+def test_files_of_one_run_in_a_folder_each(tmp_path):
+    logs = []
+    for k, slip in enumerate((0.1, 0.3)):
+        d = drive(np.random.default_rng(k), (slip,), [60], rate=20)
+        folder = tmp_path / f"run_{k}"
+        folder.mkdir()
+        for name, columns in {
+            "driver-wheel_unit": {"time": d.t, "wheel_speed [rad/s]": d.omega},
+            "driver-travel_unit": {"time": d.t, "carriage_speed [m/s]": d.v},
+            "ft_sensor-wheel_wrench": {"time": d.t, "wheel_torque [Nm]": d.torque,
+                                       "wheel_load [N]": d.load},
+        }.items():  # fmt: skip
+            logs.append(write(folder / f"{name}.csv", columns))
+    text = init(tmp_path, logs).replace("# radius = ", f'radius = "{RADIUS} m"  # ')
+    assert imported(tmp_path, logs, text) == 0
+    rows = (tmp_path / "runs.csv").read_text().splitlines()[1:]
+    assert {line.split(",")[0] for line in rows} == {"run_0", "run_1"}
+
+
+@pytest.mark.parametrize("clock", ["One", "No"])
+def test_units_and_rate_of_a_labview_head(clock, tmp_path):
+    d = drive(np.random.default_rng(4), (0.1, 0.3), [60] * 2, rate=20)
+    units = ("N", "Nm", "rad/s", "mm/s")
+    head = ["LabVIEW Measurement\t", "Writer_Version\t2", "Multi_Headings\tNo",
+            f"X_Columns\t{clock}", "***End_of_Header***\t", "\t", "Channels\t4",
+            "Y_Unit_Label\t" + "\t".join(units), "X_Dimension\t" + "\t".join(["Time"] * 4),
+            "Delta_X\t" + "\t".join([f"{d.t[1]:.6f}"] * 4), "***End_of_Header***",
+            "X_Value\tRadlast\tDrehmoment\tRaddrehzahl\tFahrgeschwindigkeit\tComment"]  # fmt: skip
+    times = [f"{t:.4f}" if clock == "One" else "" for t in d.t]
+    rows = [f"{t}\t{a:.4f}\t{b:.4f}\t{c:.5f}\t{e:.4f}" for t, a, b, c, e in
+            zip(times, d.load, d.torque, d.omega, 1000 * d.v, strict=True)]  # fmt: skip
+    (tmp_path / "fahrt.lvm").write_text("\n".join([*head, *rows]))
+    text = init(tmp_path, [tmp_path / "fahrt.lvm"])
+    assert silent(text) == {"load": "Radlast", "torque": "Drehmoment",
+                            "wheel_speed": "Raddrehzahl",
+                            "ground_speed": "Fahrgeschwindigkeit"}  # fmt: skip
+    content = tomllib.loads(text)
+    assert content["ground_speed"]["unit"] == "mm/s"
+    assert content["time"].get("rate", "20 Hz") == "20 Hz"
