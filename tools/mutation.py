@@ -44,6 +44,7 @@ ROOMS = {
         "",
     ),
     "fitting": ("soilml/fitting", "soilml/fitting", ""),
+    "inference": ("soilml/inference", "soilml/inference", ""),
     "identification": ("soilml/identification", "soilml/identification", "/plot"),
     "onboard": (
         "soilml/onboard",

@@ -40,6 +40,15 @@ def test_pooling_is_exact_where_everything_is_gaussian():
     )
     np.testing.assert_allclose(joint.covariance, np.linalg.inv(total), rtol=0.02, atol=1e-3)
     np.testing.assert_allclose(joint.mean, np.linalg.solve(total, right), rtol=0.02, atol=0.02)
+    halves = pool(
+        np.reshape(means, (2, 3, 3)), np.reshape(covariances, (2, 3, 3, 3)),
+        wide(prior_mean, prior_std), np.ones((2, 3)),
+    )  # fmt: skip
+    first = pool(
+        np.asarray(means[:3]), np.asarray(covariances[:3]), wide(prior_mean, prior_std), np.ones(3)
+    )
+    np.testing.assert_allclose(halves.mean[0], first.mean)
+    np.testing.assert_allclose(halves.inconsistency[0], first.inconsistency)
 
 
 def pattern(*varies):

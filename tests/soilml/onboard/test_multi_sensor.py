@@ -1,5 +1,7 @@
 """Estimates of one quantity from several files, against exact Gaussian inference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -68,6 +70,10 @@ def test_what_does_not_belong_together_is_refused():
     ):
         with pytest.raises(InputError, match=said):
             fuse_estimates([one, *others])
+    at = [replace(one, load=np.asarray(load)) for load in (60.0, 60.0, 90.0)]
+    assert fuse_estimates(at[:2]).estimate.load == 60.0
+    with pytest.raises(InputError, match="load"):
+        fuse_estimates(at)
     with pytest.raises(InputError, match="rule is 'best-linear'"):
         fuse_estimates([one, one], "best-linear")
     with pytest.raises(InputError, match="no estimate given"):
