@@ -62,7 +62,7 @@ def dask_map(
         from distributed import Client, LocalCluster
     except ImportError:
         raise MissingLibraryError(
-            "--engine dask needs dask, which is not installed: pip install 'soilml[cluster]'"
+            "--engine dask needs dask, which is not installed: pip install '.[cluster]'"
         ) from None
     for name in list(logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":  # errors are reported in one line

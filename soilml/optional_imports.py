@@ -31,7 +31,7 @@ def need(module: str, command: str, extra: str = "ground") -> None:
     except ImportError as error:
         raise MissingLibraryError(
             f"`soilml {command}` needs {error.name or 'a library'}, which is not installed: "
-            f"pip install 'soilml[{extra}]'"
+            f"pip install '.[{extra}]'"
         ) from None
 
 

@@ -29,6 +29,7 @@ DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
 friction angle and shear modulus, each with its uncertainty.
 
+  files to try it with         soilml example
   all of it in the browser     soilml serve
   from a log to a table        soilml import
   from a model to data         soilml simulate, generate
@@ -58,6 +59,7 @@ EPILOG = "`soilml COMMAND --help` explains one command with an example."
 #: `soilml.commands`.
 COMMANDS = {
     "init": "soilml.cli.commands.init",
+    "example": "soilml.cli.commands.example",
     "models": "soilml.cli.commands.models",
     "doctor": "soilml.cli.commands.doctor",
     "completion": "soilml.cli.commands.completion",

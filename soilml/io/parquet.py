@@ -31,7 +31,7 @@ def read_parquet(path: Path, most: Bound = TABLE_VALUES) -> tuple[dict[str, Any]
         import pyarrow as pa
     except ImportError:
         raise MissingLibraryError(
-            f"{path}: reading Parquet needs pyarrow: pip install 'soilml[ground]'"
+            f"{path}: reading Parquet needs pyarrow: pip install '.[ground]'"
         ) from None
     files = sorted(path.glob("*.parquet")) if path.is_dir() else [path]
     if not files:
@@ -68,7 +68,7 @@ def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
         import pyarrow as pa
     except ImportError:
         raise MissingLibraryError(
-            "reading a data frame needs pyarrow: pip install 'soilml[ground]'"
+            "reading a data frame needs pyarrow: pip install '.[ground]'"
         ) from None
     arrow = pa.table(frame)
     if len(set(arrow.column_names)) < len(arrow.column_names):

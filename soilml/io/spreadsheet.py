@@ -108,7 +108,7 @@ def _opened(file: Path) -> Iterator[_Book]:
         from python_calamine import CalamineWorkbook
     except ImportError:
         raise MissingLibraryError(
-            f"{file}: reading spreadsheets needs python-calamine: pip install 'soilml[logs]'; or "
+            f"{file}: reading spreadsheets needs python-calamine: pip install '.[logs]'; or "
             "save the sheet as CSV"
         ) from None
     try:

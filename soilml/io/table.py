@@ -172,7 +172,7 @@ class Table:
             import pyarrow as pa
         except ImportError:
             raise MissingLibraryError(
-                "an Arrow table needs pyarrow: pip install 'soilml[ground]'"
+                "an Arrow table needs pyarrow: pip install '.[ground]'"
             ) from None
         return pa.table(self.columns)
 

@@ -40,7 +40,7 @@ def computing_on(device: str) -> Iterator[None]:
     try:
         import torch
     except ImportError:
-        raise MissingLibraryError("a device needs torch: pip install 'soilml[torch]'") from None
+        raise MissingLibraryError("a device needs torch: pip install '.[torch]'") from None
     try:
         torch.zeros(1, dtype=torch.float64, device=device)
     except (RuntimeError, AssertionError, TypeError) as error:

@@ -158,4 +158,4 @@ def test_a_missing_library_names_the_extra(folder, capsys, monkeypatch):
 
     monkeypatch.setattr(builtins, "__import__", without)
     command = ["identify", "model.toml", "good.parquet"]
-    refused(folder, command, capsys, monkeypatch, "pip install 'soilml[ground]'")
+    refused(folder, command, capsys, monkeypatch, "pip install '.[ground]'")

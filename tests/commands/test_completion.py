@@ -18,7 +18,7 @@ def test_a_shell_is_needed(capsys):
 def test_a_missing_library_names_its_extra(capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "shtab", None)
     assert main(["completion", "bash"]) == 2
-    assert "pip install 'soilml[ground]'" in capsys.readouterr().err
+    assert "pip install '.[ground]'" in capsys.readouterr().err
 
 
 #: What is typed, and what the last word may become.

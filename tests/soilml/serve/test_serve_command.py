@@ -80,4 +80,4 @@ def _workers_below(folder):
 def test_a_missing_library_names_its_extra(monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "tornado", None)
     assert main(["serve", "--no-browser", "--port", "0"]) == 2
-    assert "pip install 'soilml[serve]'" in capsys.readouterr().err
+    assert "pip install '.[serve]'" in capsys.readouterr().err
