@@ -123,6 +123,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import available_effects, parse_names, parse_numbers
     from soilml.cli.output import show_verdict, tell, write_columns
     from soilml.cli.progress import working
+    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
     from soilml.experiment_design.advice_after_results import mean_covariates
@@ -177,11 +178,14 @@ def run(args: argparse.Namespace) -> int:
 
         save_maps(args.picture, advice, at)
     show_verdict(advice.summary(), args.out)
+    rows = best_rows(advice)
     if args.all:
         ranked = sorted(advice.choices, key=lambda c: c.overall)
-        write_columns(advice_columns(advice, [("candidate", c) for c in ranked]), args.out)
-    else:
-        write_columns(advice_columns(advice, best_rows(advice)), args.out)
+        rows = [("candidate", c) for c in ranked]
+    columns = advice_columns(advice, rows)
+    if args.out is None and SCREEN.form_of_rows() == "table" and not args.verbose:
+        columns = _short(columns)
+    write_columns(columns, args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *notes]
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
@@ -195,6 +199,16 @@ def run(args: argparse.Namespace) -> int:
         remarks.append(Remark("not-carried", text))
     tell("\n".join(texts(remarks)))
     return 0
+
+
+def _short(columns: dict[str, Any]) -> dict[str, Any]:
+    """The columns that fit 80 characters: channels are in the names of rows, `all` is left out."""
+    kept = {k: v for k, v in columns.items() if k not in ("channels", "all_left")}
+    kept["row"] = [
+        name.replace("best in ", "").replace("best for ", "").replace("all with", "all, with")
+        for name in columns["row"]
+    ]
+    return {k.removesuffix("_left"): v for k, v in kept.items()}
 
 
 def _tests_elsewhere(
