@@ -86,7 +86,7 @@ def namespace(*values: Real) -> Any:
                 from array_api_compat import torch
             except ImportError:
                 raise MissingLibraryError(
-                    "torch tensors need array-api-compat: pip install 'soilml[torch]'"
+                    "torch tensors need array-api-compat: pip install '.[torch]'"
                 ) from None
             return torch
         if hasattr(value, "__array_namespace__"):

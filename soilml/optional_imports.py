@@ -35,7 +35,7 @@ def need(module: str, command: str, extra: str = "ground", *, what: str = "") ->
         raise MissingLibraryError(
             f"{what or f'`soilml {command}`'} needs {error.name or 'a library'}, which is not "
             f"installed: "
-            f"pip install 'soilml[{extra}]'"
+            f"pip install '.[{extra}]'"
         ) from None
 
 

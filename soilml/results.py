@@ -197,7 +197,7 @@ def data_frame(columns: dict[str, Any], index: Any = None) -> Any:
     try:
         import pandas as pd
     except ImportError:
-        raise MissingLibraryError("a data frame needs pandas: pip install pandas") from None
+        raise MissingLibraryError("a data frame needs pandas: pip install '.[ground]'") from None
     return pd.DataFrame(columns, index=index)
 
 

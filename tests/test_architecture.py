@@ -208,3 +208,9 @@ def test_no_two_test_files_share_a_name():
     """Pytest imports test files by their name alone, and refuses a second one of it."""
     names = [f.name for f in (ROOT / "tests").rglob("*.py")]
     assert sorted(names) == sorted(set(names))
+
+
+def test_the_citation_names_this_version():
+    import soilml
+
+    assert f"version: {soilml.__version__}\n" in (ROOT / "CITATION.cff").read_text()

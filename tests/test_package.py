@@ -108,5 +108,5 @@ def test_the_board_simulates_and_says_what_it_lacks(board, tmp_path):
     ):
         done = run(board / "soilml", *command, cwd=tmp_path)
         assert done.returncode == 2
-        assert "pip install 'soilml[ground]'" in done.stderr
+        assert "pip install '.[ground]'" in done.stderr
         assert done.stderr.count("\n") == 1

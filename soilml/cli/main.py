@@ -29,28 +29,28 @@ DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
 friction angle and shear modulus, each with its uncertainty.
 
+  files to try it with         soilml example
   all of it in the browser     soilml serve
   from a log to a table        soilml import
   from a model to data         soilml simulate, generate
   from data to a model file    soilml train
-  from a model file to C       soilml export-c, export-fusion
-  to a graph of fixed shapes   soilml export-step
-  the slip filter for a board  soilml export-slip
+  from a model file to C       soilml export c, export fusion
+  to a graph of fixed shapes   soilml export step
+  the slip filter for a board  soilml export slip
   from a campaign to a file    soilml adapt
   from measurements to soil    soilml estimate (trained model, as on board)
                                soilml identify (analytic methods)
                                soilml bevameter (plate and shear tests)
-                               soilml wheel-leg (torque, vibration, sinkage)
-  a wheel-leg on soft ground   soilml walk
-                               soilml sensor-wheel (stress on a rim)
-  from soil to a simulator     soilml export-soil
-  runs of your own simulator   soilml design-runs
+  what the model lacks         soilml gap
+  what to measure next         soilml plan next, plan effects
+  runs of your own simulator   soilml plan runs
+  from soil to a simulator     soilml export soil
   comparison of methods        soilml compare
-  slopes that can be climbed   soilml pull (from measured rows)
-                               soilml climb (from stress on the rims)
+  slopes that can be climbed   soilml pull
   wheels for a slope           soilml design
   slip without odometry        soilml slip
   soil along a drive as a map  soilml map
+  systems of the papers        soilml paper climb, sensor-wheel, wheel-leg, walk
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 
@@ -59,6 +59,7 @@ EPILOG = "`soilml COMMAND --help` explains one command with an example."
 #: `soilml.commands`.
 COMMANDS = {
     "init": "soilml.cli.commands.init",
+    "example": "soilml.cli.commands.example",
     "models": "soilml.cli.commands.models",
     "doctor": "soilml.cli.commands.doctor",
     "completion": "soilml.cli.commands.completion",
@@ -93,6 +94,32 @@ COMMANDS = {
     "walk": "soilml.cli.commands.walk",
     "papers": "soilml.cli.commands.papers",
 }
+#: Commands of two words: the group, and by its second word the command. The command's own name is
+#: an older one, which still works.
+GROUPS = {
+    "export": {
+        "c": "export-c",
+        "fusion": "export-fusion",
+        "step": "export-step",
+        "slip": "export-slip",
+        "soil": "export-soil",
+    },
+    "plan": {"next": "advise", "effects": "audit", "runs": "design-runs"},
+    "paper": {
+        "climb": "climb",
+        "sensor-wheel": "sensor-wheel",
+        "wheel-leg": "wheel-leg",
+        "walk": "walk",
+        "numbers": "papers",
+    },
+}
+#: What the list of commands says of a group.
+GROUP_HELP = {
+    "export": "a model file as C or a graph, the slip filter, a soil for simulators",
+    "plan": "the next row, effects that runs could name, runs of a simulator",
+    "paper": "systems of the source papers, and their printed numbers",
+}
+_TWO_WORDS = {name: (group, word) for group, own in GROUPS.items() for word, name in own.items()}
 #: Options whose value may begin with a minus sign.
 _NEGATIVE_VALUES = ("--slip", "--load", "--slips")
 _WRONG_COMMAND = re.compile(r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)")
@@ -144,8 +171,11 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             commands.add_parser(name)
             continue
         module = importlib.import_module(path)
+        shown: dict[str, Any] = {"help": module.HELP}
+        if name in _TWO_WORDS:  # the list has its group
+            shown = {"prog": f"soilml {' '.join(_TWO_WORDS[name])}"}
         sub = commands.add_parser(
-            name, help=module.HELP, description=module.DESCRIPTION, formatter_class=layout
+            name, description=module.DESCRIPTION, formatter_class=layout, **shown
         )
         module.add_arguments(sub)
         add_screen_options(sub, getattr(module, "FORMATS", ()))
@@ -153,6 +183,8 @@ def parser(command: str | None = None) -> argparse.ArgumentParser:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]
             root.prog = sub.prog
         sub.set_defaults(run=module.run, outputs=getattr(module, "outputs", declared_outputs))
+    for group, text in GROUP_HELP.items() if every else ():
+        commands.add_parser(group, help=f"{', '.join(GROUPS[group])}: {text}", add_help=False)
     return root
 
 
@@ -225,9 +257,10 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
 
 def _status(words: list[str]) -> int:
     """Run the command of these words; returns the exit status."""
-    words = _join_negative_values(words)
+    typed = words or ["--help"]
+    words = _join_negative_values(_one_name(typed))
     args = parser(words[0] if words else "").parse_args(words)
-    args.command_line, args.make_parser = words, parser
+    args.command_line, args.make_parser = typed, parser
     SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()
@@ -236,6 +269,22 @@ def _status(words: list[str]) -> int:
     if sys.stdout is not None:
         sys.stdout.flush()
     return status
+
+
+def _one_name(words: list[str]) -> list[str]:
+    """The words with the command's own name first, in place of a group and its second word.
+
+    Raises `InputError` for a group without one of its words.
+    """
+    group = GROUPS.get(words[0])
+    if group is not None:
+        if len(words) > 1 and words[1] in group:
+            return [group[words[1]], *words[2:]]
+        near = did_you_mean(words[1], list(group)) if len(words) > 1 else ""
+        raise InputError(f"soilml {words[0]}: {near}needed is one of: {', '.join(group)}")
+    if words[0] in _TWO_WORDS and sys.stderr is not None and sys.stderr.isatty():
+        print(f"this command is now `soilml {' '.join(_TWO_WORDS[words[0]])}`", file=sys.stderr)
+    return words
 
 
 def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:

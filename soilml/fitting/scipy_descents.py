@@ -106,7 +106,7 @@ def descend(
     try:
         from scipy.optimize import least_squares
     except ImportError:
-        raise MissingLibraryError("identify needs scipy: pip install 'soilml[ground]'") from None
+        raise MissingLibraryError("identify needs scipy: pip install '.[ground]'") from None
 
     # scipy asks for residual and Jacobian apart, and a rejected step returns to the point before
     latest: dict[bytes, Solution] = {}

@@ -40,7 +40,7 @@ WORDS = {
     "simulate": ["m.toml", "--slip", "0.1,0.5", "--load", "60,1e6", "--speed", "0.1"],
     "identify": ["m.toml", "runs.csv", "--by", "run"],
     "bevameter": ["plates.csv"],
-    "audit": ["m.toml", "runs.csv", "--ignore-extra"],
+    "audit": ["m.toml", "runs.csv", "--ignore-extra", "-v"],
     "gap": ["m.toml", "runs.csv", "--out", "gap"],
     "estimate": [LINEAR, "runs.csv"],
     "advise": ["m.toml", "runs.csv"],
@@ -52,6 +52,7 @@ WORDS = {
 #: Commands whose tables have tests of their own, or that print none.
 ELSEWHERE = {
     "init",
+    "example",
     "completion",
     "import",
     "generate",

@@ -15,7 +15,7 @@ DESCRIPTION = """\
 Write MODEL.onnx as the C file OUT.c and its header OUT.h: C99, libm alone,
 no allocation; the header states the memory that is needed.
 
-  soilml export-c exported/wheel.onnx wheel.c
+  soilml export c exported/wheel.onnx wheel.c
   gcc -std=c99 -O2 main.c wheel.c -lm
 
 Functions, with NAME the name of OUT.c:

@@ -16,9 +16,9 @@ Write the fusion of files that estimate the same quantity from different
 sensors, such as slip from torque and from vibration, as the C file OUT.c and
 its header OUT.h. They use the structs that export-c writes for each file.
 
-  soilml export-c exported/slip_torque.onnx slip_torque.c
-  soilml export-c exported/slip_vibration.onnx slip_vibration.c
-  soilml export-fusion slip.c exported/slip_torque.onnx exported/slip_vibration.onnx
+  soilml export c exported/slip_torque.onnx slip_torque.c
+  soilml export c exported/slip_vibration.onnx slip_vibration.c
+  soilml export fusion slip.c exported/slip_torque.onnx exported/slip_vibration.onnx
 
 slip_fuse() weighs the estimates by their variances and by the correlation of
 their errors, which are in the files. docs/how-to/deploy.md describes it.

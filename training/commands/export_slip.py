@@ -20,8 +20,8 @@ Write one step of the filter of `soilml slip` for a rover: belief and readings
 in, belief, speed, slips and flags out. All shapes are numbers, so that memory
 and time of a step are fixed.
 
-  soilml export-slip ROVER.toml rover_slip.onnx
-  soilml export-slip ROVER.toml rover_slip.onnx --c rover_slip.c --soils 512
+  soilml export slip ROVER.toml rover_slip.onnx
+  soilml export slip ROVER.toml rover_slip.onnx --c rover_slip.c --soils 512
 
 ROVER.toml is that of `soilml slip`. The table of its forces is part of the
 file: fewer --soils are smaller and coarser. soilml.onboard.slip_stream runs

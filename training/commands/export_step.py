@@ -12,7 +12,7 @@ Write the set posterior of MODEL.onnx as OUT.onnx, in which every shape is a
 number: one row in, and a memory that is always as large as it can be. It is
 for compilers that need fixed shapes, such as those of accelerators.
 
-  soilml export-step exported/wheel.onnx wheel_step.onnx
+  soilml export step exported/wheel.onnx wheel_step.onnx
 
 docs/reference/onnx.md says how its memory is fed from step to step. Python
 uses MODEL.onnx itself; soilml export-c writes C that needs no library.

@@ -31,9 +31,9 @@ Rank the operating points (slip, load) and sensors of a next measurement by how
 much they reduce the uncertainty of the parameters that have a prior in
 MODEL.toml.
 
-  soilml advise MODEL.toml RUNS.csv
-  soilml advise MODEL.toml RUNS.csv --slips 0.1,0.3,0.5 --loads 30:120:4
-  soilml advise MODEL.toml --loads 30:120:4 --picture map.png
+  soilml plan next MODEL.toml RUNS.csv
+  soilml plan next MODEL.toml RUNS.csv --slip 0.1,0.3,0.5 --load 30:120:4
+  soilml plan next MODEL.toml --load 30:120:4 --picture map.png
 
 For each candidate, readings are simulated for samples of the soil, averaged
 over explanations of the rows as by soilml identify (of the prior without
@@ -53,9 +53,9 @@ the posterior samples does not carry the wheel. Model errors are considered wher
 With --gravity, rate tests made where --tested-at says (on Earth) by what they
 tell of the drawbar pull of the wheel there, under --target-load:
 
-  soilml advise MODEL.toml --gravity moon --target-load 20 --radii 0.1,0.15
+  soilml plan next MODEL.toml --gravity moon --target-load 20 --radii 0.1,0.15
 
-A test has rows at all --slips under a load, with a wheel of a radius.
+A test has rows at all --slip under a load, with a wheel of a radius.
 pull_left_N is the standard deviation of the pull that is expected after it, by
 the model, with the law of gravity in doubt; scaled_error_N is the error of the
 measured pull times the ratio of the loads, without a model. speed_ratio is the
@@ -79,9 +79,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser, need_runs=False)
     parser.add_argument(
-        "--slips", metavar="A,B,...", help="candidate slips: A,B,... or start:stop:count"
+        "--slip",
+        dest="slips",
+        metavar="A,B,...",
+        help="candidate slips: A,B,... or start:stop:count",
     )
-    parser.add_argument("--loads", metavar="A,B,...", help="candidate loads in N")
+    parser.add_argument("--load", dest="loads", metavar="A,B,...", help="candidate loads in N")
+    for old in ("--slips", "--loads"):
+        parser.add_argument(old, help=argparse.SUPPRESS)
     parser.add_argument(
         "--count",
         type=whole_number_from(1, MAX_COUNT),
@@ -118,6 +123,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import available_effects, parse_names, parse_numbers
     from soilml.cli.output import show_verdict, tell, write_columns
     from soilml.cli.progress import working
+    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
     from soilml.experiment_design.advice_after_results import mean_covariates
@@ -172,11 +178,14 @@ def run(args: argparse.Namespace) -> int:
 
         save_maps(args.picture, advice, at)
     show_verdict(advice.summary(), args.out)
+    rows = best_rows(advice)
     if args.all:
         ranked = sorted(advice.choices, key=lambda c: c.overall)
-        write_columns(advice_columns(advice, [("candidate", c) for c in ranked]), args.out)
-    else:
-        write_columns(advice_columns(advice, best_rows(advice)), args.out)
+        rows = [("candidate", c) for c in ranked]
+    columns = advice_columns(advice, rows)
+    if args.out is None and SCREEN.form_of_rows() == "table" and not args.verbose:
+        columns = _short(columns)
+    write_columns(columns, args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *notes]
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
@@ -190,6 +199,16 @@ def run(args: argparse.Namespace) -> int:
         remarks.append(Remark("not-carried", text))
     tell("\n".join(texts(remarks)))
     return 0
+
+
+def _short(columns: dict[str, Any]) -> dict[str, Any]:
+    """The columns that fit 80 characters: channels are in the names of rows, `all` is left out."""
+    kept = {k: v for k, v in columns.items() if k not in ("channels", "all_left")}
+    kept["row"] = [
+        name.replace("best in ", "").replace("best for ", "").replace("all with", "all, with")
+        for name in columns["row"]
+    ]
+    return {k.removesuffix("_left"): v for k, v in kept.items()}
 
 
 def _tests_elsewhere(

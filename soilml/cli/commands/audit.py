@@ -20,8 +20,8 @@ Determine which missing effects the planned runs of DESIGN.csv could identify
 with the sensors of MODEL.toml, which they could not, and which run to add. No
 measurement is needed.
 
-  soilml audit MODEL.toml DESIGN.csv
-  soilml audit MODEL.toml DESIGN.csv --out audit.json
+  soilml plan effects MODEL.toml DESIGN.csv
+  soilml plan effects MODEL.toml DESIGN.csv --out audit.json
 
 DESIGN.csv has the columns run, slip, load_N, and speed_m_s, pass,
 slip_angle_rad where they are set. Channels are those whose noise is declared

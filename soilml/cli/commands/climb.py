@@ -23,8 +23,8 @@ of gentle slopes and the measured stress on the rims of a front and a rear
 wheel; then predict drawbar pull against slip and the steepest slope that can
 be climbed.
 
-  soilml climb ROVER.toml RUNS.csv --stress STRESS.csv
-  soilml climb ROVER.toml RUNS.csv --stress STRESS.csv --out DIR
+  soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv
+  soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv --out DIR
 
 ROVER.toml describes a rover with four wheels:
 

@@ -14,10 +14,10 @@ ranges of its priors. With --trust, the python or command of [simulator] makes
 the runs, which are written to its table; then identify, pull and gap use that
 simulator. It is code from the model file, and may do all that you may.
 
-  soilml design-runs MODEL.toml                    the runs, as a table
-  soilml design-runs MODEL.toml --trust            makes them
-  soilml design-runs MODEL.toml --trust --count 40 40 more where it is unsure
-  soilml design-runs MODEL.toml --out design.csv   the runs, as a file
+  soilml plan runs MODEL.toml                    the runs, as a table
+  soilml plan runs MODEL.toml --trust            makes them
+  soilml plan runs MODEL.toml --trust --count 40 40 more where it is unsure
+  soilml plan runs MODEL.toml --out design.csv   the runs, as a file
 
 The first runs fill the space evenly. Where the table exists, further runs are
 those at which the emulator of the runs is least sure. The error of the emulator

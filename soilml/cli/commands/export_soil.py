@@ -20,9 +20,9 @@ Write the soil of FIT.json in the units and names of a simulator, with a README 
 the equations, of what is ignored and of what no wheel test reveals.
 
   soilml identify MODEL.toml RUNS.csv --out result.json
-  soilml export-soil result.json --to chrono --out scm
-  soilml export-soil result.json --to chrono --out scm --draws 50
-  soilml export-soil MODEL.toml --to gazebo --out gazebo
+  soilml export soil result.json --to chrono --out scm
+  soilml export soil result.json --to chrono --out scm --draws 50
+  soilml export soil MODEL.toml --to gazebo --out gazebo
 
 FIT.json is the file that `soilml identify --out` wrote, or a model file. Targets:
   chrono      Project Chrono, deformable terrain SCM

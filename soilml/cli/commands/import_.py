@@ -27,7 +27,7 @@ deviations.
 
 Logs are CSV and other text, Parquet, spreadsheets (.xlsx; one sheet of several
 as BOOK.xlsx#SHEET), MATLAB files, MCAP and bags of ROS 1 and 2
-(pip install 'soilml[logs]'); each file is a run, unless the map says otherwise.
+(pip install '.[logs]'); each file is a run, unless the map says otherwise.
 MAP.toml says which column or topic is which quantity, in which unit,
 and what stands between: radius, gear ratio, torque constant, tare, each with
 its uncertainty. --init writes one with guesses and their reasons; without --out

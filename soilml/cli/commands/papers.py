@@ -22,12 +22,12 @@ HELP = "printed numbers of the source papers next to the computed ones"
 DESCRIPTION = """\
 Compute the numbers that the source papers print, and compare them.
 
-  soilml papers                        all papers; takes about forty seconds
-  soilml papers nagatani2009           one paper
-  soilml papers --summary              how many numbers of each status
-  soilml papers comin2017 --all        every number, also those not computed
-  soilml papers --out papers.csv       every number, as CSV
-  soilml papers --json papers.json     the same with the summary, as JSON
+  soilml paper numbers                        all papers; takes about forty seconds
+  soilml paper numbers nagatani2009           one paper
+  soilml paper numbers --summary              how many numbers of each status
+  soilml paper numbers comin2017 --all        every number, also those not computed
+  soilml paper numbers --out papers.csv       every number, as CSV
+  soilml paper numbers --json papers.json     the same with the summary, as JSON
 
 status: reproduced     computed without the number, within the tolerance
         recovered      the number, or what it follows from, was put into a

@@ -19,8 +19,8 @@ Solve the force balance of each run of a wheel whose normal stress was measured:
 k_x and M, the true over the measured stress. The k_x of one run, the
 reference, then predicts the drawbar pull of all (Nagatani et al. 2009).
 
-  soilml sensor-wheel MODEL.toml RUNS.csv --stress STRESS.csv
-  soilml sensor-wheel MODEL.toml RUNS.csv --stress STRESS.csv --reference flat
+  soilml paper sensor-wheel MODEL.toml RUNS.csv --stress STRESS.csv
+  soilml paper sensor-wheel MODEL.toml RUNS.csv --stress STRESS.csv --reference flat
 
 MODEL.toml has the wheel (radius, width) and the soil, of which cohesion and
 friction angle are used. RUNS.csv has a row for each run: run, slip, load_N (the

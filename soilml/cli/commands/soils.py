@@ -59,7 +59,7 @@ def _list(entries: list[SoilEntry]) -> str:
         )
         rows.append((entry.name, *values, entry.text))
     notes = (
-        "* not printed in the paper: assumed. `soilml soils NAME` has kc, kphi, and the source; "
+        "* not in the paper: assumed. `soilml soils NAME` has kc, kphi, and the source; "
         "--format json all."
     )
     return f"{format_table(header, rows, last_left=True)}\n{notes}"

@@ -21,9 +21,9 @@ Simulate wheel-legs by resistive-force theory (Li, Zhang and Goldman 2013; Comin
 and Saaj 2017, eqs. 4 to 11), at every combination of feet, numbers of legs,
 grounds and commanded slips.
 
-  soilml walk --foot LTF,CIF --stiffness 0.4e6:1e6:4 --picture feet.png
-  soilml walk --foot none --legs 1:6:6 --stiffness 0.7e6
-  soilml walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --over-time turn.csv
+  soilml paper walk --foot LTF,CIF --stiffness 0.4e6:1e6:4 --picture feet.png
+  soilml paper walk --foot none --legs 1:6:6 --stiffness 0.7e6
+  soilml paper walk --ground SSC-1,ES-3 --slip 0,0.25,0.5 --over-time turn.csv
 
 Feet are none, LTF (Load Testing Foot), SRF and CIF (table III); grounds SSC-1,
 SSC-2, SSC-3 and ES-3 (table I), or --stiffness, the stress in N/m^3 of depth under
@@ -48,9 +48,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mass", type=NumberFrom(0.01, 1e5, "kg"), metavar="KG", help="carried (default: 3.75 kg)"
     )
+    spin = NumberFrom(1e-3, 100.0, "rad/s")
     parser.add_argument(
-        "--speed", type=NumberFrom(1e-3, 100.0, "rad/s"), metavar="RAD_S", help="default: 0.3 rad/s"
+        "--angular-speed", dest="speed", type=spin, metavar="RAD_S", help="default: 0.3 rad/s"
     )
+    parser.add_argument("--speed", type=spin, help=argparse.SUPPRESS)
     add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
     add_output(

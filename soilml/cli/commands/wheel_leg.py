@@ -25,8 +25,8 @@ DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil
 from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print.
 
-  soilml wheel-leg STRIDES.csv
-  soilml wheel-leg STRIDES.csv --by run --torque-model empirical --out soil.csv
+  soilml paper wheel-leg STRIDES.csv
+  soilml paper wheel-leg STRIDES.csv --by run --torque-model empirical --out soil.csv
 
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
@@ -37,8 +37,8 @@ the four soils of the source (table VIII): more strides do not lessen it.
 
 On a known soil the same relations give the slip of each stride:
 
-  soilml wheel-leg STRIDES.csv --known SSC-2
-  soilml wheel-leg STRIDES.csv --known 35.8,22000     degrees and Pa, 1 cm deep
+  soilml paper wheel-leg STRIDES.csv --known SSC-2
+  soilml paper wheel-leg STRIDES.csv --known 35.8,22000     degrees and Pa, 1 cm deep
 
 with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
 STRIDES.csv is then passed on as slip_measured.

@@ -60,7 +60,7 @@ def low_pass(signal: ArrayLike, rate: float, cutoff: float) -> Floats:
     try:
         from scipy.signal import butter, filtfilt
     except ImportError:
-        raise MissingLibraryError("low_pass needs scipy: pip install 'soilml[ground]'") from None
+        raise MissingLibraryError("low_pass needs scipy: pip install '.[ground]'") from None
     b, a = butter(2, cutoff, fs=rate)
     return np.asarray(filtfilt(b, a, x, padlen=PADDING), dtype=np.float64)
 

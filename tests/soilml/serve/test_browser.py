@@ -40,7 +40,7 @@ def chromium():
     try:
         from playwright.sync_api import sync_playwright
     except ImportError:
-        missing("playwright is missing: pip install 'soilml[browser]'")
+        missing("playwright is missing: pip install '.[browser]'")
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=program, args=ARGUMENTS)
         yield browser
