@@ -18,6 +18,7 @@ from training.adaptation.campaign import (
     recipe_text,
     split_runs,
     untrainable_effects,
+    within_carried_loads,
 )
 from training.set_posterior.families.recipe_family import RecipeFamily
 
@@ -98,3 +99,15 @@ def test_effects_that_need_more_than_slip_and_load_cannot_be_trained(case):
     effects = (SlipSinkage(n1=0.4), EFFECTS["multipass"]())
     own = replace(case, model=replace(case.model, effects=effects))
     assert untrainable_effects(own) == {"multipass": ("pass",)}
+
+
+def test_loads_end_where_most_soils_carry_no_more(case):
+    driven = DrivenRange.of(log(), case)
+    assert within_carried_loads(driven, case, 0) == (driven, [])
+    soft = replace(case, prior=case.prior | {"kphi": Prior(4e3, 1e5, log=True)})
+    narrowed, (remark,) = within_carried_loads(driven, soft, 0)
+    assert driven.load[0] == narrowed.load[0] < narrowed.load[1] < driven.load[1]
+    assert within_carried_loads(narrowed, soft, 0) == (narrowed, [])
+    assert f"up to {narrowed.load[1]:g} N" in remark.text
+    with pytest.raises(InputError, match=r"load_N 300 to 900.*kphi 4000 to 100000"):
+        within_carried_loads(replace(driven, load=(300.0, 900.0)), soft, 0)
