@@ -60,6 +60,18 @@ def test_a_drive_over_sand_is_recognised(prompt):
         assert last.values[f"{name}_low"] < last.values[name] < last.values[f"{name}_high"]
 
 
+def test_rows_that_fit_no_exact_model_are_told(prompt):
+    assert prompt[-1].values["disagrees"] == 0.0
+    own, found = logic(), []
+    for at, (kind, stamp, *parts) in contents(drive(30)):
+        if kind == "joints":
+            parts[2] = [0.5 * effort for effort in parts[2]]
+        found += play(own, [(at, (kind, stamp, *parts))])
+    last = found[-1]
+    assert last.values["disagrees"] == 1.0 and last.level is Level.WARN
+    assert last.values["in_range"] == 1.0 and "check units" in own.soil().message
+
+
 @pytest.mark.parametrize("delay", [0.05, 0.3, 0.9, 1.2, 1.9])
 def test_odometry_that_arrives_late_gives_the_same_rows(prompt, delay):
     late = play(logic(), contents(drive(), delay))
