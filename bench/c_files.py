@@ -39,7 +39,7 @@ SINGLE = "one reading"
 #: Rows that the emulated board steps through, and the seed of their noise.
 ROWS, SEED = 60, 8
 ABOUT_LATENCY = (
-    "`soilml export-c` (gcc -O2) beside onnxruntime, one thread. Microseconds of processor time, "
+    "`soilml export c` (gcc -O2) beside onnxruntime, one thread. Microseconds of processor time, "
     "all in turn: median and 99th percentile. *Step*: one more row and the answer, by the rows in "
     "the memory. *Noise alone*: a case without errors of sensors and model, for which graph and C "
     "have a branch; *with errors*: those that the file has by itself. C is called through ctypes, "

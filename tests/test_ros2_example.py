@@ -55,6 +55,18 @@ def test_a_drive_over_sand_is_recognised(prompt):
         assert last.values[f"{name}_low"] < last.values[name] < last.values[f"{name}_high"]
 
 
+def test_rows_that_fit_no_exact_model_are_told(prompt):
+    assert prompt[-1].values["disagrees"] == 0.0
+    own, found = logic(), []
+    for at, (kind, stamp, *parts) in contents(drive(30)):
+        if kind == "joints":
+            parts[2] = [0.5 * effort for effort in parts[2]]
+        found += play(own, [(at, (kind, stamp, *parts))])
+    last = found[-1]
+    assert last.values["disagrees"] == 1.0 and last.level is Level.WARN
+    assert last.values["in_range"] == 1.0 and "check units" in own.soil().message
+
+
 def test_messages_that_wait_on_the_way_and_come_twice_give_the_same_rows(prompt):
     rng, ready, mixed = np.random.default_rng(0), {"joints": 0.0, "odometry": 0.0}, []
     for at, (kind, *parts) in contents(drive()):

@@ -144,6 +144,8 @@ def train(
         return _train_on_few_rows(spec, data, progress)
     prior = _prior(parts.train)
     labels = [_label(regressor, parts) for regressor in spec.regressors]
+    # first, because it refuses loads that the soils do not carry
+    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     members = []
     for regressor, label in zip(spec.regressors, labels, strict=True):
         _fit(regressor, parts, partial(progress, f"fitting {label}"))
@@ -160,7 +162,6 @@ def train(
     alone = spec.per_row or spec.set_posterior is not None  # rows are not pooled as Gaussians
     calibrate = calibrate_single_rows if alone else calibrate_pooling
     pooling = calibrate(mean, covariance, calibration, prior, run_conditions(parts.train))
-    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     trained = TrainedModel(
         spec=spec,
         estimator=estimator,
@@ -215,6 +216,7 @@ def _train_on_few_rows(spec: Spec, data: Dataset, progress: Progress) -> Trained
     parts, prior = DataSplit(data, data, data), _prior(data)
     for regressor in spec.regressors:
         _label(regressor, parts)  # refuses what does not fit into memory
+    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     estimator, members, left = fit_few_rows(
         spec.regressors, spec.rule, data, prior, spec.seed, progress
     )
@@ -233,7 +235,6 @@ def _train_on_few_rows(spec: Spec, data: Dataset, progress: Progress) -> Trained
         held_out = measure_held_out(lambda features: answers, single, conditions, last.factor)
         pooling = replace(pooling, held_out=held_out)
     names = [*(regressor.name for regressor in spec.regressors), "estimator"]
-    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     return TrainedModel(
         spec=spec,
         estimator=estimator,

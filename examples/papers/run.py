@@ -194,7 +194,7 @@ def run() -> None:
             done = subprocess.run([sys.executable, str(HERE / f"{script}.py")])
             if done.returncode != 0:
                 sys.exit(f"{script}.py failed with status {done.returncode}")
-    print("\n== All printed numbers beside the computed ones: soilml papers ==", flush=True)
+    print("\n== All printed numbers beside the computed ones: soilml paper numbers ==", flush=True)
     table = OUT / "papers.csv"
     done = subprocess.run([sys.executable, "-m", "soilml", "papers", "--summary", "--out", table])
     (OUT / "README.md").write_text(page(), encoding="utf-8")

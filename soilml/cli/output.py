@@ -193,7 +193,7 @@ def _left_out(shown: Mapping[str, Sequence[str]], width: int) -> list[str]:
     for name in dict.fromkeys([*first, *order]):
         if sum(widths[n] for n in shown if n not in out) - 2 <= width:
             break
-        if name in ("in_range", "run") or len(out) == len(shown) - 1:
+        if name in ("in_range", "disagrees", "run") or len(out) == len(shown) - 1:
             continue
         out.append(name)
     return [name for name in shown if name in out]

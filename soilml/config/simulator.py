@@ -168,7 +168,7 @@ def emulated(
         assert simulator.runs is not None
         if not simulator.runs.is_file():
             raise InputError(
-                f"{simulator.runs}: there is no such file; `soilml design-runs` proposes the runs "
+                f"{simulator.runs}: there is no such file; `soilml plan runs` proposes the runs "
                 "of [simulator], and makes them where it has python or command"
             )
         table = read_runs(simulator.runs)
@@ -221,7 +221,7 @@ def design_of(table: Table, gear: Gear, prior: Mapping[str, Prior]) -> tuple[Emu
     if len(table) < FEWEST * len(inputs):
         raise InputError(
             f"{source}: {len(table)} runs for {len(inputs)} inputs ({', '.join(inputs)}); needed "
-            f"are {FEWEST * len(inputs)}, better {ADVISED * len(inputs)}: soilml design-runs "
+            f"are {FEWEST * len(inputs)}, better {ADVISED * len(inputs)}: soilml plan runs "
             "proposes more"
         )
     x = _columns(table, inputs)

@@ -140,7 +140,7 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
     """
     if "wheels" not in settings and "radius" in settings:
         settings.fail(
-            "a rover of four equal wheels is for soilml climb; here each wheel stands in "
+            "a rover of four equal wheels is for soilml paper climb; here each wheel stands in "
             "[rover.wheels], as front-left = { position = [0.4, 0.3] }"
         )
     mass = _bounded(settings, "mass", settings.number("mass"), _MASS)

@@ -14,7 +14,7 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TypeAlias
 
@@ -117,7 +117,7 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
         )
     if metadata.get("soilml_kind") == ONE_STEP:
         raise ModelFileError(
-            f"{file} is one step of a stream, written by soilml export-step for other programs; "
+            f"{file} is one step of a stream, written by soilml export step for other programs; "
             "needed is the file that it was made from"
         )
     return _open_intact(file, content, metadata), metadata
@@ -129,11 +129,11 @@ def open_slip_step(path: str | os.PathLike[str], form: str) -> tuple[Session, di
     content = _read_content(file)
     metadata = _read_metadata(file, content)
     if metadata.get("soilml_kind") != SLIP_STEP:
-        raise ModelFileError(f"{file} is no file of soilml export-slip")
+        raise ModelFileError(f"{file} is no file of soilml export slip")
     if (found := metadata.get("soilml_format", "1")) != form:
         raise ModelFileError(
             f"{file} has format {_shown(found)} of slip filters; this version of soilml reads "
-            f"format {form}: write it again with soilml export-slip"
+            f"format {form}: write it again with soilml export slip"
         )
     return _open_intact(file, content, metadata), metadata
 
@@ -218,11 +218,13 @@ def _read_metadata(file: Path, content: bytes) -> dict[str, str]:
     found: dict[str, str] = {}
     has_graph = False
     try:
-        for number, value in _fields(memoryview(content)):
+        for number, value, first, last in _fields(content, 0, len(content)):
             has_graph |= number == _GRAPH
-            if number == _METADATA and not isinstance(value, int):
+            if number == _METADATA and value is None:
                 entry = {
-                    key: bytes(text) for key, text in _fields(value) if not isinstance(text, int)
+                    key: content[start:stop]
+                    for key, text, start, stop in _fields(content, first, last)
+                    if text is None
                 }
                 found[entry.get(1, b"").decode()] = entry.get(2, b"").decode()
     except ValueError as error:
@@ -258,49 +260,63 @@ def create_session(content: bytes) -> Session:
 
 def refers_to_files(content: bytes) -> bool:
     """Whether a tensor of the ONNX model is in another file; `ValueError` for what is no model."""
-    pending = [("model", memoryview(content))]
+    pending = [("model", 0, len(content))]
     while pending:
-        kind, message = pending.pop()
-        for number, value in _fields(message):
-            if kind == "tensor":
+        kind, at, end = pending.pop()
+        inside = _INSIDE.get(kind)
+        for number, value, first, last in _fields(content, at, end):
+            if inside is None:  # a tensor
                 if number == _EXTERNAL or (number == _LOCATION and value != 0):
                     return True
-            elif (inner := _INSIDE[kind].get(number)) is not None:
-                if isinstance(value, int):
+            elif number in inside:
+                if value is not None:
                     raise ValueError("a number where a message is expected")
-                pending.append((inner, value))
+                pending.append((inside[number], first, last))
     return False
 
 
-def _fields(message: memoryview) -> Iterator[tuple[int, memoryview | int]]:
-    """(number, content) of each field of a protobuf message."""
-    at, end = 0, len(message)
+def _fields(content: bytes, at: int, end: int) -> list[tuple[int, int | None, int, int]]:
+    """The fields of the protobuf message in these bytes.
+
+    Each has its number, its value where it is a number of variable length, else None, and the
+    place where its bytes begin and end. Numbers of one byte, which nearly all are, are read here:
+    a file has some ten thousand fields.
+    """
+    found: list[tuple[int, int | None, int, int]] = []
     while at < end:
-        key, at = _varint(message, at)
-        number, wire = key >> 3, key & 7
-        if wire == _VARINT:
-            value, at = _varint(message, at)
-            yield number, value
-            continue
+        key = content[at]
+        at += 1
+        if key > 127:
+            key, at = _varint(content, at - 1, end)
+        wire = key & 7
         if wire == _BYTES:
-            size, at = _varint(message, at)
+            size = content[at] if at < end else 128
+            at += 1
+            if size > 127:
+                size, at = _varint(content, at - 1, end)
+        elif wire == _VARINT:
+            first = at
+            value, at = _varint(content, at, end)
+            found.append((key >> 3, value, first, at))
+            continue
         elif wire in (_EIGHT_BYTES, _FOUR_BYTES):
             size = 8 if wire == _EIGHT_BYTES else 4
         else:
             raise ValueError(f"wire type {wire}")
         if at + size > end:
             raise ValueError("the message ends early")
-        yield number, message[at : at + size]
+        found.append((key >> 3, None, at, at + size))
         at += size
+    return found
 
 
-def _varint(message: memoryview, at: int) -> tuple[int, int]:
+def _varint(content: bytes, at: int, end: int) -> tuple[int, int]:
     """A number of variable length, and the place behind it."""
     value = shift = 0
     while True:
-        if at >= len(message) or shift > 63:
+        if at >= end or shift > 63:
             raise ValueError("the message ends early")
-        byte = message[at]
+        byte = content[at]
         value |= (byte & 127) << shift
         at, shift = at + 1, shift + 7
         if byte < 128:

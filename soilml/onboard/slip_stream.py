@@ -1,6 +1,6 @@
 """Speed, slip and flags of a rover without odometry on board, by a graph of one step.
 
-It needs numpy and onnxruntime alone. `soilml export-slip` writes the graph.
+It needs numpy and onnxruntime alone. `soilml export slip` writes the graph.
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class SlipStream:
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> SlipStream:
-        """A file of `soilml export-slip`, verified by its checksums and its own probe.
+        """A file of `soilml export slip`, verified by its checksums and its own probe.
 
         The probe is some rows with their known answers. Raises `ModelFileError` for another file,
         a damaged one, or a failing probe.

@@ -24,7 +24,7 @@ class Paper:
     chapters: tuple[str, ...] = ()
 
 
-#: By the name that `soilml papers` takes.
+#: By the name that `soilml paper numbers` takes.
 PAPERS: dict[str, Paper] = {
     "nagatani2009": Paper("Nagatani, Ikeda, Sato and Yoshida 2009: a wheel with force sensors"),
     "nagatani_climbing": Paper("Nagatani et al.: online estimation of climbing ability"),

@@ -231,7 +231,7 @@ def readme(export: SoilExport, names: Sequence[str]) -> str:
     lines = [
         f"# Soil of {Path(known.source).name} for {target.name}",
         "",
-        f"Written by `soilml export-soil` for {target.program}.",
+        f"Written by `soilml export soil` for {target.program}.",
         f"Files: {', '.join(f'`{name}`' if name != '...' else name for name in shown)}.",
         "`export.json` has the same in a form for programs, with checksums of what was read.",
         "",

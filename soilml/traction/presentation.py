@@ -256,7 +256,7 @@ def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str,
         ],
         warnings=warnings,
         next_steps=[
-            "Drive a row at another load and slip: soilml advise tells which narrows the soil most."
+            "Drive a row at another load and slip: soilml plan next says which narrows it most."
         ],
         notation=[
             ("90 %", "from the 5 % to the 95 % quantile; medians before them."),

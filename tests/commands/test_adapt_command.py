@@ -40,9 +40,10 @@ def small_training(tmp_path, monkeypatch):
         monkeypatch.setattr(validation, name, getattr(validation, name) // 10)
 
 
-def write_log(folder, *effects, loads=(40.0, 60.0, 80.0, 100.0, 120.0, 50.0)):
+def write_log(folder, *effects, loads=(40.0, 60.0, 80.0, 100.0, 120.0, 50.0), priors=""):
     """A model file and runs of a wheel with effects that the model lacks."""
-    (folder / "model.toml").write_text(THREE_CHANNEL_MODEL)
+    text = THREE_CHANNEL_MODEL.replace("[noise]", f"{priors}[noise]")
+    (folder / "model.toml").write_text(text)
     case = read_case(folder / "model.toml")
     world = replace(case, model=replace(case.model, effects=effects))
     slip = np.tile(np.linspace(0.08, 0.6, 12), len(loads))
@@ -121,3 +122,16 @@ def test_the_chain_from_a_hidden_effect_to_a_better_file(tmp_path, capsys, small
     assert capsys.readouterr().out == shown
     assert {path: path.stat().st_mtime_ns for path in before} == before
     assert (out / "adapted.h").is_file()
+
+
+def test_soils_that_carry_a_part_of_the_loads_are_learned_from(tmp_path, capsys, small_training):
+    """A wheel that digs itself in, heavy loads, and priors that reach to soft soils."""
+    out = tmp_path / "out"
+    soft = 'kphi = { range = [2e5, 3e6], scale = "log" }\nn = [0.7, 1.3]\n'
+    words = write_log(tmp_path, SlipSinkage(n1=0.5), loads=(60.0, 120.0, 200.0), priors=soft)
+    assert main([*words, "--out", str(out), "--rows", "3000"]) == 0
+    assert "with slip-sinkage" in capsys.readouterr().out
+    sets = json.loads(soilml.Estimator.load(out / "adapted.onnx").metadata["set"])
+    assert 0.9 < sets["carried"] < 1.0 and sets["load"] == [50.0, 240.0]
+    share = f"carry the wheel in {sets['carried']:.2%} of the operating conditions"
+    assert share in (out / "adapted.md").read_text()

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -41,6 +42,7 @@ def test_a_run_has_one_answer_with_errors_of_the_model(runs, capsys, whole_file)
     assert float(rows["sound"]["cohesion_Pa"]) == pytest.approx(own["cohesion"][0], rel=1e-3)
     assert float(rows["sound"]["shear_modulus_m_p95"]) == pytest.approx(own.high[2], rel=1e-3)
     assert not [key for key in rows["sound"] if "usual" in key]
+    assert rows["sound"]["disagrees"] == "0" and "disagree with the exact model" not in said
     assert "errors of the model are included, of a size that follows from the residuals" in said
 
 
@@ -48,3 +50,19 @@ def test_rows_out_of_range_are_set_aside_and_said(runs, capsys, whole_file):
     rows, said = answers(capsys, str(whole_file), "runs.csv")
     assert rows["far"]["rows_in_range"] == "13" and rows["far"]["in_range"] == "1"
     assert "run far: 3 of 16 rows are out of range; they are set aside" in said
+
+
+def test_a_run_with_a_fault_of_its_sensor_disagrees(runs, capsys, whole_file):
+    text = ["run,slip,load_N,torque_Nm"]
+    slip, load, torque = (runs["sound"][name] for name in ("slip", "load", "torque"))
+    for name, factor in (("sound", 1.0), ("faulty", np.where(slip > 0.3, 1.6, 1.0))):
+        read = np.broadcast_to(factor, slip.shape) * torque
+        text += [
+            f"{name},{s:.9g},{w:.9g},{t:.9g}" for s, w, t in zip(slip, load, read, strict=True)
+        ]
+    Path("faulty.csv").write_text("\n".join(text) + "\n")
+    rows, said = answers(capsys, str(whole_file), "faulty.csv")
+    assert {name: row["disagrees"] for name, row in rows.items()} == {"sound": "0", "faulty": "1"}
+    assert "run faulty: " in said
+    assert main(["estimate", str(whole_file), "faulty.csv", "--by", "run", "--out", "e.csv"]) == 0
+    assert "disagrees" in Path("e.csv").read_text().splitlines()[0]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from datagen.recipe import SENSOR_COLUMNS
+from datagen.recipe import SENSOR_COLUMNS, parse_recipe
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.config.write_case import case_as_toml
@@ -21,10 +23,18 @@ from soilml.physics.gears.emulated import EmulatedGear
 from soilml.physics.operating_point import COVARIATES
 from soilml.quantities import SHEAR, column
 from soilml.remarks import Remark
-from training.set_posterior.families.recipe_family import MOST_UNKNOWNS
+from training.set_posterior.families.recipe_family import MOST_UNKNOWNS, RecipeFamily
+from training.set_posterior.response_surface import (
+    LEAST_CARRIED,
+    LEAST_DESIGNS,
+    carried_shares,
+    check_equilibria,
+)
 
 #: A file is trained this far beyond the slips of the log, and this factor beyond its loads.
 SLIP_MARGIN, LOAD_FACTOR = 0.05, 1.2
+#: Loads that the soils do not carry are left out until this share of slips and loads is carried.
+CARRIED_CONDITIONS = 0.75
 #: Slips that a file can be trained on.
 LEAST_SLIP, MOST_SLIP = 0.01, 0.95
 #: Runs of synthetic rows: their length, share and what is steady in them, as in the recipe `wheel`.
@@ -210,6 +220,37 @@ def recipe_text(case: Case, driven: DrivenRange, rows: int, seed: int) -> str:
     )
     top = f"rows = {rows}\nseed = {seed}\n\n"
     return f"{top}{case_as_toml(own)}\n{driven.as_toml()}\n{RUNS}"
+
+
+def within_carried_loads(
+    driven: DrivenRange, case: Case, seed: int
+) -> tuple[DrivenRange, list[Remark]]:
+    """The range for which a file can be trained, and a remark where its loads end earlier.
+
+    Soils that carry some of the loads are no obstacle. Where most slips and loads are carried by
+    less than half of the soils of the priors, the heavy loads are left out. Raises `InputError`
+    where the light ones are not carried either.
+    """
+    recipe = json.dumps(tomllib.loads(recipe_text(case, driven, 1, seed)))
+    family = RecipeFamily.of(
+        parse_recipe(recipe, "the recipe of the log"),
+        [name for name in SHEAR if name in case.prior],
+    )
+    designs, shares = carried_shares(family, seed)
+    order = np.argsort(designs[:, 1])
+    loads, carried = designs[order, 1], shares[order] >= LEAST_CARRIED
+    up_to = np.cumsum(carried) / np.arange(1, len(order) + 1)  # share of those up to each load
+    if up_to[-1] >= LEAST_DESIGNS:
+        return driven, []
+    enough = np.flatnonzero((up_to >= CARRIED_CONDITIONS) & (loads > LOAD_FACTOR * driven.load[0]))
+    if enough.size == 0:
+        check_equilibria(family, seed)
+    most = _three_digits(loads[enough[-1]])
+    text = (
+        f"the file is for loads up to {most:g} N of {driven.load[1]:g} N: heavier ones sink to the "
+        "hub on most soils of [soil.prior]; priors of firmer soils would reach further"
+    )
+    return replace(driven, load=(driven.load[0], most)), [Remark("loads-narrowed", text)]
 
 
 def with_fitted_soil(case: Case, fitted: Mapping[str, float]) -> Case:

@@ -38,6 +38,7 @@ from training.adaptation.campaign import (
     untrainable_effects,
     with_fitted_soil,
     with_noise_of_log,
+    within_carried_loads,
 )
 from training.adaptation.judgement import BoardCandidate, Judgement, check_lengths, judge
 from training.adaptation.page import adapt_page
@@ -171,6 +172,9 @@ def adapt(
         if split.kept_back is not None:
             check_lengths(split.kept_back)
         new, remarks = board_unknowns(with_noise_of_log(found.case, table))
+        for one in [new] if split.kept_back is None or against else [new, old]:
+            driven, narrowed = within_carried_loads(driven, one, seed)
+            remarks = [*remarks, *narrowed]
         head = [f"With {' + '.join(found.effects)}. {found.sentence}"]
         write_files({target / ADAPTED_MODEL: case_as_toml(found.case, head)})
         make = partial(make_file, steps, seed=seed, workers=workers, progress=progress)

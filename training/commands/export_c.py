@@ -1,4 +1,4 @@
-"""`soilml export-c`: a model file as C code for a board without Python."""
+"""`soilml export c`: a model file as C code for a board without Python."""
 
 from __future__ import annotations
 

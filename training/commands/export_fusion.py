@@ -1,4 +1,4 @@
-"""`soilml export-fusion`: the fusion of several model files as C code."""
+"""`soilml export fusion`: the fusion of several model files as C code."""
 
 from __future__ import annotations
 

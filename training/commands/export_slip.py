@@ -1,4 +1,4 @@
-"""`soilml export-slip`: the filter of `soilml slip` for the board, as ONNX and as C."""
+"""`soilml export slip`: the filter of `soilml slip` for the board, as ONNX and as C."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`soilml export-step`: one step of a stream as an ONNX file of fixed shapes."""
+"""`soilml export step`: one step of a stream as an ONNX file of fixed shapes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ for compilers that need fixed shapes, such as those of accelerators.
   soilml export step exported/wheel.onnx wheel_step.onnx
 
 docs/reference/onnx.md says how its memory is fed from step to step. Python
-uses MODEL.onnx itself; soilml export-c writes C that needs no library.
+uses MODEL.onnx itself; soilml export c writes C that needs no library.
 """
 MOST_ROWS = 4096  # Rows that one step may take
 

@@ -62,6 +62,13 @@ SET_POSTERIOR = (
     "(`model_error` 0), as it is in the simulation; the file's own answer has errors of the model."
 )
 
+#: How the prior is weighted where its soils do not carry all loads.
+CARRIED = (
+    "Soils of the prior carry the wheel in {:.2%} of the operating conditions. The others take no "
+    "part in the training, and these sets are of soils that carry all their rows: a soil counts by "
+    "the loads that it carries."
+)
+
 
 def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) -> str:
     """The card of a model file as Markdown, from its model, metadata and name."""
@@ -82,6 +89,8 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
     ]
     if trained.set_posterior is not None:
         lines += [SET_POSTERIOR, "", *table_of(trained.set_figures, targets)]
+        if (carried := trained.set_posterior.response.carried) < 1.0:
+            lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
     elif not trained.spec.per_row and trained.pooled_scores:
         lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]

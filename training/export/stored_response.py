@@ -53,6 +53,7 @@ def write_anew(path: Path) -> None:
     limits = MisfitLimits(*(np.asarray(sets["misfit"][key]) for key in ("readings", "most")))
     terms = tuple(tuple(term) for term in sets.get("monomials", ())) or family_terms(family)
     response = read_response(branch, family, sets["error"], terms)
+    response = replace(response, carried=float(sets.get("carried", 1.0)))
     small = bool(sets.get("small", False))
     posterior = SetPosteriorGraph(
         family, response, limits, sets["noise"], small, _scales(sets), _sensor_errors(metadata)

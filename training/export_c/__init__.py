@@ -1,1 +1,1 @@
-"""A model file as C99 code for a board without Python: `soilml export-c`."""
+"""A model file as C99 code for a board without Python: `soilml export c`."""

@@ -56,7 +56,7 @@ def write_fusion(
     """Texts of the C file and of its header.
 
     estimators: Of the files, 2 to `MOST_FILES`, each another one.
-    files: Prefix of the C names of each, as `soilml export-c` writes them.
+    files: Prefix of the C names of each, as `soilml export c` writes them.
     name: Prefix of the C names of the fusion.
 
     Raises `InputError` for files that cannot be fused: of different quantities or priors, or that

@@ -108,9 +108,14 @@ CHANNEL_WEIGHTS = np.asarray([1.0, 0.4, 1.0])
 CONTACT_SHARE, LEAST_CONTACT_DESIGNS, CONTACT_HIDDEN = 8, 512, 32
 #: Designs on which terms are chosen, and points of the unknowns.
 SELECTION_DESIGNS, SELECTION_POINTS = 256, 512
-#: Designs that are simulated to see whether soils of the prior carry the loads, and the share of
-#: them below which they plainly do not.
-CHECKED_DESIGNS, CLEARLY_TOO_FEW = 64, 0.35
+#: Designs that are simulated to see whether soils of the prior carry the loads.
+CHECKED_DESIGNS = 128
+#: A design is learned from if this share of the soils of the prior carry its load: a polynomial
+#: needs points on more than a corner of its range. This share of the designs must be such.
+LEAST_CARRIED, LEAST_DESIGNS = 0.5, 0.5
+#: Weight of a point without equilibrium, where the polynomial continues what is learned from the
+#: others: it settles what these leave open, and does not change what they say.
+CONTINUED_WEIGHT = 0.1
 
 
 @dataclass(frozen=True)
@@ -149,6 +154,8 @@ class Response:
     lower: Floats  # (f,) ends of the features of the designs
     upper: Floats
     error: Floats  # (channels,) rms over held-out designs, on the scales of the responses
+    #: share of the pairs of a design and a soil that have an equilibrium, of which alone it learned
+    carried: float = 1.0
     #: the changes of the channels with another contact, if this is an error of the family's model
     contact: Response | None = None
 
@@ -208,9 +215,10 @@ class Response:
 def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:
     """The response surface of a family, with that of the changes by another contact if it has one.
 
-    Raises `InputError` if fewer than half of the designs carry their load on all soils of the
-    prior.
+    Designs and soils are drawn together: pairs without an equilibrium take no part. Raises
+    `InputError`, before anything is fitted, for loads that most soils of the prior do not carry.
     """
+    check_equilibria(family, settings.seed)
     terms = family_terms(family)
     if 0 < settings.terms < len(terms):
         terms = _most_useful_terms(family, terms, settings)
@@ -223,24 +231,20 @@ def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Prog
     return replace(response, contact=_fit(family, family.contact_changes, terms, smaller, progress))
 
 
+def carried_shares(family: WheelFamily, seed: int) -> tuple[Floats, Floats]:
+    """A few designs (n, d), and the share of the soils of the prior that carry each, (n,)."""
+    designs, x = family.designs(CHECKED_DESIGNS, seed), _points(family, SELECTION_POINTS, seed)
+    return designs, np.isfinite(family.responses(designs, x[None])).all(axis=2).mean(axis=1)
+
+
 def check_equilibria(family: WheelFamily, seed: int) -> None:
-    """Raise what `fit_response` would for loads that soils of the prior do not carry, in seconds.
-
-    A few designs tell; where their share is near the limit, the fit itself decides.
-    """
-    x = _points(family, SELECTION_POINTS, seed)
-    y = family.responses(family.designs(CHECKED_DESIGNS, seed), x[None])
-    feasible = np.asarray(np.isfinite(y).all(axis=(1, 2)))
-    if feasible.mean() < CLEARLY_TOO_FEW:
-        _check_share(feasible)
-
-
-def _check_share(feasible: NDArray[np.bool_]) -> None:
-    if feasible.mean() < 0.5:
+    """Raise `InputError` for loads that most soils of the prior do not carry; takes seconds."""
+    carried = float(np.mean(carried_shares(family, seed)[1] >= LEAST_CARRIED))
+    if carried < LEAST_DESIGNS:
         raise InputError(
-            f"only {feasible.mean():.0%} of the operating conditions have an equilibrium on all "
-            "soils of the prior; needed is half of them: lower the loads, or raise the bearing "
-            "values or the lower ends of their priors"
+            f"{family.described()}: only {carried:.0%} of these slips and loads have an "
+            "equilibrium on half of these soils; needed is half of them: lower the loads, or "
+            "raise the bearing values or the lower ends of their priors"
         )
 
 
@@ -253,7 +257,8 @@ def _most_useful_terms(family: WheelFamily, terms: Terms, settings: ResponseSett
     """So many of these terms as the settings permit, chosen on a few designs."""
     x = _points(family, SELECTION_POINTS, settings.seed)
     y = family.responses(family.designs(SELECTION_DESIGNS, settings.seed), x[None])
-    y = y[np.isfinite(y).all(axis=(1, 2))] * CHANNEL_WEIGHTS
+    carried = np.isfinite(y).all(axis=2).mean(axis=1)
+    y = np.stack([_continued(one, x) for one in y[carried >= LEAST_CARRIED]]) * CHANNEL_WEIGHTS
     return select_terms(x, y.swapaxes(0, 1).reshape(len(x), -1), terms, settings.terms)
 
 
@@ -272,9 +277,9 @@ def _fit(
     x = _points(family, int(POINTS_PER_TERM * len(terms)), settings.seed)
     basis = monomials(x, terms)
     designs = family.designs(settings.designs, settings.seed)
-    coefficients, squared_error, feasible = _fit_polynomials(respond, designs, x, basis, progress)
-    _check_share(feasible)
-    features = family.features(designs[feasible])
+    coefficients, squared_error, carried = _fit_polynomials(respond, designs, x, basis, progress)
+    used = carried.mean(axis=1) >= LEAST_CARRIED
+    features = family.features(designs[used])
     # the error of a coefficient counts by the rms of its monomial
     error_weights = np.sqrt(np.mean(basis**2, axis=0))[:, None] * CHANNEL_WEIGHTS
     response = _train_network(
@@ -282,10 +287,11 @@ def _fit(
     )
     held_out = slice(0, int(HELD_OUT * len(features)))
     network_error = basis @ (response.coefficients(features[held_out]) - coefficients[held_out])
+    network_error = network_error[carried[used][held_out]]
     # residuals of a least-squares fit are too small by the degrees of freedom of the fit
     fit_error = squared_error[held_out] * len(x) / (len(x) - len(terms))
-    error = np.sqrt(np.mean(network_error**2, axis=(0, 1)) + fit_error.mean(axis=0))
-    return replace(response, error=error)
+    error = np.sqrt(np.mean(network_error**2, axis=0) + fit_error.mean(axis=0))
+    return replace(response, error=error, carried=float(carried.mean()))
 
 
 def _fit_polynomials(
@@ -297,8 +303,8 @@ def _fit_polynomials(
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """Least-squares polynomials of designs at points x (m, p), whose monomials are the basis.
 
-    Coefficients (feasible, terms, channels), mean squared residuals (feasible, channels), and which
-    designs (n,) are feasible: those with an equilibrium at all points.
+    Coefficients (used, terms, channels), mean squared residuals (used, channels), of the designs
+    that are learned from; and which points carry each design, (n, m).
     """
     fit = partial(_fit_some, respond, x, basis, np.asarray(np.linalg.pinv(basis)))
     parts = [
@@ -311,8 +317,8 @@ def _fit_polynomials(
             progress("simulating", done * SIMULATED_AT_A_TIME, len(designs))
             found.append(result)
     progress("simulating", len(designs), len(designs))
-    coefficients, squared_error, feasible = zip(*found, strict=True)
-    return (np.concatenate(coefficients), np.concatenate(squared_error), np.concatenate(feasible))
+    coefficients, squared_error, carried = zip(*found, strict=True)
+    return (np.concatenate(coefficients), np.concatenate(squared_error), np.concatenate(carried))
 
 
 def _fit_some(
@@ -324,9 +330,31 @@ def _fit_some(
 ) -> tuple[Floats, Floats, NDArray[np.bool_]]:
     """The result of `_fit_polynomials` for some of the designs, in one worker."""
     y = respond(designs, x[None])
-    finite = np.asarray(np.isfinite(y).all(axis=(1, 2)))
-    a = (y[finite].swapaxes(1, 2) @ pseudo_inverse.T).swapaxes(1, 2)
-    return a, np.mean((basis @ a - y[finite]) ** 2, axis=1), finite
+    carried = np.asarray(np.isfinite(y).all(axis=2))
+    whole = np.asarray(carried.all(axis=1))
+    used = carried.mean(axis=1) >= LEAST_CARRIED
+    y = y[used]
+    a = np.empty((len(y), basis.shape[1], y.shape[2]))
+    a[whole[used]] = (y[whole[used]].swapaxes(1, 2) @ pseudo_inverse.T).swapaxes(1, 2)
+    for i in np.flatnonzero(~whole[used]):
+        weight = np.where(np.isfinite(y[i]).all(axis=1), 1.0, CONTINUED_WEIGHT)[:, None]
+        a[i] = np.linalg.lstsq(weight * basis, weight * _continued(y[i], x), rcond=None)[0]
+    squared = np.where(carried[used][:, :, None], (basis @ a - y) ** 2, np.nan)
+    return a, np.nanmean(squared, axis=1), carried
+
+
+def _continued(y: Floats, x: Floats) -> Floats:
+    """Channels (m, channels) of a design, continued linearly to points x without an equilibrium.
+
+    The values stay between the least and the largest of the other points.
+    """
+    carried = np.asarray(np.isfinite(y).all(axis=1))
+    if carried.all():
+        return y
+    basis = np.concatenate([np.ones_like(x[:, :1]), x], axis=1)
+    found = np.linalg.lstsq(basis[carried], y[carried], rcond=None)[0]
+    ends = y[carried].min(axis=0), y[carried].max(axis=0)
+    return np.where(carried[:, None], y, np.clip(basis @ found, *ends))
 
 
 def _points(family: WheelFamily, count: int, seed: int) -> Floats:

@@ -203,6 +203,7 @@ def metadata_of(posterior: SetPosteriorGraph, sets_only: bool) -> dict[str, Any]
             "readings": posterior.limits.readings.tolist(),
             "most": posterior.limits.misfit.tolist(),
         },
+        **({"carried": posterior.response.carried} if posterior.response.carried < 1.0 else {}),
         **({"small": True, "monomials": posterior.response.terms} if posterior.small else {}),
         **posterior.family.metadata(),
     }

@@ -261,6 +261,7 @@ class SoilLogic:
             "rows_in_question": float(state.rows_in_question),
             "drifting": float(state.drifting),
             "in_range": float(found.in_range),
+            "disagrees": float(found.disagrees),
         }
         values |= {} if row is None else {f"row_{name}": value for name, value in row.items()}
         parts = zip(found.names, found.mean, found.std, found.low, found.high, strict=True)
@@ -275,6 +276,9 @@ class SoilLogic:
             text = "out of range, or inconsistent"
         else:
             text = f"not determined yet: {', '.join(vague)}" if vague else "all determined"
+        if found.in_range and found.disagrees:
+            text += "; the rows fit no exact model: check units, sensors and wheel"
+        doubt = doubt or bool(found.disagrees)
         sound = bool(found.in_range) and state.rows_remembered > 0 and not doubt
         level = Level.OK if sound else Level.WARN
         return SoilReport(level, f"{text}; {state.words}", values, stamp)

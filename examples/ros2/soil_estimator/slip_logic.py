@@ -16,7 +16,7 @@ from soilml.onboard.slip_stream import SlipStream
 
 #: Parameters of the node, all but the last ones needed.
 PARAMETERS = {
-    "model": "path of a file of soilml export-slip",
+    "model": "path of a file of soilml export slip",
     "joints": "names of the wheels' joints in joint_states, in the order of the file's wheels",
     "wheel_radius": "radius of the wheels, m",
     "joint_signs": "1.0 or -1.0 for each joint: whether its velocity is positive forward",

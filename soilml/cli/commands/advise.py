@@ -1,4 +1,4 @@
-"""`soilml advise`: which measurement to make next."""
+"""`soilml plan next`: which measurement to make next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`soilml audit`: effects that a rig and an experimental design could identify."""
+"""`soilml plan effects`: effects that a rig and an experimental design could identify."""
 
 from __future__ import annotations
 

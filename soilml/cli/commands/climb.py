@@ -1,4 +1,4 @@
-"""`soilml climb`: the slope that a rover can climb, from its first climbs of gentle slopes."""
+"""`soilml paper climb`: the slope that a rover can climb, from climbs of gentle ones."""
 
 from __future__ import annotations
 

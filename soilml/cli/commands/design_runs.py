@@ -1,4 +1,4 @@
-"""`soilml design-runs`: the runs of another simulator that stand in for the equations."""
+"""`soilml plan runs`: the runs of another simulator that stand in for the equations."""
 
 from __future__ import annotations
 

@@ -61,8 +61,10 @@ of a run is the prior where they are more than half of its rows, and widened as
 far as the misfit says where no soil explains the others. The interval includes
 errors of the model of wheel and soil, whose size follows from the residuals of
 the run. --exact-model leaves them out, for a model that was checked on a known
-soil; a [discrepancy] or [remainder] of --case takes their place. A row with a
-blank reading, or whose status is not ok, gets a blank estimate. Slip differs
+soil; a [discrepancy] or [remainder] of --case takes their place. With a file of
+a set posterior, disagrees is 1 where the rows of a run fit no exact model, as
+those of one sound run in a hundred: check units, sensors and wheel. A row with
+a blank reading, or whose status is not ok, gets a blank estimate. Slip differs
 from row to row and has no --by.
 
 --with fuses, row by row, model files that estimate the same parameters from
@@ -354,6 +356,8 @@ def _group_estimates(
     for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values[index], np.nan)
     columns["in_range"] = answered & estimate.in_range[index]
+    if estimator.sets is not None:
+        columns["disagrees"] = answered & estimate.disagrees[index].astype(bool)
     remarks = table_estimates.channel_remarks(
         estimator, table_estimates.joint_readings(estimator, table.rows(usable))
     )

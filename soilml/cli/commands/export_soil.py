@@ -1,4 +1,4 @@
-"""`soilml export-soil`: soil parameters for other simulators."""
+"""`soilml export soil`: soil parameters for other simulators."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`soilml papers`: every printed number of the source papers compared with the computed one."""
+"""`soilml paper numbers`: printed numbers of the source papers beside computed ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`soilml sensor-wheel`: shear modulus and drawbar pull from the stress on the rim of a wheel."""
+"""`soilml paper sensor-wheel`: shear modulus and drawbar pull from the stress on a rim."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ included. The reference is the run of least slope. One k_x serves up to a slip
 of about 0.5. pull_on_slope_N is the pull that the slope requires. --diameter
 removes what a round sensor averages over its disc (0.0095 m in the source):
 uncorrected, the arc appears longer and k_x too large. A whole rover with two
-such wheels: soilml climb.
+such wheels: soilml paper climb.
 """
 #: Ratio of true to measured stress, or its inverse, that no loss of sensors explains.
 MOST_MAGNIFICATION = 30.0

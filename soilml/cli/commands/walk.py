@@ -1,4 +1,4 @@
-"""`soilml walk`: a wheel-leg walking over soft ground, by resistive-force theory."""
+"""`soilml paper walk`: a wheel-leg walking over soft ground, by resistive-force theory."""
 
 from __future__ import annotations
 

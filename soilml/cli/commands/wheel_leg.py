@@ -1,4 +1,4 @@
-"""`soilml wheel-leg`: the soil from torque, vibration and sinkage of a wheel-leg's strides."""
+"""`soilml paper wheel-leg`: the soil from torque, vibration and sinkage of strides."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ STRIDES.csv is then passed on as slip_measured.
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque. --sinkage-model
-walks fits those of the sinkage to simulated walks (soilml walk), which the
+walks fits those of the sinkage to simulated walks (soilml paper walk), which the
 printed ones do not agree with.
 """
 QUANTITIES = ("friction_angle_rad", "normal_stiffness_Pa")

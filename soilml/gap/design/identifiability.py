@@ -78,7 +78,7 @@ class Audit:
         return plot_audit(self, ax)
 
     def as_json(self) -> dict[str, Any]:
-        """The content of the file that `soilml audit --out` writes."""
+        """The content of the file that `soilml plan effects --out` writes."""
         effects = [as_json_entry(e) | {"nameable": e.nameable} for e in self.effects]
         content: dict[str, Any] = as_json_entry(self)
         return content | {"effects": effects}

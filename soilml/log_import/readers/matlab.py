@@ -134,7 +134,7 @@ def _hdf5_leaves(path: Path) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     except ImportError:
         raise InputError(
             f"{path} is an HDF5 file, as MATLAB 7.3 writes them, which needs h5py: pip install "
-            "'soilml[logs]'; or save it in MATLAB with save(..., '-v7')"
+            "'.[logs]'; or save it in MATLAB with save(..., '-v7')"
         ) from None
     leaves: list[tuple[str, Any]] = []
     about: list[str] = []

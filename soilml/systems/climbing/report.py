@@ -1,4 +1,4 @@
-"""From measured climbs to climbing ability: the report of `soilml climb`."""
+"""From measured climbs to climbing ability: the report of `soilml paper climb`."""
 
 from __future__ import annotations
 
@@ -131,7 +131,7 @@ class ClimbingReport:
         return np.asarray(axes)
 
     def as_json(self) -> dict[str, Any]:
-        """The content of the file that `soilml climb` writes."""
+        """The content of the file that `soilml paper climb` writes."""
         fit = self.ground.fit.as_json()
         fit["given"] = {
             name: float(self.ground.samples[0, i])

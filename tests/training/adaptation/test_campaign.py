@@ -8,12 +8,14 @@ from conftest import MODEL
 
 from datagen.recipe import read_recipe
 from soilml import SlipSinkage, read_case
+from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
 from training.adaptation.campaign import (
     DrivenRange,
     recipe_text,
     split_runs,
+    within_carried_loads,
 )
 from training.set_posterior.families.recipe_family import RecipeFamily
 
@@ -59,3 +61,15 @@ def test_the_recipe_is_read_back_and_suits_a_set_posterior(case, tmp_path):
     assert recipe.case.prior == prior and recipe.case.model == model
     family = RecipeFamily.of(recipe, ("cohesion", "friction_angle", "shear_modulus"))
     assert len(family.axes) == 4
+
+
+def test_loads_end_where_most_soils_carry_no_more(case):
+    driven = DrivenRange.of(log(), case)
+    assert within_carried_loads(driven, case, 0) == (driven, [])
+    soft = replace(case, prior=case.prior | {"kphi": Prior(4e3, 1e5, log=True)})
+    narrowed, (remark,) = within_carried_loads(driven, soft, 0)
+    assert driven.load[0] == narrowed.load[0] < narrowed.load[1] < driven.load[1]
+    assert within_carried_loads(narrowed, soft, 0) == (narrowed, [])
+    assert f"up to {narrowed.load[1]:g} N" in remark.text
+    with pytest.raises(InputError, match=r"load_N 300 to 900.*kphi 4000 to 100000"):
+        within_carried_loads(replace(driven, load=(300.0, 900.0)), soft, 0)

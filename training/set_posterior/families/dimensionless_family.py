@@ -271,3 +271,8 @@ class DimensionlessFamily:
             "ground_pressure": list(self.pressure),
             "bearing_std": [0.0, MOST_BEARING_STD],
         }
+
+    def described(self) -> str:
+        """See `WheelFamily`."""
+        said = (f"{name} {own.lower:g} to {own.upper:g}" for name, own in self.ranges.items())
+        return f"[any_wheel] {', '.join(said)}"

@@ -49,6 +49,7 @@ SHARE_ALL_CHANNELS = 0.3
 #: Up to this many unknowns all terms have a degree of up to four; beyond, those of the estimated
 #: unknowns alone.
 FEW_UNKNOWNS = 4
+MOST_ROUNDS = 32  # Rounds in which simulated sets are drawn that their soils carry
 LEAST_SHARE = 0.2  # Least relative noise in the scale of torque where its noise is constant
 #: Without a logarithm, a torque is used whatever its noise; that of an absent reading is larger.
 ANY_NOISE = 1e5
@@ -197,14 +198,7 @@ class RecipeFamily:
     def sets(self, count: int, rows: int, seed: int) -> SimulatedSets:
         """See `WheelFamily`; the noise is the recipe's, and channels without noise are absent."""
         rng = np.random.default_rng((seed, rows))
-        slip = self.recipe.slip.at(run_patterns(count, rows, rng))
-        load = self.recipe.load.at(run_patterns(count, rows, rng))
-        x = np.stack([axis.quantile(rng.random(count)) for axis in self.axes], axis=1)
-        y = self.responses(
-            np.stack([slip, load], axis=-1).reshape(-1, 2), np.repeat(x, rows, axis=0)[:, None]
-        ).reshape(count, rows, 3)
-        feasible = np.isfinite(y).all(axis=(1, 2))
-        slip, load, y, x = slip[feasible], load[feasible], y[feasible], x[feasible]
+        slip, load, y, x = self._carried_sets(count, rows, rng)
         asinh_torque = 2.0 * self.linear_torque * np.sinh(y[..., 0])
         torque = asinh_torque if self.linear_torque else np.exp(y[..., 0]) * load
         values = (torque, np.exp(y[..., 1]), y[..., 2] * load)
@@ -230,6 +224,28 @@ class RecipeFamily:
         )
         return SimulatedSets(readings, {}, np.stack(truth, axis=1), origin)
 
+    def _carried_sets(
+        self, count: int, rows: int, rng: np.random.Generator
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Slip and load (count, rows), responses and soils of sets whose soil carries all rows.
+
+        Those that it does not carry are drawn anew; after many rounds there may be fewer.
+        """
+        found: list[tuple[Floats, Floats, Floats, Floats]] = []
+        for _ in range(MOST_ROUNDS):
+            slip = self.recipe.slip.at(run_patterns(count, rows, rng))
+            load = self.recipe.load.at(run_patterns(count, rows, rng))
+            x = np.stack([axis.quantile(rng.random(count)) for axis in self.axes], axis=1)
+            y = self.responses(
+                np.stack([slip, load], axis=-1).reshape(-1, 2), np.repeat(x, rows, axis=0)[:, None]
+            ).reshape(count, rows, 3)
+            carried = np.isfinite(y).all(axis=(1, 2))
+            found.append((slip[carried], load[carried], y[carried], x[carried]))
+            if sum(len(one[3]) for one in found) >= count:
+                break
+        slip, load, y, x = (np.concatenate(part)[:count] for part in zip(*found, strict=True))
+        return slip, load, y, x
+
     def _noise(self, bias: Noise, shape: tuple[int, ...]) -> dict[str, tuple[Floats, Floats]]:
         """Noise as in `Origin`, of the channels that the recipe has noise for, and of the bias."""
         named = {name: self.recipe.case.noise.get(column(name)) for name in RESPONSE_CHANNELS}
@@ -253,3 +269,12 @@ class RecipeFamily:
             "slip": [self.recipe.slip.lower, self.recipe.slip.upper],
             "load": [self.recipe.load.lower, self.recipe.load.upper],
         }
+
+    def described(self) -> str:
+        """See `WheelFamily`."""
+        operating = {"slip": self.recipe.slip, "load_N": self.recipe.load}
+        said = [
+            ", ".join(f"{name} {own.lower:g} to {own.upper:g}" for name, own in part.items())
+            for part in (operating, self.recipe.case.prior)
+        ]
+        return f"{said[0]}, and [soil.prior] {said[1]}"

@@ -209,6 +209,10 @@ class WheelFamily(Protocol):
         """Ranges and axes, for the file and its card."""
         ...
 
+    def described(self) -> str:
+        """Slips, loads and soils as a user wrote them, for messages."""
+        ...
+
 
 def run_patterns(count: int, rows: int, rng: np.random.Generator) -> Floats:
     """Random fractions of the range (count, rows).
