@@ -26,7 +26,7 @@ def audited(folder, text=None, model=MODEL, *options):
     (folder / "model.toml").write_text(model)
     (folder / "design.csv").write_text(text or design())
     command = ["audit", str(folder / "model.toml"), str(folder / "design.csv")]
-    assert main([*command, "--out", str(folder / "audit.json"), *options]) == 0
+    assert main([*command, "-v", "--out", str(folder / "audit.json"), *options]) == 0
     return json.loads((folder / "audit.json").read_text())
 
 
@@ -137,7 +137,8 @@ def test_no_reading_is_looked_at_and_people_are_told_what_could_be_named(usual, 
     found = audited(tmp_path, text)
     assert found == usual
     said = capsys.readouterr().out
-    assert said.splitlines()[0].split()[:2] == ["effect", "nameable"]
+    assert said.startswith("These runs could name ")
+    assert said.splitlines()[2].split()[:2] == ["effect", "nameable"]
     for name, e in by_name(found).items():
         (line,) = [line for line in said.splitlines() if line.split()[:1] == [name]]
         assert line.split()[1] == ("yes" if e["nameable"] else "no")

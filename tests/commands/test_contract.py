@@ -172,13 +172,13 @@ def test_soils_and_effects_list_their_catalogues(capsys):
         "compare",
         "soils",
         "effects",
-        "climb",
+        "paper climb",
         "pull",
-        "advise",
+        "plan next",
     ],
 )
 def test_help_teaches_with_an_example(command, capsys):
-    assert main([command, "--help"]) == 0
+    assert main([*command.split(), "--help"]) == 0
     assert f"soilml {command}" in capsys.readouterr().out.split("positional")[0]
 
 
