@@ -12,7 +12,7 @@ TYPE_CHECKING = False  # typing takes longer to import than all this; type check
 if TYPE_CHECKING:
     from typing import Any
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 
 #: public name -> the module that defines it; effects of the catalogue come in addition
 _HOME = {
