@@ -63,7 +63,8 @@ class Whitening:
         white = (self.noise * values.T).T if independent else self.noise @ values
         if not self.basis.shape[1]:
             return np.asarray(white)
-        return np.asarray(white - (self.basis * self.shrinkage) @ (self.basis.T @ white))
+        shrunk = (self.shrinkage * (self.basis.T @ white).T).T
+        return np.asarray(white - self.basis @ shrunk)
 
 
 def squared_residuals_and_log_determinant(
