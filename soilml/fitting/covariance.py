@@ -35,13 +35,13 @@ class Whitening:
 
     .. math:: W = (I - Q S Q^T) W_0, \quad S = \operatorname{diag}(s)
 
-    `noise` is :math:`W_0`: a matrix (m, m), dense or sparse, or the inverse standard deviations
-    (m,) of independent noise. Many of these share it, so that each takes m q numbers of memory in
-    place of m^2. `whitening @ x` multiplies arrays (m,) and (m, k).
+    `noise` is :math:`W_0`: a matrix (m, m), dense or sparse, the inverse standard deviations (m,)
+    of independent noise, or another `Whitening`. Many of these share it, so that each
+    takes m q numbers of memory in place of m^2. `whitening @ x` multiplies arrays (m,) and (m, k).
     """
 
     noise: Any
-    basis: Floats  # (m, q), with orthonormal columns
+    basis: Any  # (m, q), dense or sparse, with orthonormal columns
     shrinkage: Floats  # (q,)
 
     @staticmethod
@@ -63,7 +63,8 @@ class Whitening:
         white = (self.noise * values.T).T if independent else self.noise @ values
         if not self.basis.shape[1]:
             return np.asarray(white)
-        return np.asarray(white - (self.basis * self.shrinkage) @ (self.basis.T @ white))
+        shrunk = (self.shrinkage * (self.basis.T @ white).T).T
+        return np.asarray(white - self.basis @ shrunk)
 
 
 def squared_residuals_and_log_determinant(

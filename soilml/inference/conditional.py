@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from soilml.arrays import Floats
+from soilml.arrays import Floats, Integers
 from soilml.inference.evidence import LinearisedFit
 from soilml.inference.gaussian_terms import Hyperparameters
 
@@ -15,25 +16,60 @@ from soilml.inference.gaussian_terms import Hyperparameters
 class Conditional:
     """Weights of columns and changes of coordinates, given readings: mean and covariance.
 
-    columns (m, k): What one standard deviation a priori of each changes.
+    columns (m, k): What one standard deviation a priori of each changes, scatter apart.
+    mean (k,), covariance (k, k): Of these.
+    scatter (m, s): What one standard deviation of scatter of its own run changes of each reading.
+    run (m,): Run of each reading.
+    weights (R, s), root (R, s, s), back (R, s, k): Of scatter; see `Eliminated`.
     noise (m,): Standard deviation of the noise.
     """
 
     columns: Floats
     mean: Floats
     covariance: Floats
+    scatter: Floats
+    run: Integers
+    weights: Floats
+    root: Floats
+    back: Floats
     noise: Floats
 
     @property
     def variance(self) -> Floats:
         """Variance (m,) of a reading that is left out."""
-        spread = np.einsum("ij,jk,ik->i", self.columns, self.covariance, self.columns)
-        return np.asarray(self.noise**2 + spread)
+        return np.asarray(self.noise**2 + self.spread(self.scatter, self.columns))
 
     @property
     def expected(self) -> Floats:
         """Expected residual (m,) of a reading that is left out."""
-        return np.asarray(self.columns @ self.mean)
+        expected = self.columns @ self.mean
+        if len(self.weights):
+            expected = expected + (self.scatter * self.weights[self.run]).sum(axis=1)
+        return np.asarray(expected)
+
+    def spread(self, scatter: Floats, columns: Floats) -> Floats:
+        """Variance (m,) by weights and coordinates of combinations (m, s) and (m, k) of them.
+
+        The scatter of each combination is that of the run of the reading.
+        """
+        own, rest = self._roots(scatter, columns, self.run)
+        return np.asarray((own**2).sum(axis=1) + (rest**2).sum(axis=1))
+
+    def joint(self, own: NDArray[np.bool_]) -> Floats:
+        """Covariance (k, k) of k readings that are left out, with independent noise."""
+        run = self.run[own]
+        scatter, rest = self._roots(self.scatter[own], self.columns[own], run)
+        same = (run[:, None] == run) * (scatter @ scatter.T)
+        return np.asarray(np.diag(self.noise[own] ** 2) + same + rest @ rest.T)
+
+    def _roots(self, scatter: Floats, columns: Floats, run: Integers) -> tuple[Floats, Floats]:
+        """Combinations in independent unit variances: of the scatter of a run, and of the rest."""
+        factor = np.linalg.cholesky(self.covariance)
+        if not len(self.root):
+            return np.zeros_like(scatter), columns @ factor
+        own = np.einsum("ijk,ik->ij", self.root[run], scatter)
+        rest = columns - np.einsum("ij,ijk->ik", scatter, self.back[run])
+        return own, rest @ factor
 
 
 def conditional(model: LinearisedFit, at: Hyperparameters) -> Conditional:
@@ -46,22 +82,27 @@ def conditional(model: LinearisedFit, at: Hyperparameters) -> Conditional:
     independent there.
     """
     terms, p = model.terms, len(model.x)
-    gram, _, _ = model.products(at.autocorrelation)
-    variance, q = terms.variance(at), gram.shape[1] - p - 1
-    used = np.flatnonzero(variance > 0.0)
-    take = np.concatenate([used, np.arange(q, q + p + 1)])
-    weight = np.exp(-2.0 * at.log[terms.groups :])
-    total = np.einsum("c,cij->ij", weight, gram[:, take[:, None], take])
-    scale = np.concatenate([np.sqrt(variance[used]), np.ones(p)])
-    matrix = scale[:, None] * total[:-1, :-1] * scale
+    used, _, found = model.eliminated(at)
     k = len(used)
+    scale = np.concatenate([np.sqrt(terms.variance(at)[used]), np.ones(p)])
+    matrix = scale[:, None] * found.left[:-1, :-1] * scale
     matrix[np.arange(k), np.arange(k)] += 1.0
     matrix[k:, k:] += np.diag(model.precision) + model.information
-    b = scale * total[:-1, -1]
+    b = scale * found.left[:-1, -1]
     b[k:] -= model.pull
     covariance = np.linalg.inv(matrix)
-    columns = np.column_stack([terms.columns[:, used], model.jacobian]) * scale
-    return Conditional(columns, covariance @ b, covariance, terms.noise_std(at))
+    mean = covariance @ b
+    return Conditional(
+        columns=np.column_stack([terms.columns[:, used], model.jacobian]) * scale,
+        mean=mean,
+        covariance=covariance,
+        scatter=terms.scatter_change * found.std,
+        run=terms.run,
+        weights=found.weights(np.append(-scale * mean, 1.0)),
+        root=found.root,
+        back=found.back[:, :, :-1] * scale,
+        noise=terms.noise_std(at),
+    )
 
 
 def leave_one_out(model: LinearisedFit, at: Hyperparameters) -> tuple[Floats, Floats]:
@@ -74,17 +115,17 @@ def leave_one_out(model: LinearisedFit, at: Hyperparameters) -> tuple[Floats, Fl
     found = conditional(model, at)
     noise = model.terms.whitened(at.autocorrelation, ~model.outliers).noise
     scale = model.terms.noise_scale(at)[model.terms.readings.channel]
-    white = noise[:, None] * found.columns if noise.ndim == 1 else noise @ found.columns
-    white = white / scale[:, None]
-    left = model.residual - found.columns @ found.mean
-    own = noise * left if noise.ndim == 1 else noise @ left
-    own = own / scale
-    back = noise * own if noise.ndim == 1 else noise.T @ own
-    root = np.linalg.cholesky(found.covariance)
-    inner = noise[:, None] * white if noise.ndim == 1 else noise.T @ white
-    diagonal = noise**2 if noise.ndim == 1 else np.asarray((noise.multiply(noise)).sum(axis=0))
-    weighted = back / scale
-    diagonal = diagonal / scale**2 - (((inner / scale[:, None]) @ root) ** 2).sum(axis=1)
+    left = model.residual - found.expected
+    every = np.column_stack([left, found.scatter, found.columns]) / scale[:, None]
+    if noise.ndim == 1:
+        back = noise[:, None] ** 2 * every
+        diagonal = noise**2
+    else:
+        back = noise.T @ (noise @ every)
+        diagonal = np.asarray((noise.multiply(noise)).sum(axis=0))
+    back = back / scale[:, None]
+    s = found.scatter.shape[1]
+    diagonal = diagonal / scale**2 - found.spread(back[:, 1 : 1 + s], back[:, 1 + s :])
     kept = ~model.outliers
     variance = np.where(kept, 1.0 / np.maximum(diagonal, 1e-300), found.variance)
-    return np.where(kept, weighted * variance, left), variance
+    return np.where(kept, back[:, 0] * variance, left), variance

@@ -30,7 +30,12 @@ from soilml.arrays import Floats, Integers
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.least_squares import Solution
 from soilml.inference import constants
-from soilml.inference.gaussian_terms import DISCREPANCY, GaussianTerms, Hyperparameters
+from soilml.inference.gaussian_terms import (
+    DISCREPANCY,
+    SCATTER,
+    GaussianTerms,
+    Hyperparameters,
+)
 from soilml.inference.priors import (
     AT_BOUND,
     LOG_2PI,
@@ -38,6 +43,7 @@ from soilml.inference.priors import (
     correction_of_prior,
     prior_of_hyperparameters,
 )
+from soilml.inference.scatter_elimination import Eliminated, Products
 from soilml.numerics.prior import UNIFORM_PRECISION
 
 Booleans = NDArray[np.bool_]
@@ -59,8 +65,8 @@ class Evaluation:
     covariance: Floats  # (p, p) of the coordinates, as if none were at a bound
     step: Floats  # (p,) to the optimum under these hyperparameters
     push: Floats  # (p,) gradient of ln p of the coordinates at a bound
-    weights: Floats  # (used,) mean weights of the columns
-    used: Integers  # (used,) numbers of the columns that have a variance
+    weights: Floats  # (used,) mean weights of the columns, those of scatter apart
+    used: Integers  # (used,) numbers of these columns: those that have a variance
 
 
 @dataclass(frozen=True)
@@ -103,48 +109,56 @@ class LinearisedFit:
     constant: Floats
     information: Floats
     cost: float
-    _products: dict[float, tuple[Floats, Floats, float]] = field(default_factory=dict)
-    _taken: dict[tuple[float, bytes], tuple[Floats, Floats, float]] = field(default_factory=dict)
+    _products: dict[float, Products] = field(default_factory=dict)
+    _taken: dict[tuple[float, bytes], Products] = field(default_factory=dict)
 
     def without(self, outliers: Booleans) -> LinearisedFit:
         """The same model of other readings."""
         return replace(self, outliers=outliers, _products={}, _taken={})
 
-    def products(self, autocorrelation: float) -> tuple[Floats, Floats, float]:
-        """Gram matrices (channels, q + p + 1, ...) of [U, J, r]; counts; ln|V_e| at scale 1."""
+    def products(self, autocorrelation: float) -> Products:
+        """Products of the whitened scatter, and of [U, J, r] with the other columns U."""
         if autocorrelation not in self._products:
             white = self.terms.whitened(autocorrelation, ~self.outliers)
             own = np.column_stack([self.jacobian, self.residual])
             own = white.noise[:, None] * own if white.noise.ndim == 1 else white.noise @ own
-            q, k = white.columns.shape[1], own.shape[1]
-            gram = np.zeros((self.terms.channels, q + k, q + k))
-            for c in range(self.terms.channels):
-                of = self.terms.readings.channel == c
-                gram[c, :q, :q] = white.gram[c]
-                gram[c, :q, q:] = white.columns[of].T @ own[of]
-                gram[c, q:, :q] = gram[c, :q, q:].T
-                gram[c, q:, q:] = own[of].T @ own[of]
-            self._products[autocorrelation] = gram, white.counts, white.log_determinant
+            self._products[autocorrelation] = white.products_with(self.terms, own)
         return self._products[autocorrelation]
 
-    def _ordered(
-        self, autocorrelation: float, used: Integers, order: Integers
-    ) -> tuple[Floats, Floats, float]:
-        """Gram matrices of the used columns and of [J, r] in an order; see `products`."""
-        key = autocorrelation, used.tobytes()
+    def _ordered(self, autocorrelation: float, used: Integers, order: Integers) -> Products:
+        """Products of the used columns and of [J, r] in an order; see `products`."""
+        key = autocorrelation, used.tobytes() + order.tobytes()
         if key not in self._taken:
-            gram, counts, log_determinant = self.products(autocorrelation)
-            p = len(self.x)
-            q = gram.shape[1] - p - 1
-            take = np.concatenate([used, q + order, [q + p]])
-            self._taken[key] = gram[:, take[:, None], take], counts, log_determinant
+            found = self.products(autocorrelation)
+            p = self.jacobian.shape[1]
+            q = found.others.shape[1] - p - 1
+            self._taken[key] = found.taken(np.concatenate([used, q + order, [q + p]]))
         return self._taken[key]
+
+    def eliminated(
+        self, at: Hyperparameters, order: Integers | None = None
+    ) -> tuple[Integers, Products, Eliminated]:
+        """Numbers of the used columns without scatter, products of [U, J, r], and what is left.
+
+        order (p,): Of the coordinates; as they are by default.
+        """
+        terms = self.terms
+        used = np.flatnonzero(terms.variance(at)[terms.without_scatter] > 0.0)
+        order = np.arange(self.jacobian.shape[1]) if order is None else order
+        found = self._ordered(at.autocorrelation, used, order)
+        left = found.eliminated(np.exp(-2.0 * at.log[terms.groups :]), terms.scatter_std(at))
+        return terms.without_scatter[used], found, left
 
     def evaluate(self, at: Hyperparameters) -> Evaluation:
         """The model at some hyperparameters."""
         _, _, found = self._evaluated(at, in_full=True)
         assert found is not None
         return found
+
+    def value_and_gradient(self, at: Hyperparameters) -> tuple[float, Floats]:
+        """The value of `evaluate` and its gradient in the logarithms of the hyperparameters."""
+        value, gradient, _ = self._evaluated(at, in_full=False)
+        return value, gradient
 
     def _evaluated(
         self, at: Hyperparameters, *, in_full: bool
@@ -154,56 +168,73 @@ class LinearisedFit:
         In one Cholesky factor, coordinates at a bound stand after the others: the solution of the
         first ones leaves them where they are, and the determinant has all.
         """
-        from scipy.linalg import solve_triangular
+        from scipy.linalg.lapack import dtrtri
 
         terms, p, first = self.terms, len(self.x), self.terms.groups
-        variance = terms.variance(at)
-        used = np.flatnonzero(variance > 0.0)
         order = np.concatenate([np.flatnonzero(~self.held), np.flatnonzero(self.held)])
-        gram, counts, log_determinant = self._ordered(at.autocorrelation, used, order)
-        weight = np.exp(-2.0 * at.log[first:])
-        total = np.tensordot(weight, gram, axes=1)
-        k = len(used)
+        used, products, scatter = self.eliminated(at, order)
+        total, counts, k = scatter.left, products.counts, len(used)
         free = k + int(np.count_nonzero(~self.held))
-        scale = np.concatenate([np.sqrt(variance[used]), np.ones(p)])
+        scale = np.concatenate([np.sqrt(terms.variance(at)[used]), np.ones(p)])
         matrix = scale[:, None] * total[:-1, :-1] * scale
         matrix[np.arange(k), np.arange(k)] += 1.0
         matrix[k:, k:] += (np.diag(self.precision) + self.information)[np.ix_(order, order)]
         b = scale * total[:-1, -1]
         b[k:] -= self.pull[order]
         factor = np.linalg.cholesky(matrix)
-        half = solve_triangular(factor[:free, :free], b[:free], lower=True)
+        root, _ = dtrtri(factor, lower=1)
+        half = root[:free, :free] @ b[:free]
         beta = np.zeros(len(scale))
-        beta[:free] = solve_triangular(factor[:free, :free].T, half, lower=False)
+        beta[:free] = half @ root[:free, :free]
         prior, gradient, curvature = prior_of_hyperparameters(terms, at)
         value = float(
             total[-1, -1]
             - half @ half
             + 2.0 * np.log(np.diag(factor)).sum()
-            + log_determinant
+            + scatter.log_determinant
+            + products.log_determinant
             + 2.0 * counts @ at.log[first:]
             - p * LOG_2PI
             + self.cost
             + self.constant.sum()
             + prior
         )
-        root = solve_triangular(factor, np.eye(len(matrix)), lower=True)
         inverse = root.T @ root
         of_terms = terms.group[used] >= 0
         change = 2.0 * (1.0 - np.diag(inverse)[:k] - beta[:k] ** 2)
         np.add.at(gradient, terms.group[used][of_terms], change[of_terms])
+        # scatter: the inverse is D^-1 + G G^T within runs, and -G root beside the others
         left = np.append(-scale * beta, 1.0)
-        spread = scale[:, None] * inverse * scale
-        squares = weight * ((gram @ left) @ left)
-        degrees = weight * np.tensordot(gram[:, :-1, :-1], spread, axes=2)
+        tau, weights = scatter.std, scatter.weights(left)
+        alone = scatter.root.swapaxes(1, 2) @ scatter.root
+        shared = scatter.back[:, :, :-1] * scale @ root.T
+        within = alone + shared @ shared.swapaxes(1, 2)
+        own = terms.of_kind(SCATTER)
+        diagonal = np.diagonal(within, axis1=1, axis2=2)
+        gradient[own] += 2.0 * (1.0 - diagonal - weights**2).sum(axis=0)
+        runs, others = np.zeros((2, *products.runs.shape[1:])), np.zeros((2, *total.shape))
+        s = len(tau)
+        runs[0, :, :, :s] = tau[:, None] * within * tau
+        runs[0, :, :, s:-1] = -2.0 * tau[:, None] * (shared @ root) * scale
+        others[0, :-1, :-1] = scale[:, None] * inverse * scale
+        moved = -tau * weights
+        runs[1, :, :, :s] = moved[:, :, None] * moved[:, None, :]
+        runs[1, :, :, s:] = 2.0 * moved[:, :, None] * left
+        others[1] = left[:, None] * left
+        weight = np.exp(-2.0 * at.log[first:])
+        degrees, squares = weight * products.summed(runs, others).T
         gradient[first:] += 2.0 * (counts - degrees - squares)
         curvature[first:] += 2.0 * np.maximum(counts - degrees, LEAST_DEGREES)
         if not in_full:
             return value, gradient, None
         shrunk = (np.eye(k) - inverse[:k, :k]) ** 2
-        for g in range(first):
-            own = terms.group[used] == g
-            curvature[g] += 2.0 * float(shrunk[np.ix_(own, own)].sum())
+        for g in np.flatnonzero(~own[:first]):
+            of = terms.group[used] == g
+            curvature[g] += 2.0 * float(shrunk[np.ix_(of, of)].sum())
+        for j, g in enumerate(np.flatnonzero(own)):
+            part, rest = shared[:, j], 1.0 - alone[:, j, j]
+            square = rest @ (rest - 2.0 * (part**2).sum(axis=1)) + ((part.T @ part) ** 2).sum()
+            curvature[g] += 2.0 * float(square)
         back = np.argsort(order)
         step, push = np.zeros(p), np.zeros(p)
         step[order] = beta[k:]
@@ -219,7 +250,7 @@ class LinearisedFit:
 
         def objective(log: Floats) -> tuple[float, Floats]:
             try:
-                value, gradient, _ = self._evaluated(replace(start, log=log), in_full=False)
+                value, gradient = self.value_and_gradient(replace(start, log=log))
             except np.linalg.LinAlgError:
                 return 1e9, np.zeros_like(log)
             return value, np.where(fixed, 0.0, gradient)
@@ -259,19 +290,15 @@ class LinearisedFit:
         """
         from scipy.linalg import solve_triangular
 
-        terms, p = self.terms, self.jacobian.shape[1]
-        gram, counts, log_determinant = self.products(at.autocorrelation)
-        variance = terms.variance(at)
-        used, q = np.flatnonzero(variance > 0.0), gram.shape[1] - p - 1
-        take = np.concatenate([used, np.arange(q, q + p + 1)])
-        weight = np.exp(-2.0 * at.log[terms.groups :])
-        total = np.einsum("c,cij->ij", weight, gram[:, take[:, None], take])
-        k, t = len(used), np.sqrt(variance[used])
+        terms = self.terms
+        used, products, scatter = self.eliminated(at)
+        total, k, t = scatter.left, len(used), np.sqrt(terms.variance(at)[used])
         matrix = t[:, None] * total[:k, :k] * t + np.eye(k)
         factor = np.linalg.cholesky(matrix)
         half = solve_triangular(factor, t[:, None] * total[:k, k:], lower=True)
-        value = 2.0 * float(np.log(np.diag(factor)).sum()) + log_determinant
-        value += 2.0 * float(counts @ at.log[terms.groups :])
+        value = 2.0 * float(np.log(np.diag(factor)).sum())
+        value += scatter.log_determinant + products.log_determinant
+        value += 2.0 * float(products.counts @ at.log[terms.groups :])
         return total[k:, k:] - half.T @ half, value + prior_of_hyperparameters(terms, at)[0]
 
     def evidence_with(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from soilml.fitting.covariance import Whitening, discrepancy_process
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.inference import constants
+from soilml.inference.scatter_elimination import Products
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
@@ -42,6 +44,8 @@ FIRST_AMPLITUDE, FIRST_SCATTER = -0.5, -0.3
 DISCREPANCY, SCATTER = "discrepancy", "scatter"
 #: Group of columns whose weights have unit variance.
 FIXED = -1
+#: Eigenvalue of the products of a run's whitened scatter, over the largest, that is rounding.
+LEAST_SCATTER = 1e-14
 KEPT = 24  # Whitened columns that are kept, by autocorrelation and outliers
 
 
@@ -74,6 +78,38 @@ class GaussianTerms:
     kinds: tuple[str, ...]
     usual: Floats
     _kept: dict[tuple[float, bytes], WhitenedColumns] = field(default_factory=dict)
+
+    @cached_property
+    def without_scatter(self) -> Integers:
+        """Numbers of the columns that are not of scatter."""
+        return np.flatnonzero(~self._of_scatter)
+
+    @cached_property
+    def scatter_change(self) -> Floats:
+        """Change (m, s) of each reading by one unit of scatter of its own run."""
+        found = self.columns[:, self._of_scatter]
+        s = self.kinds.count(SCATTER)
+        if not found.shape[1]:
+            return np.zeros((len(found), s))
+        return found.reshape(len(found), -1, s)[np.arange(len(found)), self.run]
+
+    @property
+    def _of_scatter(self) -> Booleans:
+        return np.asarray([*(own == SCATTER for own in self.kinds), False])[self.group]
+
+    @property
+    def run(self) -> Integers:
+        """Run (m,) of each reading."""
+        return np.asarray(self.readings.run[self.readings.row])
+
+    @cached_property
+    def runs_with_scatter(self) -> int:
+        """Number of the runs that have scatter of their own: all, or none where there is one."""
+        return int(np.count_nonzero(self._of_scatter)) // max(self.kinds.count(SCATTER), 1)
+
+    def scatter_std(self, at: Hyperparameters) -> Floats:
+        """Standard deviations (s,) of scatter, in units, whether or not there are several runs."""
+        return np.exp(at.log[self.of_kind(SCATTER)])
 
     @property
     def channels(self) -> int:
@@ -138,14 +174,21 @@ class GaussianTerms:
         return self._kept[key]
 
     def whiten(self, at: Hyperparameters, outliers: Booleans) -> Whitening:
-        """What makes the covariance of the readings one; outliers weigh nothing."""
+        """What makes the covariance of the readings one; outliers weigh nothing.
+
+        Scatter is whitened first: its columns of two runs share no reading.
+        """
+        noise: Any
         noise, _ = noise_whitening(self.readings, ~outliers, at.autocorrelation)
         scale = 1.0 / self.noise_scale(at)[self.readings.channel]
         noise = scale * noise if noise.ndim == 1 else noise.multiply(scale[:, None]).tocsr()
-        variance = self.variance(at)
+        if self.runs_with_scatter:
+            change = self.scatter_change * self.scatter_std(at)
+            noise = _whitened_scatter(noise, change, self.run, self.runs_with_scatter)
+        variance = self.variance(at)[self.without_scatter]
         used = variance > 0.0
-        columns = self.columns[:, used] * np.sqrt(variance[used])
-        white = noise[:, None] * columns if noise.ndim == 1 else noise @ columns
+        columns = self.columns[:, self.without_scatter[used]] * np.sqrt(variance[used])
+        white = Whitening(noise, columns[:, :0], np.zeros(0)) @ columns
         if not white.shape[1]:
             return Whitening(noise, white, np.zeros(0))
         basis, size, _ = np.linalg.svd(white, full_matrices=False)
@@ -170,19 +213,67 @@ class WhitenedColumns:
     """Columns whitened by the declared noise, and their products by channel."""
 
     noise: Any  # what whitens: (m,) or sparse (m, m)
-    columns: Floats  # (m, q), zero for readings that are left out
+    columns: Floats  # (m, q), those of scatter apart; zero for readings that are left out
     gram: Floats  # (channels, q, q)
+    scatter: Any  # sparse (channels R s, m): scatter by channel and run
+    runs: Floats  # (channels, R, s, s + q): products of scatter with itself and the columns
     log_determinant: float  # of the noise of those that are kept
     counts: Floats  # (channels,) readings that are kept
+
+    def products_with(self, terms: GaussianTerms, own: Floats) -> Products:
+        """The products, with those of further whitened columns (m, k)."""
+        q, k = self.columns.shape[1], own.shape[1]
+        others = np.zeros((terms.channels, q + k, q + k))
+        others[:, :q, :q] = self.gram
+        for c in range(terms.channels):
+            of = terms.readings.channel == c
+            others[c, :q, q:] = self.columns[of].T @ own[of]
+            others[c, q:, :q] = others[c, :q, q:].T
+            others[c, q:, q:] = own[of].T @ own[of]
+        further = np.reshape(self.scatter @ own, (*self.runs.shape[:3], k))
+        runs = np.concatenate([self.runs, further], axis=-1)
+        return Products(runs, others, self.counts, self.log_determinant)
 
 
 def _whitened(terms: GaussianTerms, autocorrelation: float, kept: Booleans) -> WhitenedColumns:
     noise, log_determinant = noise_whitening(terms.readings, kept, autocorrelation)
-    white = noise[:, None] * terms.columns if noise.ndim == 1 else noise @ terms.columns
-    channel = terms.readings.channel
+    change = terms.scatter_change
+    every = np.column_stack([change, terms.columns[:, terms.without_scatter]])
+    every = noise[:, None] * every if noise.ndim == 1 else noise @ every
+    channel, count, s = terms.readings.channel, terms.runs_with_scatter, change.shape[1]
+    white, cells = every[:, s:], terms.channels * count
+    scatter = _by_cell(every[:, :s], channel * count + terms.run, cells).T.tocsr()
+    runs = np.reshape(scatter @ every, (terms.channels, count, s, every.shape[1]))
     by = [white[channel == c] for c in range(terms.channels)]
     counts = np.bincount(channel[kept], minlength=terms.channels).astype(np.float64)
-    return WhitenedColumns(noise, white, np.stack([w.T @ w for w in by]), log_determinant, counts)
+    gram = np.stack([w.T @ w for w in by])
+    return WhitenedColumns(noise, white, gram, scatter, runs, log_determinant, counts)
+
+
+def _by_cell(values: Floats, cell: Integers, cells: int) -> Any:
+    """Sparse (m, cells s): values (m, s) in the columns of the cell of each row; none of none."""
+    from scipy.sparse import csr_array
+
+    m, s = values.shape
+    if not cells:
+        return csr_array((m, 0), dtype=np.float64)
+    index = cell[:, None] * s + np.arange(s)
+    return csr_array((values.ravel(), index.ravel(), s * np.arange(m + 1)), shape=(m, cells * s))
+
+
+def _whitened_scatter(noise: Any, change: Floats, run: Integers, runs: int) -> Whitening:
+    """Whitening of noise and scatter from its change (m, s) by one standard deviation.
+
+    The basis of each run is in the eigenvectors of the products of its columns.
+    """
+    white = noise[:, None] * change if noise.ndim == 1 else noise @ change
+    s = white.shape[1]
+    size, vectors = np.linalg.eigh(np.reshape(_by_cell(white, run, runs).T @ white, (runs, s, s)))
+    seen = size > LEAST_SCATTER * size.max(axis=1, initial=LEAST_SCATTER, keepdims=True)
+    root = np.sqrt(np.where(seen, size, np.inf))
+    own = np.einsum("ij,ijk->ik", white, vectors[run]) / root[run]
+    shrinkage = np.where(seen, 1.0 - 1.0 / np.sqrt(1.0 + np.maximum(size, 0.0)), 0.0)
+    return Whitening(noise, _by_cell(own, run, runs), shrinkage.ravel())
 
 
 def noise_whitening(

@@ -81,7 +81,7 @@ def _along_runs(
     rng = np.random.default_rng(seed)
     orders = np.vstack([order, rng.permuted(np.tile(order, (PERMUTATIONS, 1)), axis=1)])
     products = np.stack([orders @ (b.T @ residual) for b in by_run], axis=1)
-    squares = np.stack([np.einsum("pr,rs,ps->p", orders, b.T @ b, orders) for b in by_run], axis=1)
+    squares = np.stack([((orders @ (b.T @ b)) * orders).sum(axis=1) for b in by_run], axis=1)
     squares = np.maximum(squares, 1e-12)
     z = products / np.sqrt(squares)
     largest = np.abs(z[1:]).max(axis=1)

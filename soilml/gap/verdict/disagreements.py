@@ -96,8 +96,7 @@ def unpredicted_region(
     at = soil.without.at
     found = conditional(soil.linear.without(soil.outliers | out), at)
     own = out & ~soil.outliers
-    columns = found.columns[own]
-    matrix = np.diag(found.noise[own] ** 2) + columns @ found.covariance @ columns.T
+    matrix = found.joint(own)
     residual = soil.linear.residual[own] - found.expected[own]
     square = float(residual @ np.linalg.solve(matrix, residual))
     if chi_square_tail(square, residual.size) >= REGION_LEVEL:
