@@ -26,7 +26,7 @@ from soilml.fitting.covariance import Whitening, discrepancy_process
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.inference import constants
-from soilml.inference.scatter_elimination import Products
+from soilml.inference.scatter_elimination import Products, by_cell, scatter_whitening
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
@@ -44,8 +44,6 @@ FIRST_AMPLITUDE, FIRST_SCATTER = -0.5, -0.3
 DISCREPANCY, SCATTER = "discrepancy", "scatter"
 #: Group of columns whose weights have unit variance.
 FIXED = -1
-#: Eigenvalue of the products of a run's whitened scatter, over the largest, that is rounding.
-LEAST_SCATTER = 1e-14
 KEPT = 24  # Whitened columns that are kept, by autocorrelation and outliers
 
 
@@ -184,7 +182,7 @@ class GaussianTerms:
         noise = scale * noise if noise.ndim == 1 else noise.multiply(scale[:, None]).tocsr()
         if self.runs_with_scatter:
             change = self.scatter_change * self.scatter_std(at)
-            noise = _whitened_scatter(noise, change, self.run, self.runs_with_scatter)
+            noise = scatter_whitening(noise, change, self.run, self.runs_with_scatter)
         variance = self.variance(at)[self.without_scatter]
         used = variance > 0.0
         columns = self.columns[:, self.without_scatter[used]] * np.sqrt(variance[used])
@@ -242,38 +240,12 @@ def _whitened(terms: GaussianTerms, autocorrelation: float, kept: Booleans) -> W
     every = noise[:, None] * every if noise.ndim == 1 else noise @ every
     channel, count, s = terms.readings.channel, terms.runs_with_scatter, change.shape[1]
     white, cells = every[:, s:], terms.channels * count
-    scatter = _by_cell(every[:, :s], channel * count + terms.run, cells).T.tocsr()
+    scatter = by_cell(every[:, :s], channel * count + terms.run, cells).T.tocsr()
     runs = np.reshape(scatter @ every, (terms.channels, count, s, every.shape[1]))
     by = [white[channel == c] for c in range(terms.channels)]
     counts = np.bincount(channel[kept], minlength=terms.channels).astype(np.float64)
     gram = np.stack([w.T @ w for w in by])
     return WhitenedColumns(noise, white, gram, scatter, runs, log_determinant, counts)
-
-
-def _by_cell(values: Floats, cell: Integers, cells: int) -> Any:
-    """Sparse (m, cells s): values (m, s) in the columns of the cell of each row; none of none."""
-    from scipy.sparse import csr_array
-
-    m, s = values.shape
-    if not cells:
-        return csr_array((m, 0), dtype=np.float64)
-    index = cell[:, None] * s + np.arange(s)
-    return csr_array((values.ravel(), index.ravel(), s * np.arange(m + 1)), shape=(m, cells * s))
-
-
-def _whitened_scatter(noise: Any, change: Floats, run: Integers, runs: int) -> Whitening:
-    """Whitening of noise and scatter from its change (m, s) by one standard deviation.
-
-    The basis of each run is in the eigenvectors of the products of its columns.
-    """
-    white = noise[:, None] * change if noise.ndim == 1 else noise @ change
-    s = white.shape[1]
-    size, vectors = np.linalg.eigh(np.reshape(_by_cell(white, run, runs).T @ white, (runs, s, s)))
-    seen = size > LEAST_SCATTER * size.max(axis=1, initial=LEAST_SCATTER, keepdims=True)
-    root = np.sqrt(np.where(seen, size, np.inf))
-    own = np.einsum("ij,ijk->ik", white, vectors[run]) / root[run]
-    shrinkage = np.where(seen, 1.0 - 1.0 / np.sqrt(1.0 + np.maximum(size, 0.0)), 0.0)
-    return Whitening(noise, _by_cell(own, run, runs), shrinkage.ravel())
 
 
 def noise_whitening(

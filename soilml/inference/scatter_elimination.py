@@ -1,4 +1,4 @@
-r"""Scatter of each run, eliminated from the normal equations of all columns.
+r"""Scatter of each run by its own block: normal equations without it, and what whitens it.
 
 The columns of scatter of two runs share no reading, so that their part of the matrix of the normal
 equations has one small block for each run. With Z the products of the scatter with the others:
@@ -19,10 +19,15 @@ complement).
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from soilml.arrays import Floats, Integers
+from soilml.fitting.covariance import Whitening
+
+#: Eigenvalue of the products of a run's whitened scatter, over the largest, that is rounding.
+LEAST_SCATTER = 1e-14
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,3 +100,29 @@ class Eliminated:
     def weights(self, others: Floats) -> Floats:
         """Mean weights (R, s) of the scatter, given what the others (n,) leave: -beta, then 1."""
         return np.asarray(self.root.swapaxes(1, 2) @ (self.gain @ others)[..., None])[..., 0]
+
+
+def by_cell(values: Floats, cell: Integers, cells: int) -> Any:
+    """Sparse (m, cells s): values (m, s) in the columns of the cell of each row; none of none."""
+    from scipy.sparse import csr_array
+
+    m, s = values.shape
+    if not cells:
+        return csr_array((m, 0), dtype=np.float64)
+    index = cell[:, None] * s + np.arange(s)
+    return csr_array((values.ravel(), index.ravel(), s * np.arange(m + 1)), shape=(m, cells * s))
+
+
+def scatter_whitening(noise: Any, change: Floats, run: Integers, runs: int) -> Whitening:
+    """Whitening of noise and scatter from its change (m, s) by one standard deviation.
+
+    The basis of each run is in the eigenvectors of the products of its columns.
+    """
+    white = noise[:, None] * change if noise.ndim == 1 else noise @ change
+    s = white.shape[1]
+    size, vectors = np.linalg.eigh(np.reshape(by_cell(white, run, runs).T @ white, (runs, s, s)))
+    seen = size > LEAST_SCATTER * size.max(axis=1, initial=LEAST_SCATTER, keepdims=True)
+    root = np.sqrt(np.where(seen, size, np.inf))
+    own = np.einsum("ij,ijk->ik", white, vectors[run]) / root[run]
+    shrinkage = np.where(seen, 1.0 - 1.0 / np.sqrt(1.0 + np.maximum(size, 0.0)), 0.0)
+    return Whitening(noise, by_cell(own, run, runs), shrinkage.ravel())
