@@ -134,7 +134,7 @@ def add_residual_rows(
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
     outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)
-    exact = operating.stds.reduce("ReduceMax") <= 0.0
+    exact = operating.stds.reduce("ReduceSum") <= 0.0
     counts = [
         used.sum(),
         in_range.node("Shape").astype(np.float32),
