@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from soilml.cli.main import COMMANDS, parser
+from soilml.cli.main import COMMANDS, GROUPS, parser
 
 PAGE = "docs/reference/commands"
 MARK = "<!-- commands -->"
@@ -23,7 +23,11 @@ def helps() -> dict[str, str]:
 
 def _insert(app: Any, docname: str, source: list[str]) -> None:
     if docname == PAGE:
-        sections = (f"## soilml {name}\n\n```text\n{text}```\n" for name, text in helps().items())
+        words = {own: f"{group} {word}" for group, of in GROUPS.items() for word, own in of.items()}
+        sections = (
+            f"## soilml {words.get(name, name)}\n\n```text\n{text}```\n"
+            for name, text in helps().items()
+        )
         source[0] = source[0].replace(MARK, "\n".join(sections))
 
 

@@ -28,7 +28,6 @@ RUN_FAULTS = {
     "wrong unit": (RUNS.replace("load_N", "load_kN"), "load is read in N"),
     "text in a number": (RUNS.replace("3.0", "three"), "line 3, column torque_Nm"),
     "NaN": (RUNS.replace("3.0", "NaN"), "line 3, column torque_Nm"),
-    "slip of one": (RUNS.replace("0.3", "1.0"), "line 3, column slip"),
     "negative load": (RUNS.replace("80", "-80"), "line 3, column load_N"),
     "empty file": ("", "is empty"),
     "no such file": (None, "no such file"),

@@ -12,7 +12,7 @@ import pytest
 
 import soilml
 from soilml.cli import main
-from soilml.cli.main import COMMANDS, parser
+from soilml.cli.main import COMMANDS, GROUPS, parser
 from soilml.quantities import QUANTITIES
 
 ROOT = Path(__file__).parents[2]
@@ -54,6 +54,8 @@ def test_notebooks_have_cells_that_parse_and_commands_that_exist(page):
     for line in notebooks.commands(page):
         program, command, *words = shlex.split(line)
         assert program == "soilml"
+        if command in GROUPS:
+            command, words = GROUPS[command][words[0]], words[1:]
         parser(command).parse_args([command, *words])
 
 
@@ -109,7 +111,9 @@ def test_every_command_has_its_help_on_the_page():
     assert command_listing.MARK in (ROOT / f"{command_listing.PAGE}.md").read_text()
     texts = command_listing.helps()
     assert set(texts) == set(COMMANDS)
-    assert all(text.startswith(f"usage: soilml {name} ") for name, text in texts.items())
+    words = {own: f"{group} {word}" for group, of in GROUPS.items() for word, own in of.items()}
+    for name, text in texts.items():
+        assert text.startswith(f"usage: soilml {words.get(name, name)} ")
 
 
 def test_every_message_belongs_to_one_group_of_the_page():

@@ -71,9 +71,11 @@ def test_an_order_that_another_choice_turns_round_depends_on_it():
 
 
 def test_the_page_has_the_counts_of_the_rows():
-    """What `soilml papers --summary` printed into the page; it takes too long to be run here."""
+    """What `soilml paper numbers --summary` printed into the page; it takes too long to run."""
     counts = count_statuses(CLAIMED)
-    block = re.search(r"papers --summary.*?```text\n(.*?)```", PAGE.read_text(), re.DOTALL)[1]
+    block = re.search(r"paper numbers --summary.*?```text\n(.*?)```", PAGE.read_text(), re.DOTALL)[
+        1
+    ]
     for code in set(STATUSES) - {"wrong"}:
         each = [numbers[code] for numbers in counts.values()]
         line = next(line for line in block.splitlines() if line.startswith(STATUSES[code]))

@@ -6,6 +6,7 @@ takes less time than what an automatic differentiation library spends on keeping
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -123,3 +124,20 @@ def _views(flat: Singles, shapes: Sequence[tuple[int, ...]]) -> list[tuple[Singl
         part.reshape(shape) for part, shape in zip(np.split(flat, ends[:-1]), shapes, strict=True)
     ]
     return list(zip(parts[0::2], parts[1::2], strict=True))
+
+
+#: Learning rates of the one-cycle schedule: the first, the largest, which is reached after a tenth
+#: of the steps, and the last.
+FIRST_RATE, LARGEST_RATE, LAST_RATE, WARM_UP = 2.4e-4, 6e-3, 2.4e-8, 0.1
+
+
+def one_cycle_rate(done: float) -> float:
+    """Learning rate at a share of the steps: half a cosine up, and a longer one down to nothing.
+
+    References: Smith and Topin, arXiv:1708.07120, 2017.
+    """
+    if done < WARM_UP:
+        start, end, share = FIRST_RATE, LARGEST_RATE, done / WARM_UP
+    else:
+        start, end, share = LARGEST_RATE, LAST_RATE, (done - WARM_UP) / (1.0 - WARM_UP)
+    return end + 0.5 * (start - end) * (1.0 + math.cos(math.pi * share))

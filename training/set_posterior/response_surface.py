@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 from threadpoolctl import threadpool_limits
 
 from soilml.arrays import Floats
@@ -18,9 +16,9 @@ from soilml.onboard.set_contract import RESPONSE_CHANNELS
 from soilml.processes import process_map
 from training.onnx_graph.value import Value, concat, constant, gemm, tanh
 from training.regressors.standardisation import Standardisation
-from training.regressors.tanh_network import TanhNetwork, evaluate_layers
+from training.regressors.tanh_network import TanhNetwork, evaluate_layers, one_cycle_rate
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
-from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.families.coordinates import prior_points
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, monomial_terms, monomials
 from training.set_posterior.term_selection import select_terms
@@ -95,9 +93,6 @@ POINTS_PER_TERM = 2.5
 SIMULATED_AT_A_TIME = 512  # Designs simulated at a time, which bounds the memory needed
 #: Designs of a step of the training, and the share held out to measure the error.
 BATCH, HELD_OUT = 256, 0.08
-#: Learning rates of the one-cycle schedule: the first, the largest, which is reached after a tenth
-#: of the steps, and the last.
-FIRST_RATE, LARGEST_RATE, LAST_RATE, WARM_UP = 2.4e-4, 6e-3, 2.4e-8, 0.1
 #: Least standard deviation to which an output is scaled: nearly constant coefficients are not
 #: magnified.
 LEAST_OUTPUT_STD = 2e-3
@@ -108,8 +103,7 @@ CHANNEL_WEIGHTS = np.asarray([1.0, 0.4, 1.0])
 CONTACT_SHARE, LEAST_CONTACT_DESIGNS, CONTACT_HIDDEN = 8, 512, 32
 #: Designs on which terms are chosen, and points of the unknowns.
 SELECTION_DESIGNS, SELECTION_POINTS = 256, 512
-#: Designs that are simulated to see whether soils of the prior carry the loads.
-CHECKED_DESIGNS = 128
+CHECKED_DESIGNS = 128  # Simulated to see whether soils of the prior carry the loads
 #: A design is learned from if this share of the soils of the prior carry its load: a polynomial
 #: needs points on more than a corner of its range. This share of the designs must be such.
 LEAST_CARRIED, LEAST_DESIGNS = 0.5, 0.5
@@ -233,7 +227,10 @@ def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Prog
 
 def carried_shares(family: WheelFamily, seed: int) -> tuple[Floats, Floats]:
     """A few designs (n, d), and the share of the soils of the prior that carry each, (n,)."""
-    designs, x = family.designs(CHECKED_DESIGNS, seed), _points(family, SELECTION_POINTS, seed)
+    designs, x = (
+        family.designs(CHECKED_DESIGNS, seed),
+        prior_points(family.axes, family.free, SELECTION_POINTS, seed),
+    )
     return designs, np.isfinite(family.responses(designs, x[None])).all(axis=2).mean(axis=1)
 
 
@@ -255,7 +252,7 @@ def family_terms(family: WheelFamily) -> Terms:
 
 def _most_useful_terms(family: WheelFamily, terms: Terms, settings: ResponseSettings) -> Terms:
     """So many of these terms as the settings permit, chosen on a few designs."""
-    x = _points(family, SELECTION_POINTS, settings.seed)
+    x = prior_points(family.axes, family.free, SELECTION_POINTS, settings.seed)
     y = family.responses(family.designs(SELECTION_DESIGNS, settings.seed), x[None])
     carried = np.isfinite(y).all(axis=2).mean(axis=1)
     y = np.stack([_continued(one, x) for one in y[carried >= LEAST_CARRIED]]) * CHANNEL_WEIGHTS
@@ -274,7 +271,7 @@ def _fit(
     Each design is simulated at points of the unknowns, and a polynomial is fitted to its responses;
     a network then learns the coefficients of the polynomials from the features of the designs.
     """
-    x = _points(family, int(POINTS_PER_TERM * len(terms)), settings.seed)
+    x = prior_points(family.axes, family.free, int(POINTS_PER_TERM * len(terms)), settings.seed)
     basis = monomials(x, terms)
     designs = family.designs(settings.designs, settings.seed)
     coefficients, squared_error, carried = _fit_polynomials(respond, designs, x, basis, progress)
@@ -357,17 +354,6 @@ def _continued(y: Floats, x: Floats) -> Floats:
     return np.where(carried[:, None], y, np.clip(basis @ found, *ends))
 
 
-def _points(family: WheelFamily, count: int, seed: int) -> Floats:
-    """Coordinates (count, p): quantiles of the prior, truncated normal where nearly known."""
-    from scipy.special import ndtri
-
-    u = qmc.Sobol(len(family.axes), rng=seed).random(1 << (count - 1).bit_length())[:count]
-    columns = [axis.quantile(u[:, i]) for i, axis in enumerate(family.axes[: family.free])]
-    normal = ndtri(np.clip(u[:, family.free :], 1e-9, 1.0 - 1e-9))
-    truncated = np.clip(normal, -NORMAL_TRUNCATION, NORMAL_TRUNCATION) / NORMAL_TRUNCATION
-    return np.concatenate([np.stack(columns, axis=1), truncated], axis=1)
-
-
 def _train_network(
     terms: Terms,
     features: Floats,
@@ -411,15 +397,3 @@ def _train_network(
     arrays[-1] = (arrays[-1] * y_std + y_mean) / flat
     ends = features.min(axis=0), features.max(axis=0)
     return Response(terms, scaling, tuple(arrays), *ends, np.zeros(len(RESPONSE_CHANNELS)))
-
-
-def one_cycle_rate(done: float) -> float:
-    """Learning rate at a share of the steps: half a cosine up, and a longer one down to nothing.
-
-    References: Smith and Topin, arXiv:1708.07120, 2017.
-    """
-    if done < WARM_UP:
-        start, end, share = FIRST_RATE, LARGEST_RATE, done / WARM_UP
-    else:
-        start, end, share = LARGEST_RATE, LAST_RATE, (done - WARM_UP) / (1.0 - WARM_UP)
-    return end + 0.5 * (start - end) * (1.0 + math.cos(math.pi * share))

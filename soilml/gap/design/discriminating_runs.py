@@ -227,7 +227,7 @@ def _static_proposals(
             for rival, old in zip(rivals, present, strict=True)
         ]
         row: dict[str, float | str] = {
-            f"{column(k)} if {name}": v[k] for name, v in values.items() for k in names
+            f"{column(k)} if {name}": v[k] for name, v in values.items() for k in names if k in v
         }
         proposals.append(NextRun(kind, text, _mean_capped(sigmas), (row,)))
     return proposals
@@ -242,7 +242,9 @@ def _soil_difference(
     rates = rates_at(rival.coordinates, rival.x)
     for i, (name, (std, is_relative)) in enumerate(stds.items()):
         std = std * abs(own[name]) if is_relative else std
-        difference[i] = (own[name] - others[name]) / std
+        # a parameter that the rival does not free has the value of its case
+        there = others[name] if name in others else float(getattr(rival.case.soil, name))
+        difference[i] = (own[name] - there) / std
         for j, c in enumerate(rival.coordinates):
             if c.path == name:
                 jacobian[i, j] = rates[j] / std

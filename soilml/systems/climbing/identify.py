@@ -107,7 +107,8 @@ def identify_ground(
     >>> ground = identify_ground(
     ...     true.rover, climbs, fixed={"cohesion": 0.0, "friction_angle": 0.6632}
     ... )
-    >>> round(1e3 * ground.fit["shear_modulus"], 1), round(1e3 * float(ground.fit.std[0]), 1)  # mm
+    >>> modulus = ground.fit["shear_modulus"]
+    >>> round(1e3 * float(modulus.mean), 1), round(1e3 * float(modulus.std), 1)  # mm
     (7.4, 0.3)
     """
     fixed, prior, noise = dict(fixed or {}), dict(prior or {}), noise or Uncertainty()

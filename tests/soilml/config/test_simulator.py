@@ -245,7 +245,7 @@ def refused(tmp_path, text="", table=None, **files):
 
 def test_runs_that_cannot_stand_in_for_equations_are_refused(folder, tmp_path):
     columns = dict(read_table(folder / "simulated.csv").columns)
-    assert "`soilml design-runs` proposes" in refused(tmp_path)
+    assert "`soilml plan runs` proposes" in refused(tmp_path)
     few = {name: values[:20] for name, values in columns.items()}
     assert "20 runs for 5 inputs" in refused(tmp_path, table=few)
     gone = {name: values.copy() for name, values in columns.items()}

@@ -231,10 +231,10 @@ def test_the_command_states_one_answer_and_when_to_use_the_exact_model(
     (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
     out = tmp_path / "fit.json"
     files = [str(tmp_path / "biased.toml"), str(tmp_path / "runs.csv")]
-    assert main(["identify", *files, "--out", str(out)]) == 0
+    assert main(["identify", *files, "--out", str(out), "-v"]) == 0
     shown = capsys.readouterr().out
     assert "errors that all rows share are included in std: slip 0.01" in shown
-    assert shown.startswith("averaged, ") and "explained by: " in shown
+    assert "\naveraged, " in shown and "explained by: " in shown
     assert shown.index("exact_model, posterior") > shown.index("explained by: ")
     assert "use exact_model only where this model and these sensors were verified" in shown
     content = json.loads(out.read_text())

@@ -168,4 +168,4 @@ def test_declared_errors_are_not_scaled():
 @pytest.mark.slow
 def test_rows_of_another_model_speak_against_the_exact_one():
     fit = identify(CASE, rows(slip_offset=0.08))
-    assert fit.exact_model.use_of_exact.text.startswith("the rows speak against exact_model")
+    assert fit.exact_model.use_of_exact.text.startswith("the model misfits these rows")

@@ -116,7 +116,7 @@ def test_bags_without_their_libraries_name_the_extra(tmp_path, monkeypatch):
 
     monkeypatch.setitem(sys.modules, "rosbags", None)
     (tmp_path / "a.bag").write_bytes(b"")
-    with pytest.raises(MissingLibraryError, match=r"pip install 'soilml\[logs\]'"):
+    with pytest.raises(MissingLibraryError, match=r"pip install '\.\[logs\]'"):
         read_log(tmp_path / "a.bag")
 
 

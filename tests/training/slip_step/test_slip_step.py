@@ -73,7 +73,7 @@ def test_wrong_input_is_one_line(slip_stream, slip_drive, tmp_path, capsys):
     with pytest.raises(InputError, match="load is 0; possible is 1e-06 to"):
         slip_stream.step(state, rim, rim, 0.0 * load, 0.0)
     wheel = SLIP_EXAMPLE.parents[1] / "exported" / "wheel.onnx"
-    with pytest.raises(ModelFileError, match="no file of soilml export-slip"):
+    with pytest.raises(ModelFileError, match="no file of soilml export slip"):
         SlipStream.load(wheel)
     with pytest.raises(ModelFileError, match="there is no such file"):
         SlipStream.load(tmp_path / "none.onnx")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,3 +85,15 @@ class PriorAxis:
         return (
             math.log(0.5) if self.tilt == 0.0 else math.log(0.5 * self.tilt / math.sinh(self.tilt))
         )
+
+
+def prior_points(axes: Sequence[PriorAxis], free: int, count: int, seed: int) -> Floats:
+    """Coordinates (count, p): quantiles of the prior, truncated normal where nearly known."""
+    from scipy.special import ndtri
+    from scipy.stats import qmc
+
+    u = qmc.Sobol(len(axes), rng=seed).random(1 << (count - 1).bit_length())[:count]
+    columns = [axis.quantile(u[:, i]) for i, axis in enumerate(axes[:free])]
+    normal = ndtri(np.clip(u[:, free:], 1e-9, 1.0 - 1e-9))
+    truncated = np.clip(normal, -NORMAL_TRUNCATION, NORMAL_TRUNCATION) / NORMAL_TRUNCATION
+    return np.concatenate([np.stack(columns, axis=1), truncated], axis=1)
