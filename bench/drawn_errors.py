@@ -12,7 +12,7 @@ from datagen.blind_sets.reference_wheel import ContactArc, Mechanism, WheelState
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
-#: Standard deviations, those that docs/sets.md lists.
+#: Standard deviations, those that docs/concepts/sets.md lists.
 STD = {
     "slip_offset": 0.015,
     "load_gain": 0.01,

@@ -1,6 +1,6 @@
 """Hostile numbers in every input of every released file: all outputs are finite.
 
-docs/onnx-interface.md promises it of the ONNX files, docs/c-export.md of the code made of them.
+docs/reference/onnx.md promises it of the ONNX files, docs/how-to/deploy.md of the C code.
 """
 
 import ctypes

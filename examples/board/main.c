@@ -1,7 +1,7 @@
 /*
  * Estimates of the soil under a wheel, on a board without Python:
  *
- *   soilml export-c exported/wheel.onnx wheel.c
+ *   soilml export c exported/wheel.onnx wheel.c
  *   gcc -std=c99 -O3 -I. examples/board/main.c wheel.c -lm -o board && ./board
  */
 #include <math.h>

@@ -1,6 +1,6 @@
 // Two wheels of different sizes on one rover, each with an estimator of its own:
 //
-//   soilml export-c exported/any_wheel.onnx any_wheel.c
+//   soilml export c exported/any_wheel.onnx any_wheel.c
 //   gcc -std=c99 -O3 -c any_wheel.c
 //   g++ -std=c++11 -O3 -I. examples/board/main.cpp any_wheel.o -lm -o board && ./board
 #include <cstdio>

@@ -58,12 +58,12 @@ def sound_rows(case: Case, table: Table) -> tuple[Table, list[Remark]]:
     _check_copied_columns(table, channels)
     noise = {key: _noise(case, table, key) for key in channels}
     table, remarks = _without_repeated_rows(table, noise)
-    for find in (_clipped, _held):
+    for code, find in (("clipped-readings", _clipped), ("held-readings", _held)):
         for key in channels:
             spoilt, text = find(table, key, noise[key])
             if spoilt.any():
                 table = _blanked(table, key, spoilt)
-                remarks.append(_left_out(find.__name__.strip("_"), table, key, spoilt, text))
+                remarks.append(_left_out(code, table, key, spoilt, text))
     for key in channels:
         table, remark = _with_noise_of_steps(case, table, key, noise[key])
         remarks += remark
@@ -192,7 +192,7 @@ def _left_out(code: str, table: Table, key: str, spoilt: Booleans, text: str) ->
     where += f" and {rows.size - MOST_LINES} more" if rows.size > MOST_LINES else ""
     are = "1 reading is" if rows.size == 1 else f"{rows.size} readings are"
     text = f"{key}: {are} left out ({where}), {text}"
-    return Remark(f"{code}-readings", text, (key,), _severity(rows.size, table))
+    return Remark(code, text, (key,), _severity(rows.size, table))
 
 
 def _severity(count: int, table: Table) -> Severity:
