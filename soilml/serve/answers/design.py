@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -14,8 +14,8 @@ from soilml.io.named_files import NamedFiles
 from soilml.log_import.guesses.draft import toml_value
 from soilml.optional_imports import tomllib
 from soilml.physics.soils import soil_catalogue
-from soilml.report.page import Provenance, report_texts
-from soilml.rover_design.presentation import design_page
+from soilml.report.page import Provenance, page_content, report_texts
+from soilml.rover_design.presentation import report_of_design
 from soilml.rover_design.report import design_report
 from soilml.rover_design.study import LEAST, DesignStudy, read_study
 from soilml.serve.answers.job_files import MODEL_FILE, Tell, setting_file, write_files
@@ -227,19 +227,14 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     found = design_report(study, designs=designs, draws=draws, progress=progress)
     tell("drawing the report")
-    page = design_page(found, STUDY_FILE)
+    report = report_of_design(found, f"Wheels for {STUDY_FILE}")
     origin = Provenance.of(["design", STUDY_FILE], [STUDY_FILE])
     names = ("design_report.html", "design.json")
-    texts = report_texts(page, origin, found.as_json(), names, Path())
+    texts = report_texts(report, origin, found.as_json(), names, Path())
     contents = {path.name: str(text) for path, text in texts.items()}
     return {
         "met": found.met,
-        "badge": page.badge,
-        "verdict": found.summary(),
-        "next": page.next_steps[0] if page.next_steps else "",
-        "picture": {"image": page.pictures[0].image.image, "alt": page.pictures[0].image.alt},
-        "tables": [_table(t.caption, t.header, t.rows) for t in page.tables],
-        "remarks": [str(text) for text in page.warnings],
+        "report": page_content(report),
         "files": write_files({**contents, **settings}),
     }
 
@@ -251,7 +246,3 @@ def _model_of_rows(study: DesignStudy, request: Mapping[str, Any]) -> str:
         raise InputError(f"{STUDY_FILE} [soil]: needed is model = {MODEL_FILE!r}, that of the page")
     setting_file(MODEL_FILE, request.get("model"))
     return str(request["model"])
-
-
-def _table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, Any]:
-    return {"title": caption, "heads": list(header), "rows": [list(row) for row in rows]}

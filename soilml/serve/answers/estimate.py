@@ -26,7 +26,6 @@ from soilml.serve.answers.job_files import MODEL_FILE, Tell, page_case, write_fi
 from soilml.serve.answers.logs import table_summary
 from soilml.traction.by_load import LoadPrediction
 from soilml.traction.report import PullReport, pull_report
-from soilml.traction.rover_presentation import rover_text
 from soilml.traction.rover_report import rover_report
 
 #: SI unit -> shown unit and its factor.
@@ -141,7 +140,7 @@ def _pull(case: Case, table: Table) -> dict[str, Any]:
     """Drawbar pull and slope, of the rover in words; the reason where there is none."""
     try:
         if case.rover is not None:
-            return {"text": rover_text(case.rover, rover_report(case, table))}
+            return {"text": rover_report(case, table).report().text(details=True)}
         if case.gears:
             return pull_of_gears(case, table)
         return pull_curves(pull_report(case, table))

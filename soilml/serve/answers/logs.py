@@ -13,11 +13,10 @@ from soilml.io.spreadsheet import is_spreadsheet, sheet_rows, sheets_with_cells,
 from soilml.io.table import Table
 from soilml.io.text_tables import csv_text
 from soilml.log_import.checks.table_hints import table_remarks
-from soilml.log_import.page import page
 from soilml.log_import.workflow import import_log
 from soilml.quantities import COLUMNS
 from soilml.remarks import texts
-from soilml.report.page import json_text
+from soilml.report.page import Provenance, json_text, page
 from soilml.serve.answers.job_files import Tell, setting_file, write_files
 
 RUNS_FILE = "runs.csv"  # The table that an import writes
@@ -58,7 +57,9 @@ def import_logs(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     tell("drawing the report")
     contents = {
         RUNS_FILE: csv_text(found.table.columns),
-        "import_report.html": page(found, progress),
+        "import_report.html": page(
+            found.report(), Provenance.of(["import", *found.sources, "--map", found.map_name], [])
+        ),
         "import_report.json": json_text(found.as_json()),
         "bias.toml": found.bias_toml(),
         "map.toml": str(request.get("map")),

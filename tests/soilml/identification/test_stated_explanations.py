@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from soilml.identification.presentation import Identification
 
 from soilml import read_case, simulate
 from soilml.fitting.coordinates import select_free
 from soilml.identification.averaged import AveragedSamples, stated_explanations
 from soilml.identification.fit import Fit, SoilExplanation
-from soilml.identification.presentation import Identification
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.traction import soil_draws
 

@@ -1,10 +1,11 @@
-// Wheels of a rover for a slope: a form for the question, the verdict, pictures and tables.
+// Wheels of a rover for a slope: a form for the question, its report.
 
 import { ask, jobFile } from "./api.js";
-import { byId, element, fold, jumpTo, options, saveText, showError, wordList } from "./dom.js";
+import { byId, element, jumpTo, options, saveText, showError } from "./dom.js";
 import { currentName, currentTable } from "./estimate.js";
 import { work } from "./jobs.js";
 import { modelOfEstimate } from "./model_box.js";
+import { reportParts } from "./report.js";
 
 const NAMES = { rover: "Rover", wheel: "Wheel", goal: "Goal", soil: "Soil" };
 const MEASURED = "measured";
@@ -96,26 +97,11 @@ async function run() {
 }
 
 function answer({ id, result }) {
-  byId("design-result").replaceChildren(...[
-    element("article", { class: "verdict" },
-      element("p", { class: "sentence" }, element("span", { class: "badge" }, result.badge), result.verdict),
-      result.next ? element("p", {}, element("b", {}, "What would tell more: "), result.next) : null),
-    element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "Pictures of the designs" },
-      element("img", { class: "picture", src: result.picture.image, alt: result.picture.alt })),
-    element("div", { class: "buttons" },
-      element("a", { class: "button", href: jobFile(id, "design_report.html", true), target: "_blank", rel: "noopener" }, "Open the full report"),
-      element("a", { class: "button", href: jobFile(id, "design.json") }, "Save design.json"),
-      element("a", { class: "button", href: jobFile(id, "rover.toml") }, "Save rover.toml"),
-      result.files.includes("MODEL.toml") ? element("a", { class: "button", href: jobFile(id, "MODEL.toml") }, "Save MODEL.toml") : ""),
-    ...result.tables.map(table),
-    fold("Remarks", wordList(result.remarks, "remark")),
-  ].filter(Boolean));
+  const buttons = element("div", { class: "buttons" },
+    element("a", { class: "button", href: jobFile(id, "design_report.html", true), target: "_blank", rel: "noopener" }, "Open the full report"),
+    element("a", { class: "button", href: jobFile(id, "design.json") }, "Save design.json"),
+    element("a", { class: "button", href: jobFile(id, "rover.toml") }, "Save rover.toml"),
+    result.files.includes("MODEL.toml") ? element("a", { class: "button", href: jobFile(id, "MODEL.toml") }, "Save MODEL.toml") : "");
+  byId("design-result").replaceChildren(...reportParts(result.report, buttons));
   byId("design-result").scrollIntoView({ block: "start" });
-}
-
-function table({ title, heads, rows }) {
-  return fold(`${title[0].toUpperCase()}${title.slice(1)}`,
-    element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": title },
-      element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
-        element("tbody", {}, ...rows.map((row) => element("tr", {}, ...row.map((cell, i) => element(i ? "td" : "th", i ? {} : { scope: "row" }, cell))))))));
 }
