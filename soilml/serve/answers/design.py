@@ -208,7 +208,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     The soil of measured rows is that of the page's table and model.
 
-    Raises `InputError` as `soilml design` does, and for other files than these.
+    Raises `InputError` as `soilml plan wheels` does, and for other files than these.
     """
     names = request.get("names") or []
     # the soil of measured rows is that of the page's model and table
