@@ -61,6 +61,8 @@ class Coordinate:
         Bounds of x.
     is_shape
         Whether it is a shape coefficient of an effect's law.
+    of_candidate
+        Whether it is of an effect that a hypothesis adds, and not of the case.
     """
 
     path: str
@@ -72,6 +74,7 @@ class Coordinate:
     lower: float = 0.0
     upper: float = 1.0
     is_shape: bool = False
+    of_candidate: bool = False
 
     @property
     def effect(self) -> str:
@@ -179,6 +182,7 @@ def size_coordinate(effect: type[Effect], calibration: float | None) -> Coordina
         normal_std=calibration,
         lower=lower,
         upper=upper,
+        of_candidate=True,
     )
 
 
@@ -197,6 +201,7 @@ def shape_coordinates(effect: type[Effect]) -> list[Coordinate]:
                 lower=-bound,
                 upper=bound,
                 is_shape=True,
+                of_candidate=True,
             )
         )
     return coordinates

@@ -232,7 +232,7 @@ class Solution:
         A soil coordinate is uniform a priori; its precision enters as that of a Gaussian.
         """
         uniform = [
-            UNIFORM_PRECISION if np.isinf(c.std) and not c.effect else 0.0 for c in self.coordinates
+            UNIFORM_PRECISION if np.isinf(c.std) and not c.of_candidate else 0.0 for c in self.coordinates
         ]
         jacobian = np.vstack([self.jacobian, self.soil_tests.rates(self.x)])
         return np.asarray(jacobian.T @ jacobian + np.diag(self.precision + np.asarray(uniform)))

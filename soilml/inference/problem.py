@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,6 +66,20 @@ class InferenceProblem:
     readings: Readings
     effects: Mapping[str, type[Effect]]
     calibration: Mapping[str, float]
+
+    def checksum(self) -> str:
+        """A checksum, within this process, of all that the posterior depends on.
+
+        Empty where the case has effects of a user's file, which have no stable form.
+        """
+        readings = replace(self.readings, notes=(), excluded_channels=())
+        effects = sorted((name, id(effect)) for name, effect in self.effects.items())
+        parts = [self.case, self.soil, effects, sorted(self.calibration.items())]
+        parts += [getattr(readings, f.name) for f in fields(readings)]
+        try:
+            return hashlib.sha256(b"".join(map(pickle.dumps, parts))).hexdigest()
+        except (pickle.PicklingError, AttributeError, TypeError):
+            return ""
 
     @cached_property
     def penalties(self) -> dict[str, float]:
