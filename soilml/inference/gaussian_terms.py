@@ -77,6 +77,12 @@ class GaussianTerms:
     usual: Floats
     _kept: dict[tuple[float, bytes], WhitenedColumns] = field(default_factory=dict)
 
+    @staticmethod
+    def of_columns(readings: Readings, columns: Floats) -> GaussianTerms:
+        """Terms of known size alone: columns (m, q) of unit variance, and the noise."""
+        group = np.full(columns.shape[1], FIXED)
+        return GaussianTerms(readings, columns, group, (), np.ones(len(readings.channels)))
+
     @cached_property
     def without_scatter(self) -> Integers:
         """Numbers of the columns that are not of scatter."""
