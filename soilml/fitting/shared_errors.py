@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats, Real, namespace
+from soilml.arrays import Real, namespace
 from soilml.config.case import Case
 from soilml.config.measurement_noise import EFFECT_OF_ERROR, KNOWN_PARTS, common_errors
 from soilml.parameters import Parameter

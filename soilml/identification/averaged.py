@@ -23,14 +23,12 @@ from soilml.identification.posterior import (
     fit_of_samples,
     posterior_samples,
 )
-from soilml.inference import constants
 from soilml.inference.draws import Draws
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
-from soilml.remarks import Remark
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,9 @@ def _fractions(own: Draws, free: Sequence[Coordinate]) -> tuple[Floats, Floats]:
     if not own.node.hypothesis.wide_priors:
         return own.x[:, at], own.weight
     values = values_at([own.node.fit.coordinates[i] for i in at], own.x[:, at])
-    u = np.asarray([[c.prior.fraction(float(v)) for c, v in zip(free, x, strict=True)] for x in values])
+    u = np.asarray(
+        [[c.prior.fraction(float(v)) for c, v in zip(free, x, strict=True)] for x in values]
+    )
     inside = ((u > 0.0) & (u < 1.0)).all(axis=1)
     return u, own.weight * inside
 

@@ -288,11 +288,7 @@ def with_warnings(
         remarks.append(Remark("few-readings", text))
     remarks += _trade_offs(fit)
     if excess_residuals:
-        remarks.append(
-            excess_residuals_remark(
-                float(np.sqrt(fit.misfit)), case, excess_residuals
-            )
-        )
+        remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))
     if undeclared:
         names = readings.undeclared
         text = (

@@ -119,7 +119,13 @@ def _fit(
         channels=tuple(column(name) for name in readings.channels),
     )
     return with_warnings(
-        fit, case, readings, free, x, excess_residuals=WIDENED if excess else "", undeclared=undeclared
+        fit,
+        case,
+        readings,
+        free,
+        x,
+        excess_residuals=WIDENED if excess else "",
+        undeclared=undeclared,
     )
 
 

@@ -31,7 +31,7 @@ INTERVAL = np.asarray([0.05, 0.95])
 FEW_READINGS = 9
 #: Of more readings, samples begin with the linearised posterior, so much wider; samples of a round,
 #: effective size at which sampling ends, and most samples.
-WIDER, ROUND, ENOUGH, MOST_SAMPLES = 1.2, 1024, 1250.0, 16_384
+WIDER, ROUND, ENOUGH, MOST_SAMPLES = 1.5, 1024, 1250.0, 16_384
 #: Effective sample size below which mean and spread of the samples are not reported: their errors
 #: then exceed 1 / sqrt(50) = 14 % of the standard deviation.
 LEAST_USABLE_SIZE = 50.0

@@ -48,8 +48,7 @@ def infer(
         return _known[key]
     with threadpool_limits(1 if len(problem.readings) <= ONE_THREAD else None):
         found = Posterior(Search(problem, progress).run())
-    if key:
-        _known[key] = found
+    _known[key] = found
     while len(_known) > KEPT:
         _known.pop(next(iter(_known)))
     return found

@@ -35,8 +35,8 @@ from soilml.inference.gaussian_terms import (
     gaussian_terms,
     scatter_columns,
 )
-from soilml.inference.shared_columns import shared_columns
 from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
+from soilml.inference.shared_columns import shared_columns
 from soilml.remarks import Remark
 
 Booleans = NDArray[np.bool_]

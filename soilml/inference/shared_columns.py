@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import fields, replace
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.error_columns import error_columns, stacked
@@ -40,11 +38,14 @@ def shared_columns(case: Case, readings: Readings, soil: Sequence[Coordinate]):
     fixed = _columns(case, readings, fixed_names) if "F" in variant else None
     inner = [c for g in groups if (c := _columns(case, readings, g)).shape[1]]
     if "I" in variant:
-        inner.append(_inner(case, readings, ("cohesion", "friction_angle", "shear_modulus"), .1))
+        inner.append(_inner(case, readings, ("cohesion", "friction_angle", "shear_modulus"), 0.1))
     if "J" in variant:
-        inner += [_inner(case, readings, (n,), .1) for n in ("cohesion", "friction_angle", "shear_modulus")]
+        inner += [
+            _inner(case, readings, (n,), 0.1)
+            for n in ("cohesion", "friction_angle", "shear_modulus")
+        ]
     if "K" in variant:
-        inner.append(_inner(case, readings, ("kc", "kphi"), .2, together=True))
+        inner.append(_inner(case, readings, ("kc", "kphi"), 0.2, together=True))
     return fixed, inner
 
 
@@ -56,7 +57,8 @@ def _inner(case, readings, names, share, together=False):
     coords = []
     for n in names:
         v = float(getattr(case.soil, n))
-        if v == 0: continue
+        if v == 0:
+            continue
         b = declared(Soil)[n]
         unit = share * abs(v)
         lo, up = sorted(((b.lower - v) / unit, (b.upper - v) / unit))

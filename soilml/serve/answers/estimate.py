@@ -64,8 +64,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
         "remarks": texts(remarks),
         "parameters": parameters(case, fit),
         "explanations": [
-            {"text": str(one), "probability": one.probability}
-            for one in fit.explanations
+            {"text": str(one), "probability": one.probability} for one in fit.explanations
         ],
         "words": words(fit, advice),
         "warnings": texts(r for r in fit.warnings if r.code not in STATED_BESIDE),
