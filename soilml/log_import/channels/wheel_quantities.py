@@ -32,7 +32,7 @@ def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertai
             found[f"{role}.gear_ratio"] = channel.gear_ratio
         if role in ("torque", "motor_current"):
             found[f"{role}.efficiency"] = channel.efficiency
-        if role == "motor_current":
+        if channel.torque_constant is not None:
             found[f"{role}.torque_constant"] = channel.torque_constant
             found[f"{role}.idle_current"] = channel.idle_current
     if wheel.leg is not None:
