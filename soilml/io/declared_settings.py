@@ -13,7 +13,6 @@ import re
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
-from functools import cache
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
 from soilml.errors import InputError
@@ -105,11 +104,11 @@ class OneOf:
     def take(self, settings: Settings, key: str, kind: str) -> str:
         """The option, whatever the white space in it."""
         given = settings.text(key)
-        for known in self.options:
-            if given.replace(" ", "") == known.replace(" ", ""):
-                return known
-        shown = ", ".join(repr(known) for known in self.options)
-        settings.fail(f"{key} is {given!r}; needed is one of {shown}")
+        plain = {known.replace(" ", ""): known for known in self.options}
+        if given.replace(" ", "") not in plain:
+            shown = ", ".join(repr(known) for known in self.options if known)
+            settings.fail(f"{key} is {given!r}; needed is one of {shown}")
+        return plain[given.replace(" ", "")]
 
 
 @dataclass(frozen=True)
@@ -158,13 +157,13 @@ class Numbers:
         return tuple(float(x) for x in given)
 
 
-@cache
-def _declarations(cls: type) -> list[tuple[str, str, Any, tuple[Any, ...], bool]]:
+def _declarations(cls: Any) -> list[tuple[str, str, Any, tuple[Any, ...], bool]]:
     """Field, key, type, marks, and whether the key must be there, of each field of a dataclass."""
     hints = get_type_hints(cls, include_extras=True)
     found = []
     for field in fields(cls):
-        hint, marks = hints[field.name], ()
+        hint: Any = hints[field.name]
+        marks: tuple[Any, ...] = ()
         if hasattr(hint, "__metadata__"):
             hint, marks = hint.__origin__, hint.__metadata__
         key = next((mark.name for mark in marks if isinstance(mark, Key)), field.name)

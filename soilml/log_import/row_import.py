@@ -116,7 +116,7 @@ def import_rows(
 def _labels(run: Run, log_map: LogMap) -> list[str]:
     """Name of the run of each row: by [runs] column, or that of the file."""
     (recording,) = run.recordings
-    name = log_map.run_column
+    name = log_map.runs.column
     if not name:
         return [run.name] * len(recording)
     if name in recording.texts:

@@ -10,9 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.log_import.channels.inputs import Inputs
-from soilml.log_import.mapping.log_map import LogMap, WheelMap
-from soilml.log_import.mapping.wheel_leg import WheelLegMap
-from soilml.log_import.mapping.window_settings import LeaveOut
+from soilml.log_import.mapping.log_map import LeaveOut, LogMap, WheelLegMap, WheelMap
 from soilml.log_import.rows import AVERAGED, WindowRow, plain_constants, quantities_of
 from soilml.log_import.windows.mean_errors import mean_error
 from soilml.log_import.windows.stances import (

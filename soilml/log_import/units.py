@@ -192,9 +192,7 @@ def factor(unit: str, ours: str, where: str = "") -> float:
         hint = _OTHER_KIND.get(ours, "") if {kind, ours} == {"N", "kg"} else ""
         if kind in ("count", "count/s"):
             hint = "counts of an encoder need counts_per_turn, in [wheel_angle] or [wheel_speed]"
-        raise InputError(
-            f"{where}unit {unit!r} does not give {shown}{'; ' + hint if hint else ''}"
-        )
+        raise InputError(f"{where}unit {unit!r} does not give {shown}{'; ' + hint if hint else ''}")
     text = spelling(unit)
     if text in ("Hz", "kHz") and ours == "rad/s":
         return 6.283185307179586 * (1e3 if text == "kHz" else 1.0)

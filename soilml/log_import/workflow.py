@@ -112,7 +112,7 @@ def import_recordings(
     tell: Progress = lambda stage, done, total: None,
 ) -> ImportedLog:
     """What `import_log` gives, of logs that are read already; raises as it does."""
-    if found.each_row:
+    if found.runs.each_row:
         return import_rows(recordings, found, accept)
     runs = runs_of(recordings, found)
     parts_of_wheels = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]

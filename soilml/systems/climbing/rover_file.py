@@ -67,6 +67,7 @@ def _take_ground(settings: Settings) -> tuple[dict[str, float], dict[str, Prior]
     return fixed, prior
 
 
+_SPEED, _STRESS = Noise(share=Uncertainty.speed), Noise(share=0.05)
 _SHARE = Parameter("1", 0.0, 1.0, "standard deviation")
 _ANGLE = Parameter("rad", 0.0, 1.0, "standard deviation")
 
@@ -75,8 +76,8 @@ _ANGLE = Parameter("rad", 0.0, 1.0, "standard deviation")
 class _NoiseTable:
     """The table [noise]: standard deviations by column, and those of speed scale and front load."""
 
-    speed_m_s: Annotated[Noise, NoiseOfReading()] = Noise(share=Uncertainty.speed)
-    normal_Pa: Annotated[Noise, NoiseOfReading()] = Noise(share=0.05)  # noqa: N815
+    speed_m_s: Annotated[Noise, NoiseOfReading()] = _SPEED
+    normal_Pa: Annotated[Noise, NoiseOfReading()] = _STRESS  # noqa: N815
     slope_rad: Annotated[float, _ANGLE] = Uncertainty.slope
     entry_angle_rad: Annotated[float, _ANGLE] = Uncertainty.entry_angle
     speed_scale: Annotated[float, _SHARE] = Uncertainty.speed_scale
@@ -95,7 +96,10 @@ class _NoiseTable:
 def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
     found = take_declared(_NoiseTable, settings)
     own = Uncertainty(
-        found.speed_m_s.share, found.speed_scale, found.slope_rad, found.entry_angle_rad,
-        found.front_load,
-    )  # fmt: skip
+        speed=found.speed_m_s.share,
+        speed_scale=found.speed_scale,
+        slope=found.slope_rad,
+        entry_angle=found.entry_angle_rad,
+        front_load=found.front_load,
+    )
     return own, found.normal_Pa
