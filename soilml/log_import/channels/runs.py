@@ -7,6 +7,7 @@ import fnmatch
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,34 @@ def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
         _with_times(label if labels.count(label) == 1 else f"{name}_{label}", part, log_map)
         for name, label, part in found
     ]
+
+
+def as_rows(log: Sequence[Recording], name: str) -> Run:
+    """A log whose lines are numbered instead of timed."""
+    return Run(name, tuple(log), tuple(np.arange(float(len(own))) for own in log))
+
+
+def runs_of_rows(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
+    """Tables whose rows are steady runs, as runs of rows with one name that follow each other.
+
+    The name is that of the column of [runs], or of the file; the time of a row is its number.
+    """
+    runs, key = [], log_map.runs.column
+    for name, log in zip(run_names([log[0].file for log in logs]), logs, strict=True):
+        for recording in log:
+            whole = as_rows([recording], name)
+            if not key:
+                labels = [name] * len(recording)
+            elif key in recording.texts:
+                labels = [cell or "unnamed" for cell in recording.texts[key]]
+            else:
+                labels = [f"{value:g}" for value in whole.find(key)[1]]
+            number = whole.times[0]
+            starts = [i for i, label in enumerate(labels) if i == 0 or label != labels[i - 1]]
+            for start, stop in pairwise([*starts, len(labels)]):
+                keep = (number >= start) & (number < stop)
+                runs.append(Run(labels[start], (recording.rows(keep),), (number[keep],)))
+    return runs
 
 
 def matched_files(

@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError, SoilmlError
-from soilml.log_import.channels.runs import Run, runs_of
+from soilml.log_import.channels.runs import as_rows, runs_of
 from soilml.log_import.guesses.channel_drafts import draft_channels
 from soilml.log_import.guesses.columns import Candidate, candidates_of, liveliest
 from soilml.log_import.mapping.channel_map import ROLES
@@ -27,7 +27,6 @@ from soilml.log_import.mapping.written_map import (
 from soilml.log_import.new_map import draft_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import log_files
-from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import WheelSeries
 from soilml.log_import.workflow import import_log
@@ -104,10 +103,11 @@ class _Look:
         logs = [read_log(name) for name in names[: None if self.content.get("files") else 1]]
         steady = self.map is not None and self.map.runs.each_row
         try:
-            runs = _as_rows(logs) if steady else runs_of(logs, self.map or LogMap(MAP_FILE))
+            runs = [] if steady else runs_of(logs, self.map or LogMap(MAP_FILE))
         except InputError as error:
             self.fault = self.fault or str(error)
-            runs = _as_rows(logs)
+            runs = []
+        runs = runs or [as_rows(log, "log") for log in logs]
         run = liveliest(runs)
         self.run = run
         self.columns = candidates_of(run.recordings, steady)
@@ -121,11 +121,6 @@ class _Look:
             return map_from({**self.content, "slip": {"value": _ANY_SLIP}})
         except InputError:
             return None
-
-
-def _as_rows(logs: Sequence[Sequence[Recording]]) -> list[Run]:
-    """Logs without a clock: a sample each second, to be looked at."""
-    return [Run("log", tuple(r), tuple(np.arange(float(len(x))) for x in r)) for r in logs]
 
 
 def _changed(text: str, change: Mapping[str, Any], look: _Look) -> str:
