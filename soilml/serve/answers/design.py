@@ -11,7 +11,7 @@ from typing import Any
 
 from soilml.errors import InputError
 from soilml.io.named_files import NamedFiles
-from soilml.log_import.guesses.draft import toml_value
+from soilml.log_import.mapping.written_map import toml_value
 from soilml.optional_imports import tomllib
 from soilml.physics.soils import soil_catalogue
 from soilml.report.page import Provenance, report_texts
