@@ -31,7 +31,7 @@ TO_GAP = "soilml gap finds what a model lacks"
 
 def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> Report:
     """The report of one fit: verdict, soil, readings beside the model, what limits it."""
-    tables, details = [], []
+    details = []
     if fit.explanations:
         shown = sorted(fit.explanations, key=lambda one: -one.probability)
         said = [
@@ -40,10 +40,6 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
             if one.probability >= _LEAST_SHARE
         ]
         details.append(("Explanations that the intervals average over", said))
-    remarks = [*fit.warnings, *([fit.use_of_shares] if fit.use_of_shares is not None else [])]
-    if (exact := fit.exact_model) is not None:
-        note = exact.use_of_exact.text
-        tables.append(Table.of_parameters("Soil by the exact model", exact.frame_columns(), note))
     pictures = [] if fit.curves is None else [fit.curves().picture()]
     if fit.draws is not None:
         pictures.append(corner_picture(fit.names, fit.units, fit.draws))
@@ -61,9 +57,8 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
                 "left of prior", [left.get(n) for n in fit.names], "share", digits=2
             ),
         ),
-        tables=tables,
         pictures=pictures or [_intervals({"": fit}).picture()],
-        remarks=remarks,
+        remarks=fit.warnings,
         next_steps=[*next_rows, TO_GAP] if fit.fits else [TO_GAP],
         details=details,
         status=status if fit.fits else "the model does not fit",

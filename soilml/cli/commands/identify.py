@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from soilml.io.table import Table
 
 FORMATS = ("table", "json")
-HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
 Identify the soil parameters with which MODEL.toml explains the rows of
 RUNS.csv.
@@ -41,8 +40,8 @@ one of [gears.NAME] in MODEL.toml, in the column gear.
 
 Methods:
   averaged   (default) the soil averaged over explanations of the rows, each
-             weighted by its evidence: the model as it is, typical errors of
-             model and sensors of several sizes, effects of the catalogue
+             weighted by its evidence: the model as it is, a smooth error of
+             it, effects of the catalogue; typical errors of sensors beside all
 The others take the model as exact, and sensors but for [noise] and [bias]:
   posterior  mean, standard deviation and 90 % interval of the exact posterior
              under the priors and the noise
@@ -51,10 +50,9 @@ The others take the model as exact, and sensors but for [noise] and [bias]:
   newton     friction angle, shear modulus and kphi from a closed form;
              cohesion known
 
-`averaged` gives the answer of the exact model second, as exact_model. Use that
-only where model and sensors were verified on a known soil. It and `posterior`
-report which parameters the rows do not determine, and the next measurement
-that would help most.
+Use `posterior` only where model and sensors were verified on a known soil. It
+and `averaged` report which parameters the rows do not determine, and the next
+measurement that would help most.
 
 --mean averages the groups of --by, with the errors that they share. --fresh
 predicts other rows by the mean, and gives the regression of measured on
