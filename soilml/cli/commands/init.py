@@ -101,7 +101,7 @@ def _ask(key: str) -> str | None:
 
 def _size(key: str, text: str) -> float:
     """A size in SI units, from a number or a text with a unit."""
-    from soilml.config.model_settings import text_in_si
+    from soilml.io.declared_settings import text_in_si
 
     try:
         return read_number(text)
