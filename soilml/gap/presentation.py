@@ -30,13 +30,10 @@ def gap_files(
         origin = Provenance.of(["gap", model_name, runs_name], [])
     entry = {"report": summary(report, model_name, runs_name).as_json(origin)}
     comments = [report.sentence]
-    if names := report.model.suspected:
-        why = (
-            "the likeliest of several explanations that these runs cannot distinguish"
-            if report.status == "class"
-            else "suspected, not named: beside a remainder, it predicts rows kept back no worse"
-        )
-        comments += [f"{' + '.join(names)} is {why}."]
+    if count := len(report.model.explanations):
+        comments += [
+            f"{count} explanations with their weights follow; every prediction mixes them."
+        ]
     return {
         "report.html": page(report, model_name, runs_name, origin),
         "gap.json": json_text(report.as_json() | entry),

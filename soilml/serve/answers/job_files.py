@@ -29,7 +29,7 @@ def write_files(texts: Mapping[str, str]) -> list[str]:
 def page_case(request: Mapping[str, object]) -> Case:
     """The case of the page's model file, which may name no file; raises as `read_case` does."""
     file = setting_file(MODEL_FILE, request.get("model"))
-    return read_case(file, with_bias=True, files=NO_FILES)
+    return read_case(file, with_bias=True, files=NO_FILES, with_explanations=True)
 
 
 def setting_file(name: str, text: object) -> Path:
