@@ -254,9 +254,8 @@ def _weights(
             continue
         i = readings.channels.index(channel)
         of = (readings.channel == i) & _of_gear(readings, gear)
-        stated = case.discrepancy.get(column(channel))
         span = range_with_zero(readings.measured[readings.channel == i])
-        known = 0.0 if stated is None or stated.learned else stated.amplitude(span)
+        known = own.declared.amplitude(span) if _is_stated(case, channel) else 0.0
         size = float(np.hypot(amplitude[i], known))
         usual = float(terms.usual[i])
         sizes[channel, gear] = (size, max(size, usual))
@@ -271,7 +270,10 @@ def _weights(
     }
     given = dict(normal)
     if columns:
-        kept = terms.group != FIXED
+        stated = [i for i, name in enumerate(readings.channels) if _is_stated(case, name)]
+        count = int(np.isin(terms.group, stated).sum())
+        kept = np.ones(len(terms.group), bool)  # without what is stated, which is in the functions
+        kept[np.flatnonzero(terms.group == FIXED)[:count]] = False
         bare = replace(terms, columns=terms.columns[:, kept], group=terms.group[kept], _kept={})
         whiten = bare.whiten(bare.without_discrepancy(at), drawn.node.outliers)
         white = np.asarray(whiten @ np.concatenate(columns, axis=1))
@@ -290,6 +292,11 @@ def _weights(
             np.concatenate([size * normal[key], outside], axis=1),
         )
     return found
+
+
+def _is_stated(case: Case, channel: str) -> bool:
+    stated = case.discrepancy.get(column(channel))
+    return stated is not None and stated.amplitude(1.0) > 0.0
 
 
 def _of_gear(readings: Readings, gear: str) -> NDArray[np.bool_]:

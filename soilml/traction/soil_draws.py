@@ -30,8 +30,12 @@ from soilml.identification.model_error_inputs import (
     readings_with_model_error,
     with_stated_model_error,
 )
-from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
-from soilml.identification.posterior_density import check_declared
+from soilml.identification.posterior import (
+    PosteriorSamples,
+    check_declared,
+    posterior_samples,
+    prior_fractions,
+)
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
