@@ -21,11 +21,13 @@ from soilml.identification.posterior import (
     PosteriorSamples,
     check_declared,
     fit_of_samples,
+    posterior,
     posterior_samples,
 )
 from soilml.inference.draws import Draws
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
+from soilml.inference.shared_columns import shared_columns
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
@@ -45,7 +47,9 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         p(\theta | y) = \sum_h p(h | y) \int p(\theta | y, h, \eta)\, p(\eta | y, h)\, d\eta
 
     over the hypotheses h on what the model lacks and the hyperparameters of its Gaussian terms; see
-    `soilml.inference`. Soils outside of the priors of the case have no weight.
+    `soilml.inference`. Soils outside of the priors of the case have no weight. A case that states the
+    error of its model in [discrepancy] or [remainder] has one explanation, itself: the result is
+    that of the exact posterior.
 
     Parameters
     ----------
@@ -66,6 +70,8 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     FitError
         Where no parameters in the prior carry the measured loads.
     """
+    if case.states_model_error:
+        return posterior(case, readings, free)
     found = averaged_samples(case, readings, free)
     fit, mean_u = fit_of_samples("averaged", found, readings, free)
     fit = replace(fit, explanations=found.explanations)
@@ -113,6 +119,8 @@ def averaged_samples(
         raise FitError(str(error)) from error
     if found.refused is not None:
         raise_uncarried(case, readings.at)
+    fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)
+    found = found.beside(fixed, inner)
     parts = [_fractions(own, free) for own in found.draws(0)]
     sample = ImportanceSample(
         np.concatenate([u for u, _ in parts]), _normalised([w for _, w in parts]), 0.0
@@ -125,11 +133,14 @@ def soil_samples(
 ) -> PosteriorSamples:
     """Samples of the soil over all explanations of the rows, as `averaged` takes them.
 
-    With `exact_model`, those of the exact posterior. Raises `FitError` as `averaged`, and where
+    With `exact_model`, and where the case states the error of its model, those of the exact
+    posterior. Raises `FitError` as `averaged`, and where
     noise is not declared.
     """
     check_declared(readings)
-    return (posterior_samples if exact_model else averaged_samples)(case, readings, free)
+    if exact_model or case.states_model_error:
+        return posterior_samples(case, readings, free)
+    return averaged_samples(case, readings, free)
 
 
 def _fractions(own: Draws, free: Sequence[Coordinate]) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -292,6 +292,11 @@ class Posterior:
         ]
         predicted = predict_many(requests)
         return [weighted(o, self.terms, y) for o, y in zip(proposed, predicted, strict=True)]
+
+    def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
+        """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
+        prior = .9 if "P" in __import__("os").environ.get("VARIANT","") else .5
+        return Posterior(self.search.beside(fixed, inner, prior, LEAST_DRAWN))
 
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
         """Marginals of the soil parameters that are free within the case's priors, by path.

@@ -7,15 +7,12 @@ import pytest
 from channel_readings import channel_readings
 
 from soilml import identify, read_case
-from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError, InputError
-from soilml.fitting.coordinates import Coordinate, rates_at, select_free, values_at
+from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import misfit_limit
-from soilml.identification.fit import Fit, at_prior_bound, with_warnings
+from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.linear import with_fixed_parameter
-from soilml.identification.posterior import _misfit, _sampling_warnings
 from soilml.io.table import Table
-from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.numerics.prior import Prior
 from soilml.parameters import declared
 from soilml.physics.operating_point import Operating
@@ -135,17 +132,6 @@ def test_unknown_or_no_parameters_are_refused(case):
         select_free(case, ["cohesoin"])
 
 
-def test_values_and_rates_at_fractions_are_those_of_the_priors():
-    priors = [Prior(1.0, 3.0), Prior(0.01, 1.0, log=True)]
-    free = [Coordinate(str(i), "1", p, 1.0, False) for i, p in enumerate(priors)]
-    x = np.asarray([0.25, 0.5])
-    np.testing.assert_allclose(values_at(free, x), [1.5, 0.1])
-    np.testing.assert_allclose(rates_at(free, x), [2.0, 0.1 * np.log(100.0)])
-    assert free[0].fraction_precision == 12.0
-    error = Coordinate("e", "1", Prior(-4.0, 4.0), 0.0, False, normal_std=0.5)
-    assert error.fraction_precision == pytest.approx((8.0 / 0.5) ** 2)
-
-
 def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
     free = select_free(case, list(fit.names))
     found = with_warnings(
@@ -153,70 +139,6 @@ def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
     )
     assert found.warnings[0].code == "first"
     return tuple(texts(found.warnings[1:]))
-
-
-def test_a_sound_fit_has_no_warnings(case):
-    assert warned(case, fit_of(), rows_of()) == ()
-    some = {"cohesion": 0.5, "friction_angle": 0.5}
-    assert warned(case, fit_of(remaining_fraction=some), rows_of()) == ()
-
-
-def test_what_the_rows_leave_open_is_said_by_how_much_of_the_prior_remains(case):
-    left = {"cohesion": 0.51, "friction_angle": 0.81}
-    assert warned(case, fit_of(remaining_fraction=left), rows_of()) == (
-        "cohesion is weakly identified: 51% of the prior's width remains",
-        "friction_angle is not identified: 81% of the prior's width remains",
-    )
-    wide = {"cohesion": 1.03, "friction_angle": 0.996}
-    assert warned(case, fit_of(remaining_fraction=wide), rows_of()) == (
-        "cohesion is not identified: all of the prior's width remains",
-        "friction_angle is not identified: all of the prior's width remains",
-    )
-    weak = {"cohesion": 0.8, "friction_angle": 0.8}
-    assert all("weakly" in t for t in warned(case, fit_of(remaining_fraction=weak), rows_of()))
-    one_load = rows_of(load=(60.0, 60.0, 60.0))
-    said = warned(case, fit_of(remaining_fraction=left), one_load)
-    assert said[0] == "one load only: cohesion is not identified"
-    assert warned(case, fit_of(), one_load) == (
-        "one load only: cohesion is determined by the change with slip alone",
-    )
-    other = fit_of(
-        names=("n", "friction_angle"), remaining_fraction={"n": 0.1, "friction_angle": 0.1}
-    )
-    assert not any("one load" in t for t in warned(case, other, one_load))
-
-
-def test_values_at_bounds_and_assumed_priors_are_said(case):
-    said = warned(case, fit_of(), rows_of(), u=(0.0009, 0.9991))
-    assert said == (
-        "cohesion is at the lower bound of its prior, which determines the estimate",
-        "friction_angle is at the upper bound of its prior, which determines the estimate",
-    )
-    at_bound = at_prior_bound(np.asarray([0.0011, 0.9989, 0.0, 1.0]))
-    assert at_bound.tolist() == [False, False, True, True]
-    said = warned(replace(case, prior={}), fit_of(), rows_of())
-    assert said[0] == "cohesion has no prior: 0 to 10000 Pa is assumed"
-
-
-def test_few_readings_trade_offs_and_excess_are_said(case):
-    assert "1 reading for 2 parameters: the prior determines the rest" in warned(
-        case, fit_of(), rows_of(load=(60.0,))
-    )
-    assert not any("readings for" in t for t in warned(case, fit_of(), rows_of(load=(30.0, 60.0))))
-    tied = np.asarray([[4.0, -1.92], [-1.92, 1.0]])
-    said = warned(case, fit_of(covariance=tied), rows_of())
-    assert len(said) == 1
-    assert said[0].startswith("cohesion and friction_angle trade off (correlation -0.96)")
-    assert warned(case, fit_of(covariance=0.5 * (tied + COVARIANCE)), rows_of()) == ()
-    said = warned(case, fit_of(misfit=9.0), rows_of(), excess=True)
-    assert said[0].startswith("residuals are 3.0 times the declared noise: ")
-    unsure = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.1)})
-    said = warned(unsure, fit_of(misfit=9.0), rows_of(), excess=True)
-    assert said[0].startswith("residuals are 3.0 times the declared noise and discrepancy: ")
-    rows = rows_of(std=np.full(3, np.nan), excluded_channels=("sinkage_m",))
-    said = warned(case, fit_of(), rows, undeclared=True)
-    assert said[0].startswith("noise of torque_Nm is not declared: estimated from the residuals")
-    assert said[1] == "sinkage_m is not used: its noise is not declared in [noise]"
 
 
 def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
@@ -270,32 +192,6 @@ def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
     for freedom in (1, 5, 40):
         assert misfit_limit(freedom) == pytest.approx(chi2.ppf(0.999, freedom) / freedom, rel=0.04)
     assert misfit_limit(0) == np.inf
-
-
-def test_a_small_effective_sample_size_is_said():
-    def of_size(size):
-        weights = np.full(size, 1.0 / size)
-        return tuple(texts(_sampling_warnings(ImportanceSample(np.zeros((size, 1)), weights, 0.0))))
-
-    assert of_size(100000) == ()
-    assert of_size(100) == (
-        "the effective sample size is 100 only: sampling error of the values is about 10 % of "
-        "their std",
-    )
-
-
-def test_the_misfit_counts_squares_within_condensed_rows():
-    class Density:
-        class readings:  # noqa: N801
-            squares_within, reading_count = 3.0, 8
-
-        @staticmethod
-        def squared_residuals(u):
-            assert u.shape == (1, 2)
-            return 9.0
-
-    assert _misfit(Density, np.zeros(2), 2) == 2.0
-    assert _misfit(Density, np.zeros(2), 9) == 12.0
 
 
 def test_methods_are_checked_before_anything_is_read(case):

@@ -98,8 +98,7 @@ function show({ id, result }) {
     result.next ? element("p", { class: "next" }, element("b", {}, "Drive next: "), result.next) : null,
     wordList([...result.remarks, ...result.warnings], "remark"),
     pull,
-    fold("How sure this is", element("p", { class: "soft" }, `${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, averaged over explanations of the rows${explained(result.explanations)}. Brown: that of exact_model, the model file taken as exact.`),
-      result.use ? element("p", {}, `${result.use[0].toUpperCase()}${result.use.slice(1)}.`) : null,
+    fold("How sure this is", element("p", { class: "soft" }, `${counted(result.used, "row")} (${result.channels.join(", ")}). Grey: the prior. Blue: the 90 % interval after the log, averaged over explanations of the rows${explained(result.explanations)}.`),
       sureness(result.parameters), wordList(result.words.slice(0, -1))),
     element("div", { class: "buttons" },
       element("button", { type: "button", id: "use-soil", onclick: () => {
@@ -130,13 +129,13 @@ function band(parameter) {
     picture(parameter));
 }
 
-/** What each interval leaves of the prior, and the intervals of the model taken as exact. */
+/** What each interval leaves of the prior. */
 function sureness(parameters) {
-  const heads = ["", "left of the prior's width", "90 %", "90 % of exact_model"];
+  const heads = ["", "left of the prior's width", "90 %"];
   return element("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": "How sure each parameter is" },
     element("table", {}, element("thead", {}, element("tr", {}, ...heads.map((head) => element("th", { scope: "col" }, head)))),
       element("tbody", {}, ...parameters.map((p) => element("tr", {}, element("th", { scope: "row" }, p.label),
-        ...[percent(p.left), range(...p.band, p.unit), p.exact_band ? range(...p.exact_band, p.unit) : "–"].map((text) => element("td", {}, text)))))));
+        ...[percent(p.left), range(...p.band, p.unit)].map((text) => element("td", {}, text)))))));
 }
 
 /** The explanations with their probabilities, in words. */
@@ -148,7 +147,7 @@ function explained(explanations) {
 const SYMBOLS = { phi: "φ", k_phi: "kφ", k_c: "kc", a_0: "a₀", a_1: "a₁", gamma: "γ" };
 const symbolText = (symbol) => SYMBOLS[symbol] ?? symbol;
 
-function picture({ range: [low, high], prior, band: [from, to], exact_band: exact, value, log, identified, unit, label }) {
+function picture({ range: [low, high], prior, band: [from, to], value, log, identified, unit, label }) {
   const place = log
     ? (x) => (100 * Math.log(Math.max(x, low) / low)) / Math.log(high / low)
     : (x) => (100 * (x - low)) / (high - low);
@@ -164,7 +163,6 @@ function picture({ range: [low, high], prior, band: [from, to], exact_band: exac
     drawn("line", { class: "b-range", x1: "0%", x2: "100%", y1: 15, y2: 15 }),
     bar(prior[0], prior[2], 5, 20, "b-prior"),
     bar(from, to, 7, 10, `b-post${known}`),
-    ...(exact ? [bar(exact[0], exact[1], 19, 4, "b-exact")] : []),
     drawn("line", { class: `b-mid${known}`, x1: `${within(value)}%`, x2: `${within(value)}%`, y1: 7, y2: 17 }),
     words("0%", "start", low), words("100%", "end", high));
 }
