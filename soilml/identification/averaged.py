@@ -10,7 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.measurement_noise import checked_sensors
-from soilml.errors import FitError, InputError
+from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
@@ -47,9 +47,9 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         p(\theta | y) = \sum_h p(h | y) \int p(\theta | y, h, \eta)\, p(\eta | y, h)\, d\eta
 
     over the hypotheses h on what the model lacks and the hyperparameters of its Gaussian terms; see
-    `soilml.inference`. Soils outside of the priors of the case have no weight. A case that states the
-    error of its model in [discrepancy] or [remainder] has one explanation, itself: the result is
-    that of the exact posterior.
+    `soilml.inference`. Soils outside of the priors of the case have no weight. A case that states
+    the error of its model in [discrepancy] or [remainder] has one explanation, itself: the result
+    is that of the exact posterior.
 
     Parameters
     ----------
@@ -115,8 +115,8 @@ def averaged_samples(
     )
     try:
         found = infer(problem)
-    except InputError as error:
-        raise FitError(str(error)) from error
+    except InputError:
+        raise_uncarried(case, readings.at)
     if found.refused is not None:
         raise_uncarried(case, readings.at)
     fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)

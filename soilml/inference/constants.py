@@ -22,6 +22,9 @@ OTHER_LAW_PRIOR = 0.5
 OUTSIDE_PRIORS = 0.05
 #: Prior probability that a smooth discrepancy is present.
 DISCREPANCY_PRIOR = 0.5
+#: The same for the soil: a model is never quite right, and rows hardly show what another soil does
+#: too. `gap`, which decides between both, gives them equal odds.
+SOIL_DISCREPANCY_PRIOR = 0.9
 #: Range over which the logarithm of the size of an effect of soil or gear is uniform, in reference
 #: sizes; the density falls with two further powers beyond it.
 SMALLEST_SIZE, LARGEST_SIZE, TAIL_POWER = 0.01, 5.0, 2.0

@@ -295,7 +295,7 @@ class Posterior:
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
         """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
-        prior = .9 if "P" in __import__("os").environ.get("VARIANT","") else .5
+        prior = constants.SOIL_DISCREPANCY_PRIOR
         return Posterior(self.search.beside(fixed, inner, prior, LEAST_DRAWN))
 
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:

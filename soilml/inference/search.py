@@ -178,9 +178,7 @@ class Search:
                 break
         self._settle(jobs, float("inf"), NEAR_HIDDEN)
 
-    def beside(
-        self, fixed: Floats, inner: Sequence[Floats], prior: float, least: float
-    ) -> Search:
+    def beside(self, fixed: Floats, inner: Sequence[Floats], prior: float, least: float) -> Search:
         """The hypotheses above a probability, fitted beside further Gaussian terms.
 
         fixed (m, k): Columns of unit variance.
