@@ -47,30 +47,6 @@ def test_a_test_states_what_the_soil_predicts_by_hand():
     assert SHEAR.deviation(known) == pytest.approx(np.log(strength / 5000.0) / 0.1)
 
 
-def test_soil_without_bearing_capacity_is_far_off_and_finite():
-    known = {"kc": -1e5, "kphi": 1e6, "n": 1.0}
-    assert PLATE.deviation(known) == pytest.approx(np.log(1e-6) / 0.15)
-
-
-def test_derivatives_of_deviations_are_those_of_differences():
-    priors = {
-        "kphi": Prior(3e5, 5e6, log=True),
-        "kc": Prior(-1e3, 5e3),
-        "n": Prior(0.7, 1.4),
-        "cohesion": Prior(0.0, 3000.0),
-        "friction_angle": Prior(0.3, 0.8),
-        "shear_modulus": Prior(0.005, 0.05),
-    }
-    case = a_case(prior=priors, soil_tests=(PLATE, SHEAR))
-    free, u = select_free(case, None), np.linspace(0.3, 0.7, 6)
-    steps = 1e-6 * np.eye(6)
-    terms = SoilTestTerms(case, free)
-    ends = [terms.deviation(u + side * steps) for side in (1.0, -1.0)]
-    expected = ((ends[0] - ends[1]) / 2e-6).T
-    np.testing.assert_allclose(terms.rates(u), expected, rtol=1e-5, atol=1e-7)
-    assert not terms.rates(u)[:, 5].any()  # K takes no part in either test
-
-
 def test_model_file_keeps_tests_and_takes_units(tmp_path):
     text = case_as_toml(a_case())
     tests = (

@@ -14,9 +14,7 @@ from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.linear import with_fixed_parameter
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.parameters import declared
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils import Soil
 from soilml.remarks import Remark, texts
 
 COVARIANCE = np.asarray([[4.0, 1.2], [1.2, 1.0]])
@@ -47,53 +45,6 @@ def case(model_file):
     return read_case(model_file)
 
 
-def test_a_fit_has_gaussian_intervals_unless_the_method_gives_others():
-    fit = fit_of()
-    assert fit.std.tolist() == [2.0, 1.0]
-    np.testing.assert_allclose(fit.correlation, [[1.0, 0.6], [0.6, 1.0]])
-    low, high = fit.interval
-    np.testing.assert_allclose(low, [10.0 - 1.645 * 2.0, 0.5 - 1.645], rtol=1e-3)
-    np.testing.assert_allclose(high, [10.0 + 1.645 * 2.0, 0.5 + 1.645], rtol=1e-3)
-    assert fit["friction_angle"] == 0.5
-    low, high = np.asarray([9.0, 0.1]), np.asarray([12.0, 0.7])
-    own = replace(fit, low=low, high=high)
-    assert own.interval[0] is low and own.interval[1] is high
-    assert replace(fit, low=low).interval[0] == pytest.approx(fit.interval[0])
-    assert "samples" not in repr(replace(fit, samples=1))
-    assert replace(fit_of(low=None), samples=1).samples == 1
-
-
-def test_intervals_for_a_figure_have_the_ranges_of_the_priors():
-    fit = fit_of(low=np.asarray([9.0, 0.1]), high=np.asarray([12.0, 0.7]))
-    shown = fit.intervals({"friction_angle": Prior.normal(0.2)}, "a label")
-    assert shown.names == fit.names and shown.units == fit.units
-    rows = [np.asarray(v) for v in vars(shown).values() if isinstance(v, np.ndarray)]
-    values, low, high, prior_low, prior_high = rows
-    assert values.tolist() == [[10.0, 0.5]]
-    assert low.tolist() == [[9.0, 0.1]] and high.tolist() == [[12.0, 0.7]]
-    np.testing.assert_allclose(prior_low, [np.nan, -2.5758 * 0.2], rtol=1e-3)
-    np.testing.assert_allclose(prior_high, [np.nan, 2.5758 * 0.2], rtol=1e-3)
-    uniform = fit.intervals({"cohesion": Prior(1.0, 20.0)})
-    ends = [v for v in vars(uniform).values() if isinstance(v, np.ndarray)][3:]
-    assert [e[0] for e in ends] == [1.0, 20.0] and np.isnan([e[1] for e in ends]).all()
-    none = [v for v in vars(fit.intervals()).values() if isinstance(v, np.ndarray)][3:]
-    assert np.isnan(none).all()
-
-
-def test_json_of_a_fit_names_every_number():
-    content = fit_of(remaining_fraction={"cohesion": 0.3}, channels=("torque_Nm",)).as_json()
-    assert content["parameters"]["cohesion"]["remaining_fraction"] == 0.3
-    assert "remaining_fraction" not in content["parameters"]["friction_angle"]
-    assert content["parameters"]["friction_angle"]["std"] == 1.0
-    assert content["correlation"]["cohesion"] == {"friction_angle": pytest.approx(0.6)}
-    assert content["correlation"]["friction_angle"] == {"cohesion": pytest.approx(0.6)}
-    assert content["misfit"] is None and content["rows_used"] == 3
-    assert fit_of(misfit=1.5).as_json()["misfit"] == 1.5
-    assert content["channels_used"] == ["torque_Nm"] and [
-        w["code"] for w in content["warnings"]
-    ] == ["first"]
-
-
 def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
     bare = replace(case, prior={"cohesion": Prior(0.0, 500.0)})
     names = ["cohesion", "friction_angle", "shear_modulus", "n", "friction_angle"]
@@ -110,19 +61,6 @@ def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
     assert [f.unit for f in free] == ["Pa", "rad", "m", "1"]
     assert free[3].nominal == case.soil.n
     assert [f.path for f in select_free(case, None)] == list(case.prior)
-
-
-def test_a_prior_of_a_wide_parameter_lies_about_its_value(case):
-    soil = replace(case.soil, kphi=1e6, kc=0.0, a0=0.5, unit_weight=1000.0)
-    known = replace(case, soil=soil)
-    kphi, kc, a0, weight = select_free(known, ["kphi", "kc", "a0", "unit_weight"])
-    assert kphi.prior == Prior(1e6 / 30.0, 30e6, log=True)
-    bounds = declared(Soil)["kc"]
-    assert kc.prior == Prior(bounds.lower, bounds.upper)
-    assert a0.prior == Prior(0.0, 1.0)
-    assert weight.prior == Prior(0.0, 5e4)  # fifty times the value
-    near = select_free(replace(case, soil=replace(soil, unit_weight=499.0)), ["unit_weight"])[0]
-    assert near.prior == Prior(499.0 / 30.0, 499.0 * 30.0, log=True)
 
 
 def test_unknown_or_no_parameters_are_refused(case):
