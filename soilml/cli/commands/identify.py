@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
 FORMATS = ("table", "json")
-HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
 Identify the soil parameters with which MODEL.toml explains the rows of
 RUNS.csv.
