@@ -24,6 +24,7 @@ from soilml.identification.posterior import (
     posterior,
     posterior_samples,
 )
+from soilml.inference import constants
 from soilml.inference.draws import Draws
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
@@ -31,6 +32,7 @@ from soilml.inference.shared_columns import shared_columns
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
+from soilml.remarks import Remark
 
 
 @dataclass(frozen=True)
@@ -75,6 +77,9 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     found = averaged_samples(case, readings, free)
     fit, mean_u = fit_of_samples("averaged", found, readings, free)
     fit = replace(fit, explanations=found.explanations)
+    if sum(one.probability for one in found.explanations if one.exact) < constants.UNLIKELY_MODEL:
+        text = "other explanations are a hundred times as likely as the model as in its file"
+        fit = replace(fit, warnings=(*fit.warnings, Remark("unlikely", text)))
     return with_warnings(
         fit,
         case,

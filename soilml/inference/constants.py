@@ -82,6 +82,9 @@ PRESSED = 0.02
 
 # ---- the answer
 
+#: Probability of the model as in its file below which `identify` says that it does not fit.
+UNLIKELY_MODEL = 0.01
+
 #: Discrepancy, root mean square in the noise of a reading, that is no gap: with noise it makes
 #: residuals five per cent larger than noise alone.
 NEGLIGIBLE_DISCREPANCY = 0.3
