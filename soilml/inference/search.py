@@ -43,12 +43,6 @@ Booleans = NDArray[np.bool_]
 
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
-#: Objective within which of the best first fit of the soil others are optima to keep.
-OTHER_OPTIMUM = 50.0
-#: Nodes from which additions are predicted, the likeliest first.
-EXTENDED = 6
-#: Evidence within which fits without a discrepancy, which may hide their effects, are kept.
-NEAR_HIDDEN = 40.0
 #: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
 #: a bound would stay there.
 INWARD = 0.8
@@ -122,7 +116,7 @@ class Search:
         self.terms = gaussian_terms(
             readings, problem.case, scatter_columns(best.fitted(), readings)
         )
-        kept = [f for f in carried if f.objective < best.objective + OTHER_OPTIMUM]
+        kept = [f for f in carried if f.objective < best.objective + constants.OTHER_OPTIMUM]
         first = self.terms.first()
         jobs = [
             StartedFit(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept
@@ -176,7 +170,7 @@ class Search:
                 jobs.append(StartedFit(h, start, own.at, soil.outliers))
             if len(jobs) == constants.HIDDEN:
                 break
-        self._settle(jobs, float("inf"), NEAR_HIDDEN)
+        self._settle(jobs, float("inf"), constants.NEAR_HIDDEN)
 
     def beside(self, fixed: Floats, inner: Sequence[Floats], prior: float, least: float) -> Search:
         """The hypotheses above a probability, fitted beside further Gaussian terms.
@@ -321,7 +315,7 @@ class Search:
         """The fits of the next round; in the first one the best single effects in any case."""
         lowest = self.lowest
         near = sorted(self.nodes.values(), key=lambda node: node.value)
-        near = [node for node in near if node.value < lowest + constants.NEAR][:EXTENDED]
+        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.EXTENDED]
         for node in {id(n): n for n in (*near, self.nodes[SOIL_ALONE])}.values():
             if node.extended:
                 continue
