@@ -114,7 +114,7 @@ def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) ->
     if whole is not None:
         return updated_case(whole, left, learned)
     alone = updated_case(posterior.soil, left, learned)
-    mean = {p: significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
+    mean = {p: round_significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
     each = []
     for weight, node in parts:
         own = updated_case(node)
