@@ -269,7 +269,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
         return SoilQuestion(
             {name: replace(entry, spread=spread, assumed=assumed)}, None, prior, tests
         )
-    names = settings.take("names", list, "a list of published soils, see `soilml soils`")
+    names = settings.take("names", list, "a list of published soils, see `soilml show soils`")
     base = Settings({k: v for k, v in settings.content.items() if k != "names"}, settings.where,
                     settings.files)  # fmt: skip
     if not names or not all(isinstance(name, str) for name in names):
