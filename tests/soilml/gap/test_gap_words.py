@@ -8,6 +8,7 @@ import pytest
 from gap_sets import analysed, case_of, driven, hidden
 from soilml.gap.presentation import gap_files, gap_text
 from soilml.gap.report.page import summary, suspect_table
+from soilml.serve.answers.gap import verdict
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
@@ -25,7 +26,6 @@ from soilml.gap.report.results import (
 from soilml.gap.report.sentences import HEADLINE_WORDS, MOST_LINES, headline, report_lines
 from soilml.io.table import Table
 from soilml.remarks import Remark, texts
-from soilml.serve.answers.gap import verdict
 
 STORIES = {
     "torque-sensor": Plan("S", "torque-gain", 1.0, 0.01, 8, "dry-sand", 3, seed=3),
