@@ -22,7 +22,8 @@ from soilml.io.text_tables import csv_blocks
 from soilml.report.aligned_text import wrapped
 from soilml.report.figure_style import save_png
 from soilml.report.page import Content, Provenance, json_text, report_texts
-from soilml.report.report import Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 
 if TYPE_CHECKING:
     from soilml.report.column_panels import ColumnPanels
@@ -74,7 +75,7 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
             write_stdout(text)
         return
     content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    table = Table.of("rows", columns).text
+    table = ReportTable.of("rows", columns).text
     write_stdout(f"{table()}\n" if form == "table" else json_text(content))
 
 

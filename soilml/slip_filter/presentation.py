@@ -12,7 +12,8 @@ from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES
 from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
 from soilml.report.numbers import format_band
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.slip_filter.drive import DriveSlip
 
 SIZE = (9.0, 7.5)  # Width and height of the figure, inches
@@ -58,7 +59,7 @@ def report_of_drive(found: DriveSlip, title: str = "Slip of a drive") -> Report:
         kind="slip",
         verdict=verdict,
         lines=lines,
-        tables=[Table("Flags", columns)] if names else [],
+        tables=[ReportTable("Flags", columns)] if names else [],
         pictures=[
             Picture(
                 "The drive", partial(plot_drive, found), 3, 1, SIZE,

@@ -14,7 +14,8 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
 from soilml.report.figure_style import AFTER, BEFORE, PRIOR, UNCHANGED
 from soilml.report.numbers import format_band, format_quantity, format_range, significant
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.traction.by_load import SAME_LOAD, LoadPrediction
 from soilml.traction.pull_and_slope import Traction
 from soilml.traction.report import PullReport
@@ -91,7 +92,7 @@ def report_of_pull(found: PullReport, title: str = "Drawbar pull and slope") -> 
         wanted = [
             n for n in columns if n in of or n.removesuffix("_p05").removesuffix("_p95") in of
         ]
-        tables.append(Table.of(head, {n: np.asarray(columns[n])[shown] for n in wanted}))
+        tables.append(ReportTable.of(head, {n: np.asarray(columns[n])[shown] for n in wanted}))
     tables += [one.laws.table() for one in loads if one.laws is not None]
     vague = [share > NOT_IDENTIFIED_ABOVE for one in loads for share in one.remaining_fraction]
     sentences = [_sentence(one) for one in loads]
@@ -158,10 +159,10 @@ def _efficiency(known: Traction) -> Iterator[str]:
     yield f"Traffic class there: {found['traffic_class'][i]}, on {share} of the soils."
 
 
-def _by_load(found: PullReport) -> Table:
+def _by_load(found: PullReport) -> ReportTable:
     known = [one.posterior for one in found.by_load]
     pulls = [quantile_band(one.prior.largest_pull) for one in found.by_load]
-    return Table(
+    return ReportTable(
         "By load",
         [
             Column("load", [one.load for one in known], "N"),

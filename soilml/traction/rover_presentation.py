@@ -12,7 +12,8 @@ from soilml.arrays import Floats
 from soilml.numerics.quantiles import quantile_band
 from soilml.report.figure_style import AFTER, PRIOR, UNCHANGED
 from soilml.report.numbers import format_band, format_quantity, format_range
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.traction.presentation import band_columns
 from soilml.traction.rover_report import RoverReport
 
@@ -88,7 +89,7 @@ def _lines(found: RoverReport, still: float) -> Iterator[str]:
         yield f"{share} of the soils do not let the rover move."
 
 
-def _slopes(found: RoverReport) -> Table:
+def _slopes(found: RoverReport) -> ReportTable:
     own, enough = found.performance, found.performance.climbed >= FEWEST
     slip, margin, work = (quantile_band(v) for v in (own.slip, own.margin, own.energy))
     blank = np.where(enough, 0.0, np.nan)
@@ -103,10 +104,10 @@ def _slopes(found: RoverReport) -> Table:
     ):
         ends = ((band.lower + hidden).tolist(), (band.upper + hidden).tolist())
         columns.append(Column(head, (band.middle + hidden).tolist(), unit, ends=ends))
-    return Table("Slopes", columns)
+    return ReportTable("Slopes", columns)
 
 
-def _wheels(found: RoverReport) -> Iterator[Table]:
+def _wheels(found: RoverReport) -> Iterator[ReportTable]:
     """Loads, torques and sinkages on the steepest of the slopes that most draws climb."""
     own = found.performance
     climbed = np.flatnonzero(own.climbed >= FEWEST)
@@ -115,7 +116,7 @@ def _wheels(found: RoverReport) -> Iterator[Table]:
     at = int(climbed[-1])
     torque = [quantile_band(own.torque[name][:, at]) for name in own.loads]
     sinkage = [quantile_band(own.sinkage[name][:, at]) for name in own.loads]
-    yield Table(
+    yield ReportTable(
         f"Wheels on {format_quantity(float(own.slope[at]), 'rad')}",
         [
             Column("wheel", list(own.loads)),
