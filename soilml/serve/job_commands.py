@@ -105,11 +105,13 @@ def _import(request: Mapping[str, Any]) -> list[str]:
 
 
 def _wheels(request: Mapping[str, Any]) -> list[str]:
+    from soilml.config.case import read_case
     from soilml.rover_design.study import read_study
 
     names = request["names"]
     if request.get("model"):
-        names = [*names, _text_file(MODEL_FILE, request["model"]).name]
+        read_case(model := _text_file(MODEL_FILE, request["model"]), with_bias=True, files=NO_FILES)
+        names = [*names, model.name]
     files = NamedFiles(names=names, hint="drop the table of runs first")
     read_study(_text_file(STUDY_FILE, request.get("question")), files)
     effort = request.get("effort", "normal")
