@@ -6,13 +6,15 @@ from dataclasses import replace
 
 import pytest
 from gap_sets import analysed, case_of, driven, hidden
+from soilml.gap.presentation import gap_files, gap_text
+from soilml.gap.report.page import summary, suspect_table
+from soilml.serve.answers.gap import verdict
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
 from soilml.gap import gap
 from soilml.gap.report.listed_explanations import next_run_in_words
 from soilml.gap.report.reasons_in_short import SENTENCE_WORDS
-from soilml.gap.report.report import gap_files
 from soilml.gap.report.results import (
     STATUSES,
     GapReduction,
@@ -60,13 +62,18 @@ def check_order(report):
 
 
 def check_outputs(report):
+    origin = summary(report, "m", "r")
     found = json.loads(gap_files(report, "m", "r")["gap.json"])
     lines = [line["text"] for line in found["lines"]]
     assert found["sentence"] == report.sentence and lines == texts(report.lines)
-    whole = [report.sentence, *lines]
-    assert found["report"]["answer"][: len(whole)] == whole
-    assert report.report().text().startswith("\n".join(whole))
-    assert report.summary().splitlines()[0] == report.sentence
+    shown = [text.replace(" -> ", " → ") for text in (report.sentence, *lines)]
+    assert list(origin.answer) == shown
+    live = verdict(report)
+    assert [live["sentence"], *live["lines"]] == shown
+    text = gap_text(report)
+    assert text.startswith("\n".join([f"{report.status}: {report.sentence}", *lines]))
+    listed = [s["probability"] for s in suspect_table(report)]
+    assert [s["probability"] for s in live["suspects"]] == listed
 
 
 @pytest.mark.slow
