@@ -19,10 +19,10 @@ from numpy.typing import NDArray
 from soilml import Estimator, Model, Operating
 from soilml.cli import main
 from soilml.io.table import Table
-from soilml.io.text_tables import format_table
 from soilml.log_import import import_log
 from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.quantities import Z_90, column
+from soilml.report.aligned_text import format_table
 from soilml.systems.wheel_legs.slip_models import VIBRATION_SLIP, soil_spring
 from soilml.systems.wheel_legs.stances import (
     FOOT,
@@ -261,13 +261,14 @@ def picture(files: list[Path], target: Path) -> None:
     """A run over time, and slip on board over slip."""
     import matplotlib.pyplot as plt
 
-    from soilml.log_import.figures import draw_run
+    from soilml.log_import.figures import draw_run, run_panels
     from soilml.report.figure_style import report_style
 
     imported = import_log(files, FOLDER / "map.toml")
     with report_style():
-        figure = plt.figure(figsize=(9.0, 5.2))
-        draw_run(figure, imported.series[2], imported.table)
+        series = imported.series[2]
+        figure, axes = plt.subplots(run_panels(series), 1, figsize=(9.0, 5.2), layout="constrained")
+        draw_run(series, imported.table, axes)
         figure.axes[-1].set_xlabel("time, s; each blue stretch is a stance")
         figure.savefig(target, dpi=80, facecolor="white")
     plt.close(figure)

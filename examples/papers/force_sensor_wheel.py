@@ -12,8 +12,8 @@ from soilml import Model, Operating, StressShift, Table, Wheel, soil
 from soilml.config.case import Case
 from soilml.config.measurement_noise import Noise
 from soilml.gap import gap
-from soilml.io.text_tables import format_table
 from soilml.numerics.prior import Prior
+from soilml.report.aligned_text import format_table
 from soilml.systems.force_sensor_wheel import (
     MohrCoulomb,
     SensingWheel,

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from datagen.generate import generate
 from datagen.recipe import packaged_file, read_recipe
-from soilml.io.text_tables import format_table
 from soilml.papers import comin2017_slip as chapter
+from soilml.report.aligned_text import format_table
 from soilml.systems.wheel_legs.slip_models import (
     GRAVITY,
     VIBRATION_SLIP,

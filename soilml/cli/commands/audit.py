@@ -59,7 +59,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case
     from soilml.fitting.covariance import ignored_discrepancy
     from soilml.gap import audit
-    from soilml.gap.presentation import audit_text
     from soilml.report.page import json_text
 
     design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
@@ -70,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
         found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
     if args.out is not None:
         save_text(args.out, json_text(found.as_json()))
-    show_result(audit_text(found, args.verbose), found.as_json())
+    show_result(found.report(), found.as_json())
     for line in ignored_discrepancy(case, "the audit", "effects are harder to name than it says"):
         tell(line.text)
     return 0

@@ -86,7 +86,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
     from soilml.report.page import report_texts
-    from soilml.systems.climbing.presentation import climb_report, climb_text
+    from soilml.systems.climbing.presentation import report_of_climbs
     from soilml.systems.climbing.report import climbing_report
     from soilml.systems.climbing.rover_file import read_rover
     from soilml.systems.climbing.tables import read_climb_data
@@ -99,15 +99,17 @@ def run(args: argparse.Namespace) -> int:
     with working(f"identifying from {len(data.climbs)} climbs"):
         report = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
     content = report.as_json()
+    page = report_of_climbs(
+        report, f"Slopes that {Path(args.rover).name} climbs, from {Path(args.runs).name}"
+    )
     if args.out is not None:
-        page = climb_report(report, (args.rover, args.runs))
         html, result, curve, climbs = FILES
         target = Path(args.out)
         contents = report_texts(page, origin_of(args), content, (html, result), target)
         contents |= {target / curve: csv_text(_curve(report))}
         contents |= {target / climbs: csv_text(_runs(report))}
         write_files(contents, folders=[args.out])
-    show_result(climb_text(report), content)
+    show_result(page, content)
     return 0
 
 

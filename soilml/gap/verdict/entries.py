@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.fitting.effect_signatures import effect_signatures
+from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.least_squares import Solution
 from soilml.gap.checks import ONE_LOAD
 from soilml.gap.evidence.repeats import overstated_noise_notes
@@ -16,7 +17,6 @@ from soilml.gap.report.listed_explanations import SUSPECTS_IN_LINE
 from soilml.gap.report.results import (
     CandidateSummary,
     NamedEffect,
-    ReadingsAndPredictions,
     Suspect,
 )
 from soilml.gap.report.sentences import outliers_in_words
@@ -204,11 +204,11 @@ def variance_component_entries(posterior: Posterior) -> dict[str, float]:
 
 def readings_and_predictions(
     posterior: Posterior, before: Solution, after: Solution
-) -> ReadingsAndPredictions:
+) -> FittedReadings:
     """Readings, predictions by the soil alone and by the fit shown, and standard deviations."""
     readings, jacobian = posterior.terms.readings, after.derivatives
     variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
-    return ReadingsAndPredictions(
+    return FittedReadings(
         channels=tuple(column(n) for n in readings.channels),
         channel=readings.channel,
         run=tuple(readings.runs[readings.run[r]] for r in readings.row),

@@ -19,7 +19,7 @@ from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import Prior
-from soilml.report.numbers import significant
+from soilml.report.numbers import round_significant
 from soilml.results import EstimatedValue
 
 #: Probability that the explanations of a returned model hold together, and how many it has at most.
@@ -51,7 +51,7 @@ def updated_case(
     what the fit leaves and was learned; None keeps that of the case.
     """
     fit, stds = node.fit, stds_of(node)
-    values = {path: significant(v) for path, v in fit.values().items()}
+    values = {path: round_significant(v) for path, v in fit.values().items()}
     case = fit.case.with_values(values)
     prior = dict(fit.case.prior)
     bounds = {path: parameter for path, (parameter, _) in case.parameters().items()}
@@ -59,15 +59,15 @@ def updated_case(
         if not c.effect or c.is_shape:
             continue
         value, reach = values[c.path], PRIOR_HALF_WIDTH * stds[c.path]
-        lower = max(bounds[c.path].lower, significant(value - reach))
-        upper = min(bounds[c.path].upper, significant(value + reach))
+        lower = max(bounds[c.path].lower, round_significant(value - reach))
+        upper = min(bounds[c.path].upper, round_significant(value + reach))
         if lower < upper:
             prior[c.path] = Prior(lower, upper)
     remaining = dict(fit.case.discrepancy)
     if discrepancy is not None:
         declared = next(iter(remaining.values()), Discrepancy())
         remaining = {
-            name: replace(declared, share=0.0, constant=significant(std), learned=True)
+            name: replace(declared, share=0.0, constant=round_significant(std), learned=True)
             for name, std in discrepancy.items()
         }
     return replace(
@@ -114,7 +114,7 @@ def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) ->
     if whole is not None:
         return updated_case(whole, left, learned)
     alone = updated_case(posterior.soil, left, learned)
-    mean = {p: significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
+    mean = {p: round_significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
     each = []
     for weight, node in parts:
         own = updated_case(node)

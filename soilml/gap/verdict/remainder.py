@@ -15,8 +15,7 @@ from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.quantities import QUANTITIES, column
-from soilml.report.numbers import decimal
-from soilml.report.terminal import shown_unit
+from soilml.report.numbers import decimal, shown_unit
 
 #: Amplitude in usual ones below which no discrepancy of a channel is stated.
 LEAST_AMPLITUDE = 0.1

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 from gap_sets import analysed, case_of, driven, hidden
+from soilml.gap.presentation import gap_files, gap_text
+from soilml.gap.report.page import summary, suspect_table
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
 from soilml.gap import gap
-from soilml.gap.presentation import gap_files, gap_text
 from soilml.gap.report.listed_explanations import next_run_in_words
-from soilml.gap.report.page import summary, suspect_table
 from soilml.gap.report.reasons_in_short import SENTENCE_WORDS
 from soilml.gap.report.results import (
     STATUSES,
