@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.physics.effects import EFFECTS
     from soilml.physics.gears import Wheel
     from soilml.quantities import Z_90
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.column_figure import column_picture
     from soilml.systems.force_sensor_wheel import MohrCoulomb, SensingWheel, SteadyRun
     from soilml.systems.force_sensor_wheel.runs_on_slopes import read_stresses, solve_runs
 
@@ -120,7 +120,7 @@ def run(args: argparse.Namespace) -> int:
         "pull_on_slope_N": found.required,
     }
     panels = [("shear_modulus_m",), ("drawbar_pull_N", "pull_on_slope_N")]
-    write_columns(columns, args.out, args.picture, ColumnPanels(columns, "slip", panels))
+    write_columns(columns, args.out, args.picture, column_picture(columns, "slip", panels))
     middle = float(np.nanmedian(found.magnification))
     if not 1.0 / MOST_MAGNIFICATION < middle < MOST_MAGNIFICATION:
         tell(

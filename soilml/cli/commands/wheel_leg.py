@@ -17,7 +17,7 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
-    from soilml.report.parameter_figure import ParameterIntervals
+    from soilml.report.report import Picture
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -116,7 +116,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     import numpy as np
 
     from soilml.cli.output import tell, write_columns
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.column_figure import column_picture
     from soilml.systems.wheel_legs.slip_of_strides import slip_of_strides
 
     sensors = {
@@ -129,7 +129,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     columns |= {"slip": found.fused, "slip_std": found.fused_std, "in_range": found.in_range}
     numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
     panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
-    write_columns(columns, args.out, args.picture, ColumnPanels(numbered, "stride", [panel]))
+    write_columns(columns, args.out, args.picture, column_picture(numbered, "stride", [panel]))
     outside = int(np.count_nonzero(~found.in_range & np.isfinite(found.fused)))
     if outside:
         tell(f"{outside} of {len(table)} slips are outside of the 0 to 0.5 of the relations")
@@ -197,7 +197,7 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
     return 0
 
 
-def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> ParameterIntervals:
+def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> Picture:
     """Angle and stiffness by sensor, with their 90 % intervals."""
     import numpy as np
 
@@ -216,4 +216,4 @@ def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> ParameterInt
         high=value + Z_90 * std,
         prior_low=unknown,
         prior_high=unknown,
-    )
+    ).picture()

@@ -7,7 +7,8 @@ import numpy as np
 from soilml.numerics.quantiles import QuantileBand, quantile_band
 from soilml.remarks import about
 from soilml.report.numbers import format_band
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.systems.climbing.report import FIGURE_SIZE, ClimbingReport
 
 SLIPS = 9  # Slips of the curve in its table
@@ -24,7 +25,7 @@ def report_of_climbs(found: ClimbingReport, title: str = "Slopes that a rover cl
     left = [fit.remaining_fraction.get(name) for name in fit.names]
     vague = about(found.warnings, "not-identified")
     at = np.linspace(0, len(ability.slip) - 1, SLIPS).astype(int)
-    curve = Table.of(
+    curve = ReportTable.of(
         "Pull and slope over slip",
         {
             "slip": ability.slip[at],
@@ -40,7 +41,7 @@ def report_of_climbs(found: ClimbingReport, title: str = "Slopes that a rover cl
         kind="climb",
         verdict=verdict,
         lines=lines,
-        figures=Table.of_parameters(
+        figures=ReportTable.of_parameters(
             "Soil",
             fit.frame_columns(),
             left_of_prior=Column("left of prior", left, "share", digits=2),

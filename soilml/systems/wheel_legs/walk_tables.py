@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.report.column_panels import ColumnPanels
+from soilml.report.column_figure import column_picture
+from soilml.report.report import Picture
 from soilml.systems.wheel_legs.gait_metrics import TURN, gait_metrics
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.integrator import WalkStatus
@@ -46,7 +47,7 @@ class WalkTables:
     keys: tuple[str, ...]
 
     @property
-    def panels(self) -> ColumnPanels:
+    def picture(self) -> Picture:
         """Metrics against the first quantity of three values or more; else the turns themselves.
 
         Raises `InputError` for more turns than a picture shows.
@@ -61,7 +62,7 @@ class WalkTables:
             slip = ("slip_mean", "slip_rms")
             sinkage = ("sinkage_mean_m", "sinkage_largest_m")
             others = tuple(name for name in self.keys if name != swept[0])
-            return ColumnPanels(
+            return column_picture(
                 self.columns, swept[0], [slip, sinkage, ("torque_mean_Nm",)], others
             )
         if len(self.columns["foot"]) > MOST_DRAWN:
@@ -70,7 +71,7 @@ class WalkTables:
                 "fewer: ask for fewer, or for three or more values of legs, stiffness or slip"
             )
         shown = [("slip",), ("sinkage_m",), ("torque_Nm",), ("hub_height_m",)]
-        return ColumnPanels(self.motion, "turned_rad", shown, self.keys)
+        return column_picture(self.motion, "turned_rad", shown, self.keys)
 
 
 def walk_tables(
