@@ -50,7 +50,7 @@ friction angle and shear modulus, each with its uncertainty.
   wheels for a slope           soilml design
   slip without odometry        soilml slip
   soil along a drive as a map  soilml map
-  systems of the papers        soilml paper climb, sensor-wheel, wheel-leg, walk
+  systems of the papers        soilml paper climb, sensor-wheel, wheel-leg, walk, track
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
 
@@ -92,6 +92,7 @@ COMMANDS = {
     "sensor-wheel": "soilml.cli.commands.sensor_wheel",
     "wheel-leg": "soilml.cli.commands.wheel_leg",
     "walk": "soilml.cli.commands.walk",
+    "track": "soilml.cli.commands.track",
     "papers": "soilml.cli.commands.papers",
 }
 #: Commands of two words: the group, and by its second word the command. The command's own name is
@@ -110,6 +111,7 @@ GROUPS = {
         "sensor-wheel": "sensor-wheel",
         "wheel-leg": "wheel-leg",
         "walk": "walk",
+        "track": "track",
         "numbers": "papers",
     },
 }

@@ -11,7 +11,7 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import output_files, save_text, write_files
 
 if TYPE_CHECKING:
-    from soilml.systems.climbing.report import ClimbingReport
+    from soilml.systems.rim_stress.report import ClimbingReport
 
 #: Files of the folder of --out.
 FILES = ("report.html", "climb.json", "curve.csv", "climbs.csv")
@@ -93,10 +93,10 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
     from soilml.report.page import json_text, report_texts
-    from soilml.systems.climbing.presentation import climb_report, climb_text
-    from soilml.systems.climbing.report import climbing_report
-    from soilml.systems.climbing.rover_file import read_rover
-    from soilml.systems.climbing.tables import read_climb_data
+    from soilml.systems.rim_stress.presentation import climb_report, climb_text
+    from soilml.systems.rim_stress.report import climbing_report
+    from soilml.systems.rim_stress.rover_file import read_rover
+    from soilml.systems.rim_stress.tables import read_climb_data
 
     folder = args.out is not None and not args.out.lower().endswith(".json")
     if folder:
@@ -135,7 +135,7 @@ def _curve(report: ClimbingReport) -> dict[str, Any]:
 
 
 def _runs(report: ClimbingReport) -> dict[str, Any]:
-    from soilml.systems.climbing.report import SPEED_ERROR
+    from soilml.systems.rim_stress.report import SPEED_ERROR
 
     climbs = report.data.climbs
     return {

@@ -20,20 +20,28 @@ if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
 
 FORMATS = ("table", "csv", "json")
-HELP = "soil, or slip, from torque, vibration and sinkage of a wheel-leg"
+HELP = "soil, trafficability, or slip, from torque, vibration and sinkage of a wheel-leg"
 DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil
-from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print.
+from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print,
+and what they mean for a heavy rover that is to follow.
 
   soilml paper wheel-leg STRIDES.csv
   soilml paper wheel-leg STRIDES.csv --by run --torque-model empirical --out soil.csv
 
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
-(at midstance); blank where not measured. Each sensor has an estimate, with a
-standard deviation, and `fused` is that of all by the weights of eq. 30. Standard
-deviations include the error that all strides on a soil share, as large as on
-the four soils of the source (table VIII): more strides do not lessen it.
+(at midstance); blank where not measured. `soilml import` makes it from a log.
+Each sensor has an estimate, with a standard deviation, and `fused` is that of
+all by the weights of eq. 30. Standard deviations include the error that all
+strides on a soil share, as large as on the four soils of the source (table
+VIII): more strides do not lessen it.
+
+The last row of each soil has k_phi and the pull efficiency of a wheel of a
+300 kg rover (eq. 32) with its class: non-trafficable, unsafe from 35 %, safe
+from 50 %, trafficable from 65 %. Strides show neither n nor cohesion nor shear
+modulus: these are uniform over the four soils of the source, unless --assume
+has them. --wheel has another wheel.
 
 On a known soil the same relations give the slip of each stride:
 
@@ -44,9 +52,7 @@ with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
 STRIDES.csv is then passed on as slip_measured.
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
-another train a file on its strides: soilml train slip_torque. --sinkage-model
-walks fits those of the sinkage to simulated walks (soilml paper walk), which the
-printed ones do not agree with.
+another train a file on its strides: soilml train slip_torque.
 """
 QUANTITIES = ("friction_angle_rad", "normal_stiffness_Pa")
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
@@ -70,10 +76,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="planar, or linear (default), which needs one stride",
     )
     parser.add_argument(
-        "--sinkage-model",
-        choices=("printed", "walks"),
-        default="printed",
-        help="relations as printed (default), or fitted to simulated walks",
+        "--assume",
+        metavar="NAME=VALUE,...",
+        help="n, cohesion (Pa) or shear_modulus (m) of the soil, where they are known",
+    )
+    parser.add_argument(
+        "--wheel",
+        metavar="R,B,N",
+        help="radius and width (m) and load (N) of the heavy rover's wheel "
+        "(default: 0.15,0.18,490.5)",
     )
     parser.add_argument(
         "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
@@ -118,7 +129,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
 
     from soilml.cli.output import tell, write_columns
     from soilml.report.column_panels import ColumnPanels
-    from soilml.systems.wheel_legs.slip_of_strides import slip_of_strides
+    from soilml.systems.wheel_legs import slip_of_strides
 
     sensors = {
         SENSORS[name]: table[name] for name in ("torque_Nm", "vibration_m_s2") if name in table
@@ -142,7 +153,7 @@ def _known_soil(text: str) -> tuple[float, float]:
     import math
 
     from soilml.cli.options import parse_numbers
-    from soilml.systems.wheel_legs.resistive_force import GROUNDS
+    from soilml.systems.wheel_legs import GROUNDS
 
     if text.upper() in GROUNDS:
         ground = GROUNDS[text.upper()]
@@ -160,42 +171,70 @@ def _known_soil(text: str) -> tuple[float, float]:
 
 
 def _soil(args: argparse.Namespace, table: Table) -> int:
-    """The soil by each sensor, and fused."""
+    """The soil by each sensor and fused, and what it means for a heavy rover."""
     from soilml.cli.output import tell, write_columns
     from soilml.cli.tables import result_by_group, tell_failures
-    from soilml.systems.wheel_legs.sinkage_fit import (
-        PRINTED_SINKAGE,
-        fit_simulated_sinkage,
-        simulate_sinkage,
-    )
-    from soilml.systems.wheel_legs.soil_of_strides import StrideSoil, soil_of_strides
+    from soilml.systems.wheel_legs import StrideSoil, mobility, soil_of_strides
 
-    walks = args.sinkage_model == "walks"
-    relations = fit_simulated_sinkage(simulate_sinkage()) if walks else PRINTED_SINKAGE
+    heavy = _heavy(args)
 
     def estimate(rows: Table) -> StrideSoil:
         readings = {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows}
-        return soil_of_strides(rows["slip"], readings, sinkage_model=relations, **_options(args))
+        return soil_of_strides(rows["slip"], readings, **_options(args))
 
     found, failed = result_by_group(args, table, "estimating", estimate)
-    columns: dict[str, list[object]] = {args.by: []} if args.by else {}
-    keys = [f"{name}{std}" for name in QUANTITIES for std in ("", "_std")]
-    columns |= {name: [] for name in ("sensor", *keys, "strides")}
+    columns: dict[str, list[Any]] = {}
     for name, one in found.items():
-        head = f"{args.by} {name}: " if args.by else ""
-        for k, sensor in enumerate(one.sensors):
-            (angle, stiffness), (angle_std, stiffness_std) = one.mean[k], one.std[k]
-            row = (sensor, angle, angle_std, stiffness, stiffness_std, one.strides[k])
-            for key, value in zip(columns, (*((name,) if args.by else ()), *row), strict=True):
-                columns[key].append(value)
+        head, blank = f"{args.by} {name}: " if args.by else "", [""] * (len(one.sensors) - 1)
+        unread = [float("nan")] * len(blank)
+        means = mobility(one, **heavy)
+        own = {args.by: [name] * len(one.sensors)} if args.by else {}
+        own |= one.columns | {
+            "kphi_SI": [*unread, means.kphi],
+            "pull_efficiency": [*unread, means.efficiency],
+            "pull_efficiency_p05": [*unread, means.ends[0]],
+            "pull_efficiency_p95": [*unread, means.ends[1]],
+            "traffic_class": [*blank, means.traffic_class],
+            "class_probability": [*unread, means.probability[means.traffic_class]],
+        }
+        own["strides"] = own.pop("strides")  # the last
+        for key, values in own.items():
+            columns.setdefault(key, []).extend(values)
         for sensor, why in one.unused.items():
             tell(f"{head}no estimate from {sensor}: {why}")
         if not one.in_range:
-            ends = f"{1e3 * relations.shallowest:.0f} to {1e3 * relations.deepest:.0f} mm"
-            tell(f"{head}the mean sinkage is outside of the {ends} of its relation")
+            tell(f"{head}the mean sinkage is outside of the 2 to 36 mm of its relation")
     write_columns(columns, args.out, args.picture, _intervals(args.by, columns))
     tell_failures(args.by, failed)
     return 0
+
+
+def _heavy(args: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of `mobility` by --assume and --wheel."""
+    from soilml.cli.options import parse_numbers
+    from soilml.io.cell_text import read_number
+    from soilml.physics.gears import Wheel
+    from soilml.physics.operating_point import Operating
+    from soilml.systems.wheel_legs.strides import UNKNOWN
+
+    found: dict[str, Any] = {}
+    if args.assume is not None:
+        pairs = [part.partition("=")[::2] for part in args.assume.split(",")]
+        try:
+            found["known"] = {name.strip(): read_number(value.strip()) for name, value in pairs}
+        except ValueError:
+            found["known"] = {"": 0.0}
+        if found["known"].keys() - UNKNOWN.keys():
+            raise InputError(
+                f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}, such as n=0.7"
+            )
+    if args.wheel is not None:
+        sizes = parse_numbers("--wheel", args.wheel).tolist()
+        if len(sizes) != 3 or min(sizes) <= 0.0:
+            raise InputError(f"--wheel is {args.wheel!r}; needed are radius, width and load")
+        found["wheel"] = Wheel(radius=sizes[0], width=sizes[1])
+        found["at"] = Operating(slip=0.2, load=sizes[2])
+    return found
 
 
 def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> ParameterIntervals:

@@ -13,9 +13,8 @@ from soilml.errors import InputError
 from soilml.report.column_panels import ColumnPanels
 from soilml.systems.wheel_legs.gait_metrics import TURN, gait_metrics
 from soilml.systems.wheel_legs.geometry import wheel_leg
-from soilml.systems.wheel_legs.integrator import WalkStatus
 from soilml.systems.wheel_legs.resistive_force import LinearGround
-from soilml.systems.wheel_legs.walk import walk
+from soilml.systems.wheel_legs.walk import WalkStatus, walk
 
 #: Columns of the metrics of a turn, by the attribute of `GaitMetrics`.
 METRICS = {
