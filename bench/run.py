@@ -13,7 +13,6 @@ MODULES = (
     "forward_model",
     "training_bench",
     "sets",
-    "flags",
     "faults_on_board",
     "model_errors",
     "streams",

@@ -29,6 +29,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/experiment_design/simulator_runs.py": {"scipy"},
     "soilml/numerics/gaussian_emulator.py": {"scipy"},
     "soilml/gap/workflow.py": {"threadpoolctl"},
+    "soilml/inference/posterior.py": {"threadpoolctl"},
     "soilml/log_import/windows/stances.py": {"scipy"},
     "soilml/systems/rim_stress/deconvolution.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},

@@ -1,6 +1,6 @@
 """The map of drive.csv beside the true soil along it; `--make` draws the files.
 
-A rover drives 60 m over three soils that drift within their patches. `soilml map` sees slip,
+A rover drives 60 m over three soils that drift within their patches. `soilml drive map` sees slip,
 torque, load and position; the truth stands in truth.csv.
 """
 

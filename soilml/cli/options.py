@@ -46,19 +46,30 @@ class OutputFile(str):
     __slots__ = ()
 
 
-def add_output(parser: argparse.ArgumentParser, name: str, file: str, text: str) -> None:
-    """Declare an option or argument for an output, whose ending is that of `file`."""
+def add_output(
+    parser: argparse.ArgumentParser, name: str, file: str, text: str, other: str = ""
+) -> None:
+    """Declare an option or argument for an output, whose ending is that of `file`, or `other`."""
     suffix = Path(file).suffix
 
     def checked(path: str) -> OutputFile:
         try:
-            output_files(path, suffix)
+            output_files(path, other if other and path.lower().endswith(other) else suffix)
         except InputError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
         return OutputFile(path)
 
     short = ("-o",) if name == "--out" else ()
     parser.add_argument(*short, name, type=checked, metavar=file, help=text)
+
+
+def is_json(args: argparse.Namespace) -> bool:
+    """Whether the output is JSON, by its ending; raises `InputError` where --format differs."""
+    found = args.out.lower().endswith(".json")
+    wanted = {"json": True, "csv": False}.get(args.format or "", found)
+    if wanted != found:
+        raise InputError(f"--format {args.format} and --out {args.out} differ: omit --format")
+    return bool(found)
 
 
 def add_screen_options(parser: argparse.ArgumentParser, formats: Sequence[str] = ()) -> None:

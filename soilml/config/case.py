@@ -285,7 +285,7 @@ def read_case(
         case = replace(case, bias=take_bias(settings.table("bias")))
     elif "bias" in settings:
         settings.fail(
-            "[bias] is read by identify, pull, gap and estimate --case alone (in Python, "
+            "[bias] is read by identify, pull, gap and estimate --model alone (in Python, "
             "with_bias=True); for other commands delete it"
         )
     settings.finish()

@@ -84,7 +84,7 @@ def candidate_grid(
     """
     if loads is None:
         if len(measured_loads) == 0:
-            raise InputError("no loads and no measured rows: give --loads 30,60,120, or RUNS.csv")
+            raise InputError("no loads and no measured rows: give --load 30,60,120, or RUNS.csv")
         low, high = LIGHTER * float(np.min(measured_loads)), HEAVIER * float(np.max(measured_loads))
         loads = [float(f"{load:.2g}") for load in np.geomspace(low, high, LOADS)]
     return CandidateGrid(tuple(sorted({*(slips or SLIPS)})), tuple(sorted({*loads})))

@@ -21,7 +21,7 @@ from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import included_bias
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import condensing
-from soilml.identification.averaged_fit import averaged
+from soilml.identification.averaged import averaged
 from soilml.identification.fit import Fit, disagreeing_soil_tests
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton

@@ -39,10 +39,10 @@ STRONG_CORRELATION = 0.95
 BOUND_TOLERANCE = 1e-3
 
 
+#: What follows from residuals above the noise where all intervals are as much wider.
+WIDENED = "std is multiplied by this factor"
 #: Codes of the remarks by which rows speak against the model taken as exact.
 AGAINST_EXACT = ("excess-residuals", "unlikely")
-#: Probability of typical errors above which it is said that the shares do not test effects.
-MAJORITY = 0.5
 
 
 @dataclass(frozen=True, repr=False)
@@ -83,8 +83,6 @@ class Fit(Result):
         where the method drew them.
     explanations
         Of an averaged fit, the explanations of the rows, the likeliest first.
-    exact_model
-        Of an averaged fit, the one that takes model and sensors to be exactly as in the file.
     """
 
     method: str
@@ -101,7 +99,6 @@ class Fit(Result):
     high: Floats | None = None
     samples: Any = field(default=None, repr=False, compare=False)
     explanations: tuple[SoilExplanation, ...] = ()
-    exact_model: Fit | None = None
 
     @property
     def mean(self) -> Floats:
@@ -142,17 +139,15 @@ class Fit(Result):
     @property
     def fits(self) -> bool:
         """Whether the rows do not reject model and sensors as in the file."""
-        exact = self.exact_model or self
-        return not any(remark.code in AGAINST_EXACT for remark in exact.warnings)
+        return not any(remark.code in AGAINST_EXACT for remark in self.warnings)
 
     @property
     def verdict(self) -> str:
         """Whether model and rows agree, and what to do where they do not, in one sentence."""
-        exact = self.exact_model or self
-        against = [remark.code for remark in exact.warnings if remark.code in AGAINST_EXACT]
+        against = [remark.code for remark in self.warnings if remark.code in AGAINST_EXACT]
         count = f"{self.rows_used} row{'' if self.rows_used == 1 else 's'}"
         if against:
-            size = f" ({significant(float(np.sqrt(exact.misfit)), 2)} times the noise; p < 0.001)"
+            size = f" ({significant(float(np.sqrt(self.misfit)), 2)} times the noise; p < 0.001)"
             known = against[0] == AGAINST_EXACT[0]
             return f"The model does not fit these rows{size if known else ''}: run `soilml gap`."
         left = self.remaining_fraction
@@ -225,39 +220,7 @@ class Fit(Result):
         }
         if self.explanations:
             content["explanations"] = [one.as_json() for one in self.explanations]
-        if self.use_of_shares is not None:
-            content["explanations_use"] = self.use_of_shares.as_json()
-        if self.exact_model is not None:
-            exact = self.exact_model.as_json()
-            kept = ("method", "parameters", "warnings", "misfit")
-            content["exact_model"] = {key: exact[key] for key in kept} | {
-                "use": self.exact_model.use_of_exact.as_json()
-            }
         return content
-
-    @property
-    def use_of_shares(self) -> Remark | None:
-        """What the shares of `explanations` are not, where those of typical errors are most."""
-        errors = [one for one in self.explanations if not (one.effect or one.exact)]
-        if sum(one.probability for one in errors) <= MAJORITY:
-            return None
-        text = (
-            "these shares weigh what the intervals include and are no test for a missing effect: "
-            "soilml gap makes that test"
-        )
-        return Remark("shares-no-test", text, severity="note")
-
-    @property
-    def use_of_exact(self) -> Remark:
-        """When to use this fit, which takes model and sensors as exact, in place of the average."""
-        if any(remark.code in AGAINST_EXACT for remark in self.warnings):
-            text = "the model misfits these rows: do not use exact_model"
-        else:
-            text = (
-                "use exact_model only where this model and these sensors were verified on a known "
-                "soil: it takes both to be exactly as in the model file"
-            )
-        return Remark("exact-model", text, severity="note")
 
     def _parameters(self) -> dict[str, Any]:
         """Each parameter with its value, standard deviation and interval."""
@@ -295,10 +258,14 @@ def with_warnings(
     free: Sequence[Coordinate],
     u: NDArray[np.float64],
     *,
-    excess_residuals: bool,
+    excess_residuals: str,
     undeclared: bool,
 ) -> Fit:
-    """The same fit with its warnings; `u` (p,) are its values as fractions of the priors."""
+    """The same fit with its warnings.
+
+    u (p,): Its values as fractions of the priors.
+    excess_residuals: What follows from residuals that exceed the noise; "" where they do not.
+    """
     one_load = is_one_load(readings.row_load)
     remarks: list[Remark] = []
     for i, f in enumerate(free):
@@ -321,11 +288,7 @@ def with_warnings(
         remarks.append(Remark("few-readings", text))
     remarks += _trade_offs(fit)
     if excess_residuals:
-        remarks.append(
-            excess_residuals_remark(
-                float(np.sqrt(fit.misfit)), case, "std is multiplied by this factor"
-            )
-        )
+        remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))
     if undeclared:
         names = readings.undeclared
         text = (

@@ -11,7 +11,6 @@ import numpy as np
 
 from soilml.config.case import Case
 from soilml.fitting.coordinates import select_free
-from soilml.identification.averaged import stated_explanations
 from soilml.identification.fit import Fit
 from soilml.io.text_tables import format_table
 from soilml.parameters import declared
@@ -47,15 +46,10 @@ class Identification:
         """The content of the file, for one fit."""
         return self.fit.as_json() | dict(self.advice) | dict(self.soil)
 
-    def text(self, details: bool = False) -> str:
-        """The verdict, the fit as a table, its warnings, and the advice.
-
-        details: Whether the exact model is shown too.
-        """
-        exact = self.fit.exact_model
-        second = [] if exact is None or not details else ["", _exact_text(self.fit, exact)]
+    def text(self) -> str:
+        """The verdict, the fit as a table, its warnings, and the advice."""
         messages = ["", *texts(self.next_rows)] if self.next_rows else []
-        return "\n".join([_fit_text(self.fit), *second, *messages])
+        return "\n".join([_fit_text(self.fit), *messages])
 
 
 def soil_entries(
@@ -91,8 +85,7 @@ def identify_report(
     """The page of `identify`: results by group, groups without one; model file and table."""
     answers = _answers(found, by)
     lines = {label: _lines(fit) for label, fit in answers.items()}
-    # the averaged answers decide: the first ones
-    every = [line for own in list(lines.values())[: len(found)] for line in own]
+    every = [line for own in lines.values() for line in own]
     first = next(iter(found.values())).fit
     known, total = sum(line.known for line in every), len(every)
     fits = all(one.fit.fits for one in found.values())
@@ -104,17 +97,12 @@ def identify_report(
         answer = [head[name] + one.fit.verdict for name, one in found.items()]
         answer += [
             (f"{numbers.capitalised(label)}: " if label else "") + headline(own)
-            for label, own in list(lines.items())[: len(found)]
+            for label, own in lines.items()
         ]
     else:
         answer = [f"The table has a result for each of {len(found)} values of {by}."]
     warnings = [
         remark.under(head[name]) for name, one in found.items() for remark in one.fit.warnings
-    ]
-    warnings += [
-        one.fit.exact_model.use_of_exact.under(head[name])
-        for name, one in found.items()
-        if one.fit.exact_model is not None
     ]
     warnings += [
         Remark("no-result", f"{by} {name} has no result: {why}", (name,))
@@ -144,14 +132,8 @@ def identify_report(
 
 
 def _answers(found: Mapping[str, Identification], by: str | None) -> dict[str, Fit]:
-    """The fits by what they are called on the page; the exact models last."""
-    first, exact = {}, {}
-    for name, one in found.items():
-        head = f"{by} {name}" if by else ""
-        first[head] = one.fit
-        if one.fit.exact_model is not None:
-            exact[f"{head}, exact_model".removeprefix(", ")] = one.fit.exact_model
-    return first | exact
+    """The fits by what they are called on the page."""
+    return {f"{by} {name}" if by else "": one.fit for name, one in found.items()}
 
 
 def _picture(case: Case, answers: Mapping[str, Fit]) -> ReportPicture:
@@ -201,22 +183,10 @@ def _fit_text(found: Fit) -> str:
     first = f"{found.verdict}\n\n{first}"
     by = ""
     if found.explanations:
-        shown = stated_explanations(found.explanations)[:_MOST_EXPLANATIONS]
+        shown = found.explanations[:_MOST_EXPLANATIONS]
         by = f"\nexplained by: {', '.join(f'{one} ({one.probability:.0%})' for one in shown)}"
-    if found.use_of_shares is not None:
-        by += f"\n{found.use_of_shares}"
     warnings = "".join(f"\n! {text}" for text in found.warnings)
     return f"{first}\n\n{format_table(head, rows)}{by}{warnings}"
-
-
-def _exact_text(found: Fit, exact: Fit) -> str:
-    """The exact model in a table, and when to use it."""
-    unknown = _undetermined(exact)
-    ratios = exact.std / found.std
-    cells = zip(_cells(exact, unknown), ratios, strict=True)
-    rows = [(*own, f"{ratio:.2f}") for own, ratio in cells]
-    head = ("parameter", "value", "std", "90 % interval", "unit", "times std above")
-    return f"exact_model, {exact.method}\n\n{format_table(head, rows)}\n{exact.use_of_exact}"
 
 
 def _undetermined(fit: Fit) -> frozenset[str]:

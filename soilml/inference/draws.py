@@ -135,7 +135,7 @@ def weighted(own: _Proposal, terms: GaussianTerms, y: Floats | InputError) -> Dr
     for i, c in enumerate(fit.coordinates):
         if np.isfinite(c.std):
             log = log - 0.5 * (x[:, i] / c.std) ** 2
-        elif c.effect:
+        elif c.of_candidate:
             log = log + log_density_of_size(x[:, i], c.lower < 0.0 < c.upper)
     log = np.where(answered, log - own.log_density, -np.inf)
     weight = np.exp(log - np.logaddexp.reduce(log))

@@ -11,7 +11,7 @@ D has the declared standard deviations, R the correlation of neighbouring sample
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -76,6 +76,12 @@ class GaussianTerms:
     kinds: tuple[str, ...]
     usual: Floats
     _kept: dict[tuple[float, bytes], WhitenedColumns] = field(default_factory=dict)
+
+    @staticmethod
+    def of_columns(readings: Readings, columns: Floats) -> GaussianTerms:
+        """Terms of known size alone: columns (m, q) of unit variance, and the noise."""
+        group = np.full(columns.shape[1], FIXED)
+        return GaussianTerms(readings, columns, group, (), np.ones(len(readings.channels)))
 
     @cached_property
     def without_scatter(self) -> Integers:
@@ -282,7 +288,11 @@ def noise_whitening(
 
 
 def gaussian_terms(
-    readings: Readings, case: Case, scatter: Floats, fixed: Floats | None = None
+    readings: Readings,
+    case: Case,
+    scatter: Floats,
+    fixed: Floats | None = None,
+    inner: Sequence[Floats] = (),
 ) -> GaussianTerms:
     """The terms of readings: a discrepancy of each channel, scatter of each run.
 
@@ -301,14 +311,18 @@ def gaussian_terms(
         if own is not None and own.shape[1]:
             parts.append(own)
             group.append(np.full(own.shape[1], FIXED))
+    first = channels + len(inner)
+    for i, own in enumerate(inner):
+        parts.append(own)
+        group.append(np.full(own.shape[1], channels + i))
     if np.unique(readings.run[readings.row]).size > 1:
         parts.append(_by_run(readings, scatter))
-        group.append(np.tile(channels + np.arange(scatter.shape[1]), len(readings.runs)))
+        group.append(np.tile(first + np.arange(scatter.shape[1]), len(readings.runs)))
     return GaussianTerms(
         readings=readings,
         columns=np.concatenate(parts, axis=1),
         group=np.concatenate(group).astype(np.int64),
-        kinds=(*(DISCREPANCY,) * channels, *(SCATTER,) * scatter.shape[1]),
+        kinds=(*(DISCREPANCY,) * first, *(SCATTER,) * scatter.shape[1]),
         usual=process.usual,
     )
 

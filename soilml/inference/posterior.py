@@ -36,13 +36,30 @@ UNCHANGED = 0.01
 def infer(
     problem: InferenceProblem, progress: Callable[[float], None] = lambda _: None
 ) -> Posterior:
-    """The posterior of a problem.
+    """The posterior of a problem; of one that was asked before, the same again.
 
     Raises `InputError` where the model cannot be fitted. Where it cannot carry the loads of some
     rows, `Posterior.refused` is the fit that shows which.
     """
-    search = Search(problem, progress).run()
-    return Posterior(search)
+    from threadpoolctl import threadpool_limits
+
+    key = problem.checksum()
+    if key in _known:
+        return _known[key]
+    with threadpool_limits(1 if len(problem.readings) <= ONE_THREAD else None):
+        found = Posterior(Search(problem, progress).run())
+    _known[key] = found
+    while len(_known) > KEPT:
+        _known.pop(next(iter(_known)))
+    return found
+
+
+#: Posteriors of a process that are kept, by the checksum of their problem: `identify`, `gap` and
+#: `pull` of the same rows compute one.
+KEPT = 3
+_known: dict[str, Posterior] = {}
+#: Readings up to which matrices are so small that several threads only wait for each other.
+ONE_THREAD = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,5 +327,5 @@ class Posterior:
 def shape_deviation(node: Explanation) -> float:
     """Squared distance of the shapes from the catalogue's laws, in prior variances."""
     fit = node.fit
-    shapes = [i for i, c in enumerate(fit.coordinates) if c.effect and c.is_shape]
+    shapes = [i for i, c in enumerate(fit.coordinates) if c.is_shape]
     return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes]))

@@ -36,6 +36,7 @@ from soilml.inference.gaussian_terms import (
     scatter_columns,
 )
 from soilml.inference.problem import SOIL_ALONE, Hypothesis, InferenceProblem
+from soilml.inference.shared_columns import shared_columns
 from soilml.remarks import Remark
 
 Booleans = NDArray[np.bool_]
@@ -117,8 +118,9 @@ class Search:
         if operation.any():
             readings = readings.with_noise_of_operation(operation)
         self.problem = problem = replace(problem, readings=readings)
+        fixed, inner = shared_columns(best.fitted(), readings, problem.soil)
         self.terms = gaussian_terms(
-            readings, problem.case, scatter_columns(best.fitted(), readings)
+            readings, problem.case, scatter_columns(best.fitted(), readings), fixed, inner
         )
         kept = [f for f in carried if f.objective < best.objective + OTHER_OPTIMUM]
         first = self.terms.first()
@@ -189,7 +191,7 @@ class Search:
             case = self.problem.case_of(job.hypothesis)
             own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
             first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
-            zero = [0.0 if c.effect else job.start.get(c.path, 0.5) for c in coordinates]
+            zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
             known = job.near
             if known is not None and len(known.x) != len(coordinates):
                 known = None
@@ -198,7 +200,7 @@ class Search:
 
     def _first_size(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
-        if not coordinate.effect:
+        if not coordinate.of_candidate:
             return 0.5
         if coordinate.is_shape:
             return 0.0

@@ -65,7 +65,7 @@ class ImportedLog:
             )
         lines = [
             "# Errors that all rows share, from the uncertainties of the map. Add this table to",
-            "# the model file, for `soilml identify`, `gap`, `pull` and `estimate --case`; zero",
+            "# the model file, for `soilml identify`, `gap`, `pull` and `estimate --model`; zero",
             "# declares a sensor to be exact.",
             "[bias]",
         ]

@@ -86,7 +86,9 @@ def _plane(y: Floats, *terms: Floats) -> tuple[Floats, float]:
     columns = np.column_stack([np.ones_like(y), *terms])
     coefficients, *_ = np.linalg.lstsq(columns, y, rcond=None)
     residual = y - columns @ coefficients
-    return coefficients, 1.0 - float(residual @ residual / np.sum((y - y.mean()) ** 2))
+    return np.asarray(coefficients, dtype=np.float64), 1.0 - float(
+        residual @ residual / np.sum((y - y.mean()) ** 2)
+    )
 
 
 Fit = dict[str, tuple[Floats, float]]  # Coefficients and R^2 of each part

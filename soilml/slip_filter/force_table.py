@@ -68,7 +68,7 @@ def force_table(
     """
     rover = case.rover
     if rover is None:
-        raise InputError("the model file has no [rover]; soilml slip needs mass and wheels")
+        raise InputError("the model file has no [rover]; soilml drive slip needs mass and wheels")
     draws = soils or prior_draws(select_free(case, None), count, case)
     steps = int(np.ceil(np.log(loads[1] / loads[0]) / np.log(LOAD_RATIO))) + 1
     load = np.geomspace(loads[0] * 0.999, loads[1] * 1.001, max(steps, 2))

@@ -21,8 +21,7 @@ from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.averaged import AveragedSamples, stated_explanations
-from soilml.identification.averaged_fit import beyond_all_explanations, soil_samples
+from soilml.identification.averaged import AveragedSamples, soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
@@ -211,18 +210,14 @@ def measured_soil(
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
     if samples.noise_inflated:
         consequence = "bands are widened and may be biased"
-        if isinstance(samples, AveragedSamples):
-            warnings.append(beyond_all_explanations(samples.noise_scale, consequence))
-        else:
-            warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
+        warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
     known = [] if twice or not isinstance(samples, AveragedSamples) else samples.explanations
     if known and not any(e.exact for e in known):
-        first = stated_explanations(known)[0]
-        likeliest = str(first) if first.effect else "errors of sensors and model"
+        first = known[0]
         text = (
-            f"the model misfits these rows, which are likelier with {likeliest} "
+            f"the model misfits these rows, which are likelier with {first} "
             f"(probability {format_probability(first.probability)}), which the bands leave out: "
             "run soilml gap"
         )
-        warnings.append(Remark("against-model", text, (first.effect,) if first.effect else ()))
+        warnings.append(Remark("against-model", text, first.effects))
     return MeasuredSoil(draws, unknown, tuple(warnings), samples.noise_scale)

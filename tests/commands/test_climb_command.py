@@ -8,8 +8,8 @@ import pytest
 
 from soilml.cli import main
 from soilml.io.text_tables import csv_text
-from soilml.systems.climbing import SimulatedRover
-from soilml.systems.climbing.tables import climb_tables
+from soilml.systems.rim_stress import SimulatedRover
+from soilml.systems.rim_stress.tables import climb_tables
 
 ROVER = """\
 [rover]
@@ -27,7 +27,7 @@ shear_modulus = [0.001, 0.05]
 speed_m_s = "0.87 %"
 slope_rad = 0.005
 """
-COMMAND = ["climb", "rover.toml", "runs.csv", "--stress", "stress.csv"]
+COMMAND = ["paper", "climb", "rover.toml", "runs.csv", "--stress", "stress.csv"]
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import pytest
 
 from soilml import soil
 from soilml.cli import main
-from soilml.systems.force_sensor_wheel import (
+from soilml.systems.rim_stress import (
     MohrCoulomb,
     SensingWheel,
     SteadyRun,
@@ -45,7 +45,7 @@ def files(tmp_path, monkeypatch):
     return tmp_path
 
 
-COMMAND = ["sensor-wheel", "m.toml", "runs.csv", "--stress", "stress.csv"]
+COMMAND = ["paper", "sensor-wheel", "m.toml", "runs.csv", "--stress", "stress.csv"]
 
 
 def test_the_modulus_is_found_and_predicts_the_pull_of_the_slopes(files, capsys):

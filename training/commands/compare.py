@@ -22,7 +22,6 @@ BENCHMARK = ("report.html", "benchmark.json", "benchmark.csv", "benchmark.png")
 FOLDER = "demo/benchmark"
 RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 
-HELP = "score model files and analytic identification on sets of known soil"
 DESCRIPTION = """\
 Score model files, analytic identification and the prior on sets of readings
 whose soil is known: RMSE, coverage of 50 and 90 % intervals, failures, and
@@ -42,7 +41,7 @@ time per estimate.
 
 2. On test data of your own
 
-     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out DIR
+     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out FOLDER
 
    TEST.parquet comes from `soilml generate`, with a seed that was not used in
    training. Its runs are the sets; single rows are scored too. MODEL.toml
@@ -67,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: the released models)",
     )
     parser.add_argument(
-        "-o", "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
+        "-o", "--out", metavar="FOLDER", help=f"output folder (default for the benchmark: {FOLDER})"
     )
     parser.add_argument(
         "--sets",
@@ -81,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="compute the Bayes limit of the benchmark and write it to this file, nothing else",
     )
     parser.add_argument(
-        "--against",
+        "--bayes-limit",
         type=InputFile,
         metavar="FILE.parquet",
         help="Bayes limit to use, written by --limit (default: the packaged one)",
@@ -145,7 +144,7 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
         tell(note.text)
     with create_folder(args.out or FOLDER) as folder, stage_progress() as progress:
-        results = benchmark(estimators, None, args.sets, args.against, progress)
+        results = benchmark(estimators, None, args.sets, args.bayes_limit, progress)
         progress("drawing the report", 0, 1)
         columns = report.csv_columns(results)
         found = goals(results)
@@ -214,7 +213,7 @@ def _compute_limit(args: argparse.Namespace) -> int:
     from training.benchmark.bayes_limit_file import save_limit
     from training.benchmark.suite import RECIPE
 
-    if args.files or args.out or args.against:
+    if args.files or args.out or args.bayes_limit:
         raise InputError(
             "--limit given with other arguments; it allows --sets alone: omit the rest"
         )
@@ -243,7 +242,7 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
     from training.benchmark.user_comparison import check_same_provenance, compare
 
     if len(args.files) < 3 or not args.out:
-        raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out DIR")
+        raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out FOLDER")
     model, test, *files = args.files
     case = read_case_of_one_gear(model)
     table = read_long_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))

@@ -10,7 +10,6 @@ from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 
-HELP = "train regressors on data and export one ONNX model file"
 DESCRIPTION = """\
 Train the regressors of SPEC.toml on DATA.parquet, calibrate their uncertainty
 on held-out rows, and export the result as one ONNX file.

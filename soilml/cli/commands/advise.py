@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from soilml.remarks import Remark
 
 FORMATS = ("table", "csv", "json")
-HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
 Rank the operating points (slip, load) and sensors of a next measurement by how
 much they reduce the uncertainty of the parameters that have a prior in
@@ -45,7 +44,7 @@ repetition of a measured row, and the best sequence of --count rows, whose
 widths are those after all rows up to it. --all lists every candidate instead.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
-and torque with each other channel. Without --loads, loads from half to twice
+and torque with each other channel. Without --load, loads from half to twice
 the measured ones are tried. A point is excluded where a twentieth or more of
 the posterior samples does not carry the wheel. Model errors are considered where
 [discrepancy] declares them or [remainder] has them.
@@ -53,7 +52,7 @@ the posterior samples does not carry the wheel. Model errors are considered wher
 With --gravity, rate tests made where --tested-at says (on Earth) by what they
 tell of the drawbar pull of the wheel there, under --target-load:
 
-  soilml plan next MODEL.toml --gravity moon --target-load 20 --radii 0.1,0.15
+  soilml plan next MODEL.toml --gravity moon --target-load 20 --radius 0.1,0.15
 
 A test has rows at all --slip under a load, with a wheel of a radius.
 pull_left_N is the standard deviation of the pull that is expected after it, by
@@ -81,15 +80,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--slip",
         dest="slips",
-        metavar="A,B,...",
+        metavar="S,...",
         help="candidate slips: A,B,... or start:stop:count",
     )
-    parser.add_argument("--load", dest="loads", metavar="A,B,...", help="candidate loads in N")
-    for old in ("--slips", "--loads"):
-        parser.add_argument(old, help=argparse.SUPPRESS)
+    parser.add_argument("--load", dest="loads", metavar="N,...", help="candidate loads in N")
     parser.add_argument(
         "--count",
         type=whole_number_from(1, MAX_COUNT),
+        metavar="N",
         help="number of rows in the planned sequence, 1 to 5 (default: 3)",
     )
     parser.add_argument(
@@ -106,7 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--target-slip", type=slip_limit, metavar="S", help="slip of the pull there (default: 0.3)"
     )
-    parser.add_argument("--radii", metavar="A,B,...", help="further wheel radii of tests in m")
+    parser.add_argument("--radius", metavar="M,...", help="further wheel radii of tests in m")
     add_effects_option(parser)
     add_exact_model_option(parser)
     add_row_options(parser)
@@ -135,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
     if args.gravity is None:
-        for option in ("target_load", "target_slip", "radii"):
+        for option in ("target_load", "target_slip", "radius"):
             if getattr(args, option) is not None:
                 raise InputError(f"--{option.replace('_', '-')} needs --gravity, such as moon")
     elif args.count is not None or args.picture is not None:
@@ -143,7 +141,7 @@ def run(args: argparse.Namespace) -> int:
     table = None if args.runs is None else read_rows(args, RUNS)
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()
-        for option, text in (("--slips", args.slips), ("--loads", args.loads))
+        for option, text in (("--slip", args.slips), ("--load", args.loads))
     )
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     change = gravity_change(args, case)
@@ -225,7 +223,7 @@ def _tests_elsewhere(
         if case.rover is None:
             raise InputError("--gravity needs --target-load, the load of the wheel there in N")
         load = case.rover.mass * options["change"].target / len(case.rover.wheels)
-    radii = None if args.radii is None else parse_numbers("--radii", args.radii).tolist()
+    radii = None if args.radius is None else parse_numbers("--radius", args.radius).tolist()
     if len(options["loads"] or ()) * (1 + len(radii or ())) > MAX_TESTS:
         raise InputError(f"loads times radii are too many tests; at most {MAX_TESTS} are possible")
     slip = args.target_slip or TARGET_SLIP

@@ -14,7 +14,6 @@ from soilml.cli.options import (
 from soilml.io.atomic_files import save_text
 
 FORMATS = ("table", "json")
-HELP = "missing effects that planned runs could identify"
 DESCRIPTION = """\
 Determine which missing effects the planned runs of DESIGN.csv could identify
 with the sensors of MODEL.toml, which they could not, and which run to add. No

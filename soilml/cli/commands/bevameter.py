@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from soilml.io.table import Table
     from soilml.remarks import Remark
 
-HELP = "soil parameters from plate-sinkage and shear tests, without a wheel"
+FORMATS = ("table", "json")
 DESCRIPTION = """\
 Fit kc, kphi and n to plate-sinkage tests, and cohesion, friction angle and
 shear modulus to shear tests. Say what the tests cannot tell: kc apart from kphi
@@ -73,8 +73,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODEL.toml",
         help="whose gear, noise and other soil values to take",
     )
-    add_output(parser, "--out", "SOIL.toml", "write a model file with this soil")
-    add_output(parser, "--json", "FILE.json", "write estimates and remarks")
+    add_output(
+        parser,
+        "--out",
+        "SOIL.toml",
+        "write a model file with this soil, or FILE.json with estimates and remarks",
+        ".json",
+    )
     add_output(parser, "--picture", "FILE.png", "draw the tests and the fitted laws")
     add_ignore_extra_option(parser)
     add_effects_option(parser)
@@ -82,8 +87,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the tests, print the result and write the files."""
-    from soilml.cli.options import available_effects
-    from soilml.cli.output import show, tell
+    from soilml.cli.options import available_effects, is_json
+    from soilml.cli.output import show_result, tell
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
@@ -99,13 +104,13 @@ def run(args: argparse.Namespace) -> int:
         from soilml.identification.bevameter.result import save_picture
 
         save_picture(args.picture, result)
-    if args.json is not None:
-        save_text(args.json, json_text(result.as_json()))
-    if args.out is not None:
+    if args.out is not None and is_json(args):
+        save_text(args.out, json_text(result.as_json()))
+    elif args.out is not None:
         save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))
         if case is None and (missing := missing_values(result)):
             tell(f"{args.out} lacks {', '.join(missing)}: add them, or give --model")
-    show(_text(result))
+    show_result(_text(result), result.as_json())
     return 0
 
 

@@ -1,4 +1,4 @@
-"""`soilml design`: wheels of a rover for a slope, over soils and errors of the model."""
+"""`soilml plan wheels`: wheels of a rover for a slope, over soils and errors of the model."""
 
 from __future__ import annotations
 
@@ -20,14 +20,13 @@ if TYPE_CHECKING:
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
-HELP = "which wheels climb a slope, with what margin"
 DESCRIPTION = """\
 Find the wheels with which a rover climbs a slope: sizes within limits are
 compared over the soils that it may meet and over typical errors of the model.
 
-  soilml design ROVER.toml
-  soilml design ROVER.toml --slope 20 --gravity moon --picture design.png
-  soilml design ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
+  soilml plan wheels ROVER.toml
+  soilml plan wheels ROVER.toml --slope 20 --gravity moon --picture design.png
+  soilml plan wheels ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
 
 ROVER.toml states the rover; no figure of it is assumed. A dimension is a
 number, a range that is searched, or { values = [...] }:
@@ -75,7 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--slope", type=NumberFrom(0.0, 60.0, "degrees"), metavar="DEG", help="slope in degrees"
     )
     parser.add_argument("--gravity", metavar="G", help="gravity: earth, moon, mars, or in m/s^2")
-    parser.add_argument("--soil", metavar="A,B,...", help="published soils, each as likely")
+    parser.add_argument("--soil", metavar="PAPER/SOIL,...", help="published soils, each as likely")
     parser.add_argument(
         "--risk", type=NumberFrom(0.001, 0.5), help="probability of failing that is accepted"
     )
@@ -107,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
     from soilml.optional_imports import need
 
-    need("scipy", "design")
+    need("scipy", "plan wheels")
     from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
     from soilml.rover_design.figures import SIZE

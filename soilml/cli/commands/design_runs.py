@@ -7,7 +7,6 @@ from typing import Any
 
 from soilml.cli.options import InputFile, add_output, add_seed_option, whole_number_from
 
-HELP = "runs of a simulator that takes the place of the equations"
 DESCRIPTION = """\
 Propose the runs of [simulator] in MODEL.toml: slip, load and the soil in the
 ranges of its priors. With --trust, the python or command of [simulator] makes
@@ -60,7 +59,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text, format_table
     from soilml.optional_imports import need
 
-    need("scipy", "design-runs")
+    need("scipy", "plan runs")
     case = read_case(args.model, with_bias=True, with_simulator=False)
     inputs = runs.design_inputs(case)
     assert case.simulator is not None

@@ -1,4 +1,4 @@
-"""`soilml effects`: the catalogue of effects."""
+"""`soilml show effects`: the catalogue of effects."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import argparse
 from soilml.cli.options import add_effects_option
 from soilml.errors import InputError, did_you_mean
 
-HELP = "list the effects that a model can include, or show one"
 DESCRIPTION = """\
 List the effects that [[effect]] in a model file may name.
 
-  soilml effects                 all effects, one line each
-  soilml effects slip-sinkage    one effect: parameters, units, bounds,
+  soilml show effects                 all effects, one line each
+  soilml show effects slip-sinkage    one effect: parameters, units, bounds,
                                  equation, source
 """
 

@@ -34,7 +34,6 @@ FUSION_RULES = (
     "pairwise",
 )
 FORMATS = ("table", "csv", "json")
-HELP = "soil parameters or slip from measured rows, by a trained model"
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
 are those of the onboard runtime.
@@ -42,11 +41,11 @@ are those of the onboard runtime.
   soilml estimate exported/wheel.onnx
   soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
   soilml estimate exported/wheel.onnx RUNS.csv --by run
-  soilml estimate exported/any_wheel.onnx RUNS.csv --case MODEL.toml --by run
+  soilml estimate exported/any_wheel.onnx RUNS.csv --model MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
 Without a table, one line tells what the file is for: wheel, effects and priors.
---case compares them with those of your model file, and refuses another wheel.
+--model compares them with those of your model file, and refuses another wheel.
 
 Each row of the table gives mean, standard deviation (_std) and 90 % interval
 (_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
@@ -61,7 +60,7 @@ of a run is the prior where they are more than half of its rows, and widened as
 far as the misfit says where no soil explains the others. The interval includes
 errors of the model of wheel and soil, whose size follows from the residuals of
 the run. --exact-model leaves them out, for a model that was checked on a known
-soil; a [discrepancy] or [remainder] of --case takes their place. With a file of
+soil; a [discrepancy] or [remainder] of --model takes their place. With a file of
 a set posterior, disagrees is 1 where the rows of a run fit no exact model, as
 those of one sound run in a hundred: check units, sensors and wheel. A row with
 a blank reading, or whose status is not ok, gets a blank estimate. Slip differs
@@ -80,7 +79,7 @@ print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="trained model file")
+    parser.add_argument("trained", type=InputFile, metavar="MODEL.onnx", help="trained model file")
     parser.add_argument(
         "runs",
         nargs="?",
@@ -104,7 +103,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--rule", help=f"fusion rule of --with: {', '.join(FUSION_RULES)}")
     parser.add_argument(
-        "--case",
+        "--model",
+        dest="case",
         type=InputFile,
         metavar="MODEL.toml",
         help="your wheel and effects, which are compared with those of the model file; for a file "
@@ -147,7 +147,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.quantities import column
     from soilml.remarks import texts
 
-    estimators = [Estimator.load(file) for file in (args.model, *args.others)]
+    estimators = [Estimator.load(file) for file in (args.trained, *args.others)]
     _check_options(args, estimators)
     if args.runs is None and args.case is None:
         show("\n".join(presentation.description(estimator).text for estimator in estimators))
@@ -201,7 +201,7 @@ def run(args: argparse.Namespace) -> int:
 
     def build() -> tuple[Report, dict[str, Any]]:
         content = {"columns": {k: np.asarray(v).tolist() for k, v in columns.items()}}
-        files = args.model, args.runs
+        files = args.trained, args.runs
         page = presentation.estimate_report(columns, remarks, estimators[0], args.by, files)
         return page, {**content, "notes": [remark.as_json() for remark in remarks]}
 
@@ -232,8 +232,8 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
-            f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
-            "a run; omit --by"
+            f"{args.trained} estimates {estimators[0].per_row[0]}, which differs from row to row "
+            "of a run; omit --by"
         )
 
 

@@ -11,13 +11,12 @@ from soilml.errors import InputError, did_you_mean
 if TYPE_CHECKING:
     from soilml.io.table import Table
 
-HELP = "files to try the commands with: a campaign, a log, a rover"
 DESCRIPTION = """\
 Write an example into a folder, and say which command to run on it.
 
-  soilml example DIR                  a campaign whose wheel does what its model lacks
-  soilml example log DIR              the recording of a rig, in the units of its maker
-  soilml example rover DIR            a rover, and rows of one of its wheels
+  soilml example FOLDER               a campaign whose wheel does what its model lacks
+  soilml example log FOLDER           the recording of a rig, in the units of its maker
+  soilml example rover FOLDER         a rover, and rows of one of its wheels
 
 All measurements are simulated, with noise. Existing files are not replaced.
 """
@@ -78,7 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "words",
         nargs="+",
-        metavar="[NAME] DIR",
+        metavar="[NAME] FOLDER",
         help=f"{', '.join(EXAMPLES)} (default: campaign), and the folder for its files",
     )
 
@@ -88,7 +87,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     from soilml.cli.options import folder_outputs
 
     name, folder = _name_and_folder(args)
-    return folder_outputs("DIR", str(folder), EXAMPLES[name][0])
+    return folder_outputs("FOLDER", str(folder), EXAMPLES[name][0])
 
 
 def run(args: argparse.Namespace) -> int:

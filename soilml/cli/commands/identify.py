@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
 FORMATS = ("table", "json")
-HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
 Identify the soil parameters with which MODEL.toml explains the rows of
 RUNS.csv.
@@ -45,8 +44,8 @@ one of [gears.NAME] in MODEL.toml, in the column gear.
 
 Methods:
   averaged   (default) the soil averaged over explanations of the rows, each
-             weighted by its evidence: the model as it is, typical errors of
-             model and sensors of several sizes, effects of the catalogue
+             weighted by its evidence: the model as it is, a smooth error of
+             it, effects of the catalogue; typical errors of sensors beside all
 The others take the model as exact, and sensors but for [noise] and [bias]:
   posterior  mean, standard deviation and 90 % interval of the exact posterior
              under the priors and the noise
@@ -55,10 +54,9 @@ The others take the model as exact, and sensors but for [noise] and [bias]:
   newton     friction angle, shear modulus and kphi from a closed form;
              cohesion known
 
-`averaged` gives the answer of the exact model second, as exact_model. Use that
-only where model and sensors were verified on a known soil. It and `posterior`
-report which parameters the rows do not determine, and the next measurement
-that would help most.
+Use `posterior` only where model and sensors were verified on a known soil. It
+and `averaged` report which parameters the rows do not determine, and the next
+measurement that would help most.
 
 --mean averages the groups of --by, with the errors that they share. --fresh
 predicts other rows by the mean, and gives the regression of measured on
@@ -174,7 +172,7 @@ def run(args: argparse.Namespace) -> int:
 
     write_with_report(args, {args.out: text}, lambda: (page(), content))
     heads = {name: f"{args.by} {name}: " if name else "" for name in shown}
-    parts = [heads[name] + result.text(args.verbose) for name, result in shown.items()]
+    parts = [heads[name] + result.text() for name, result in shown.items()]
     if lines is not None:
         parts.append(regression_text(lines, Path(args.fresh).name))
     show_result("\n\n".join(parts), {k: content[k] for k in content if k != "draws"})

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 #: Endings of the table, its report and the errors that all rows share.
 SUFFIXES = (".csv", ".report.html", ".report.json", ".bias.toml")
-HELP = "bring logs of a rig or a rover into a table of runs"
 DESCRIPTION = """\
 Bring raw logs into the table RUNS.csv that identify, estimate and gap read:
 slip, torque and load of each wheel in each steady window, with standard

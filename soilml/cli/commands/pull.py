@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 Result = TypeVar("Result", bound="Plotted")
 
 FORMATS = ("table", "csv", "json")
-HELP = "drawbar pull against slip, and the slope that can be climbed"
 DESCRIPTION = """\
 Predict the drawbar pull of a running gear against slip on the soil of the
 measured rows, and the slope that a vehicle with such gears can climb, both
@@ -79,8 +78,10 @@ MAX_LOADS = 8  # Largest number of loads
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser)
-    parser.add_argument("--load", help="vertical loads in N: A,B,... or start:stop:count")
-    parser.add_argument("--slope", metavar="A,B,...", help="slopes of a rover in degrees")
+    parser.add_argument(
+        "--load", metavar="N,...", help="vertical loads in N: A,B,... or start:stop:count"
+    )
+    parser.add_argument("--slope", metavar="DEG,...", help="slopes of a rover in degrees")
     add_gravity_options(parser)
     parser.add_argument(
         "--slip-limit", type=slip_limit, metavar="S", help="largest slip considered"

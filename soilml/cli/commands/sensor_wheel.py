@@ -13,7 +13,6 @@ from soilml.cli.options import (
 from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
-HELP = "shear modulus and pull of a wheel from the stress on its rim"
 DESCRIPTION = """\
 Solve the force balance of each run of a wheel whose normal stress was measured:
 k_x and M, the true over the measured stress. The k_x of one run, the

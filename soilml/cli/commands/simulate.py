@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from soilml.report.column_panels import ColumnPanels
 
 FORMATS = ("table", "csv", "json")
-HELP = "forces and sinkage against slip and load, from a model"
 DESCRIPTION = """\
 Solve the equilibrium of gear and soil of MODEL.toml at every combination of
 the slips and loads.
@@ -42,6 +41,7 @@ Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
 
+_ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version before
 MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 
 
@@ -51,9 +51,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "model", type=InputFile, metavar="MODEL.toml", help="gear, soil and effects"
     )
     parser.add_argument(
-        "--slip", required=True, help="slip ratios, above 0 driving, below 0 braking"
+        "--slip",
+        metavar="S,...",
+        required=True,
+        help="slip ratios, above 0 driving, below 0 braking",
     )
-    parser.add_argument("--load", required=True, help="vertical loads in N")
+    parser.add_argument("--load", metavar="N,...", required=True, help="vertical loads in N")
     parser.add_argument(
         "--speed",
         type=NumberFrom(-100.0, 100.0, "m/s"),
@@ -68,9 +71,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--slip-angle",
-        type=NumberFrom(-1.6, 1.6, "rad"),
-        metavar="RAD",
-        help="angle between wheel plane and path, in rad",
+        type=NumberFrom(-91.0, 91.0, "degrees"),
+        metavar="DEG",
+        help="angle between wheel plane and path, in degrees",
     )
     add_effects_option(parser)
     add_gear_option(parser)
@@ -107,7 +110,7 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from soilml.cli.options import available_effects, parse_numbers
-    from soilml.cli.output import write_columns
+    from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
@@ -134,7 +137,10 @@ def run(args: argparse.Namespace) -> int:
             f"at most {most} are possible{' with --balance' if args.balance else ''}"
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
-    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
+    angle = None if args.slip_angle is None else np.deg2rad(args.slip_angle)
+    if angle is not None and 0.0 < abs(args.slip_angle) <= _ONCE_RADIANS:
+        tell(f"! --slip-angle is in degrees now: {args.slip_angle:g} degrees")
+    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
     options["with_efficiency"], settling = args.efficiency, None
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:

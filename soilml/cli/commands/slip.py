@@ -1,4 +1,4 @@
-"""`soilml slip`: slip, speed and soil of a rover without odometry."""
+"""`soilml drive slip`: slip, speed and soil of a rover without odometry."""
 
 from __future__ import annotations
 
@@ -14,12 +14,11 @@ from soilml.cli.options import (
 )
 
 FORMATS = ("table", "csv", "json")
-HELP = "slip of a rover without odometry, from torque and pitch"
 DESCRIPTION = """\
 Infer body speed, slip of each wheel and the soil along a drive whose speed
 nobody measured, from torques, rim speeds and pitch, with 90 % intervals.
 
-  soilml slip DRIVE.csv --rover ROVER.toml --out slip.csv --picture slip.png
+  soilml drive slip ROVER.toml DRIVE.csv --out slip.csv --picture slip.png
 
 ROVER.toml has [gear], [soil] with [soil.prior], [rover] with mass and wheels,
 and [drive]: torque_per_ampere, the friction of the drives and their errors.
@@ -33,28 +32,25 @@ the loads follow from mass and positions.
 All wheels share one body speed, at which they pull what the slope requires.
 Torques weigh the soils of the prior. The result has a row for each time;
 flags say which rows are refused (standing, hard floor) and where the slip is
-not determined. --json has the same with remarks.
+not determined. FILE.json has the same with remarks.
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover and prior")
     parser.add_argument(
         "drive", type=InputFile, metavar="DRIVE.csv", help="a row for each time and wheel"
     )
-    parser.add_argument(
-        "--rover", type=InputFile, metavar="ROVER.toml", required=True, help="rover and prior"
-    )
     add_effects_option(parser)
     add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_output(parser, "--out", "FILE.csv", "write the table to this file, or FILE.json", ".json")
     add_output(parser, "--picture", "FILE.png", "draw slip, speed and pitch against time")
-    add_output(parser, "--json", "FILE.json", "write table and remarks")
 
 
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
-    from soilml.cli.options import available_effects
+    from soilml.cli.options import available_effects, is_json
     from soilml.cli.output import show, tell, tell_columns
     from soilml.cli.progress import working
     from soilml.cli.screen import SCREEN
@@ -82,14 +78,11 @@ def run(args: argparse.Namespace) -> int:
     def draw(path: Path) -> None:
         save_png(lambda ax: plot_drive(found, ax), 3, 1, SIZE, path)
 
-    table = csv_text(drive_columns(found))
-    contents: dict[str | None, Any] = {
-        args.out: table,
-        args.picture: draw,
-        args.json: json_text(drive_json(found)),
-    }
+    whole = args.out is not None and is_json(args)
+    table = json_text(drive_json(found)) if whole else csv_text(drive_columns(found))
+    contents: dict[str | None, Any] = {args.out: table, args.picture: draw}
     write_files({Path(path): content for path, content in contents.items() if path is not None})
-    if args.out is None and args.json is None and SCREEN.form_of_rows() != "table":
+    if args.out is None and SCREEN.form_of_rows() != "table":
         tell_columns(drive_columns(found), None)
         for remark in found.remarks():
             tell(f"! {remark}")

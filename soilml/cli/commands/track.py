@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from soilml.cli.options import InputFile, NumberFrom, add_gear_option, add_output
 from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
-HELP = "soil, sinkage and belt of a tracked robot from the log of its pulls"
 DESCRIPTION = """\
 Evaluate the log of a tracked robot that pulls a payload (Wang, Yan and Du 2018):
 slip from two travels, pull from the stationary part of the tension, sinkage of
@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(f"--grousers is {args.grousers!r}; needed are pitch, tip, f_g and j_k")
         pitch, tip, friction, yielding = sizes
         grousers = Grousers(pitch=pitch, tip=tip, friction=friction, yielding=yielding)
-    found = evaluate_log(case, log, 0.5 * args.mass * 9.81, args.spacing, grousers)
+    found: Any = evaluate_log(case, log, 0.5 * args.mass * 9.81, args.spacing, grousers)
     write_columns(found.columns, args.out, args.picture, found)
     if found.fit is not None:
         tell(found.fit.summary())

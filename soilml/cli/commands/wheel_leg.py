@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from soilml.report.parameter_figure import ParameterIntervals
 
 FORMATS = ("table", "csv", "json")
-HELP = "soil, trafficability, or slip, from torque, vibration and sinkage of a wheel-leg"
 DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil
 from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print,

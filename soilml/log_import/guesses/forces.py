@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate, words_of
-from soilml.log_import.guesses.draft import Marked
 from soilml.log_import.guesses.vertical_axis import axis_in, families, with_sinkage_along
+from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import factor
 
 _FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "effort", "力"}

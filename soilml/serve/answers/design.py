@@ -11,7 +11,7 @@ from typing import Any
 
 from soilml.errors import InputError
 from soilml.io.named_files import NamedFiles
-from soilml.log_import.guesses.draft import toml_value
+from soilml.log_import.mapping.written_map import toml_value
 from soilml.optional_imports import tomllib
 from soilml.physics.soils import soil_catalogue
 from soilml.report.page import Provenance, report_texts
@@ -208,7 +208,7 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
 
     The soil of measured rows is that of the page's table and model.
 
-    Raises `InputError` as `soilml design` does, and for other files than these.
+    Raises `InputError` as `soilml plan wheels` does, and for other files than these.
     """
     names = request.get("names") or []
     # the soil of measured rows is that of the page's model and table

@@ -14,7 +14,6 @@ from soilml.experiment_design.advice_after_results import advice_after_fit
 from soilml.experiment_design.presentation import abstention_message, next_row_remarks, row_message
 from soilml.fitting.coordinates import select_free
 from soilml.identification import Fit, identify
-from soilml.identification.averaged import stated_explanations
 from soilml.io.read_table import RUNS, read_table
 from soilml.io.table import Table
 from soilml.log_import.checks.table_hints import table_remarks
@@ -49,7 +48,6 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     remarks = table_remarks(table, case)
     tell(f"estimating the soil from {len(table)} rows")
     fit = identify(case, table)
-    exact = fit.exact_model
     tell("looking for the next measurement")
     advice = None if fit.samples is None else advice_after_fit(case, table, None, fit)
     tell("predicting drawbar pull and slope")
@@ -64,12 +62,10 @@ def answer(request: dict[str, Any], tell: Tell) -> dict[str, Any]:
     return {
         **table_summary(table),
         "remarks": texts(remarks),
-        "parameters": parameters(case, fit, exact),
+        "parameters": parameters(case, fit),
         "explanations": [
-            {"text": str(one), "probability": one.probability}
-            for one in stated_explanations(fit.explanations)
+            {"text": str(one), "probability": one.probability} for one in fit.explanations
         ],
-        "use": "" if exact is None else exact.use_of_exact.text,
         "words": words(fit, advice),
         "warnings": texts(r for r in fit.warnings if r.code not in STATED_BESIDE),
         "next": "" if advice is None else row_message(advice, advice.best()),
@@ -87,7 +83,7 @@ def read_rows(request: dict[str, Any]) -> Table:
     return table if not run else table.where("run", str(run))
 
 
-def parameters(case: Case, fit: Fit, exact: Fit | None = None) -> list[dict[str, Any]]:
+def parameters(case: Case, fit: Fit) -> list[dict[str, Any]]:
     """Each parameter averaged over explanations, by the model taken as exact, and its prior.
 
     In shown units; `si` is the value in the SI unit.
@@ -116,17 +112,8 @@ def parameters(case: Case, fit: Fit, exact: Fit | None = None) -> list[dict[str,
                 "weak": WEAKLY_IDENTIFIED_ABOVE < left <= NOT_IDENTIFIED_ABOVE,
                 "si": float(fit.values[i]),
             }
-            | ({} if exact is None else _of_exact(exact, i, factor))
         )
     return found
-
-
-def _of_exact(exact: Fit, i: int, factor: float) -> dict[str, Any]:
-    """Parameter `i` by the model taken as exact."""
-    return {
-        "exact": factor * float(exact.values[i]),
-        "exact_band": [factor * float(end[i]) for end in exact.interval],
-    }
 
 
 def words(fit: Fit, advice: Advice | None) -> list[str]:

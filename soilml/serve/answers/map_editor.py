@@ -10,23 +10,23 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError, SoilmlError
-from soilml.log_import.channels.runs import Run, runs_of
+from soilml.log_import.channels.runs import as_rows, runs_of
+from soilml.log_import.guesses.channel_drafts import draft_channels
 from soilml.log_import.guesses.columns import Candidate, candidates_of, liveliest
-from soilml.log_import.guesses.map_edits import (
+from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
+from soilml.log_import.mapping.written_map import (
     channels_of,
     columns_in,
     open_lines,
     parsed,
-    set_role,
-    set_unit,
     set_value,
+    with_channel,
+    with_unit,
 )
-from soilml.log_import.mapping.channel_map import ROLES
-from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.new_map import draft_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import log_files
-from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
 from soilml.log_import.rows import WheelSeries
 from soilml.log_import.workflow import import_log
@@ -101,12 +101,13 @@ class _Look:
             self.map = self._without_slip()
         # what is wrong with its channels does not hide the columns
         logs = [read_log(name) for name in names[: None if self.content.get("files") else 1]]
-        steady = self.map is not None and self.map.each_row
+        steady = self.map is not None and self.map.runs.each_row
         try:
-            runs = _as_rows(logs) if steady else runs_of(logs, self.map or LogMap(MAP_FILE, ()))
+            runs = [] if steady else runs_of(logs, self.map or LogMap(MAP_FILE))
         except InputError as error:
             self.fault = self.fault or str(error)
-            runs = _as_rows(logs)
+            runs = []
+        runs = runs or [as_rows(log, "log") for log in logs]
         run = liveliest(runs)
         self.run = run
         self.columns = candidates_of(run.recordings, steady)
@@ -122,11 +123,6 @@ class _Look:
             return None
 
 
-def _as_rows(logs: Sequence[Sequence[Recording]]) -> list[Run]:
-    """Logs without a clock: a sample each second, to be looked at."""
-    return [Run("log", tuple(r), tuple(np.arange(float(len(x))) for x in r)) for r in logs]
-
-
 def _changed(text: str, change: Mapping[str, Any], look: _Look) -> str:
     given = {k: str(change.get(k) or "") for k in ("column", "role", "unit", "value")}
     if "line" in change:
@@ -135,8 +131,31 @@ def _changed(text: str, change: Mapping[str, Any], look: _Look) -> str:
             raise InputError("line: needed is the number of a line of the map")
         return set_value(text, int(line), given["value"])
     if "column" in change:
-        return set_role(text, look.run, look.columns, given["column"], given["role"], given["unit"])
-    return set_unit(text, given["role"], given["unit"])
+        return _with_role(text, look, given["column"], given["role"], given["unit"])
+    return with_unit(text, given["role"], given["unit"])
+
+
+def _with_role(text: str, look: _Look, address: str, path: str, unit: str) -> str:
+    """The map with a column in another role: its unit, sign and tare as its samples show them."""
+    known = {c.address: c for c in look.columns}
+    parent, _, role = path.rpartition(".")
+    if address not in known or (path and role not in ROLES):
+        raise InputError(f"column {address!r}, channel {path!r}: one of them is not known")
+    if not path:
+        return with_channel(text, address, None)
+    chosen = {role: known[address]}
+    for other, table in channels_of(look.content).items():
+        above, _, own = other.rpartition(".")
+        used = columns_in(table)
+        if above == parent and own != role and used and used[0] in known and used[0] != address:
+            chosen[own] = known[used[0]]
+    drafted = draft_channels(chosen, look.run, {})[role]
+    drafted.path, drafted.about = path, ROLES[role][1]
+    if unit:
+        drafted.keys.pop("scale", None)
+        drafted.comments.pop("unit", None)
+        drafted.put("unit", unit)
+    return with_channel(text, address, drafted)
 
 
 def _roles(content: Mapping[str, Any]) -> list[dict[str, str]]:
@@ -164,7 +183,7 @@ def _column(column: Candidate, samples: Floats, look: _Look) -> dict[str, Any]:
     role = path.rpartition(".")[2]
     shared = channels.get(role, {})
     own = {**shared, **channels.get(path, {})}
-    clock = look.map is not None and column.name == look.map.time_column
+    clock = look.map is not None and column.name == look.map.time.column
     return {
         "name": column.address,
         "stated": column.unit,

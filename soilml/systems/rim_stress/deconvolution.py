@@ -66,7 +66,7 @@ def fit_stress_arc(
 
     def size(x: Floats) -> tuple[Floats, float]:
         mean = _shape(at, x) @ share
-        return mean, float(mean @ seen / max(mean @ mean, 1e-300))
+        return mean, float(mean @ seen) / max(float(mean @ mean), 1e-300)
 
     def misfit(x: Floats) -> Floats:
         mean, scale = size(x)

@@ -115,7 +115,7 @@ def force_components(
 def force_of(parts: Floats, force: int, magnification: Real, cohesion: Real, tangent: Real) -> Real:
     """Load, pull (N) or torque (N m) at M, c (Pa) and tan(phi); see `force_components`."""
     pressed, rubbed, bonded = parts[force]
-    return magnification * (pressed + tangent * rubbed) + cohesion * bonded
+    return np.asarray(magnification * (pressed + tangent * rubbed) + cohesion * bonded)
 
 
 def magnification(parts: Floats, load: Real, cohesion: Real, tangent: Real) -> Real:

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Annotated, final
 
-from soilml.config.measurement_noise import Noise, take_noise
+from soilml.config.measurement_noise import Noise, NoiseOfReading
 from soilml.config.model_settings import take_priors
 from soilml.errors import InputError
+from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import Parameter, check, declared
+from soilml.parameters import Parameter
 from soilml.systems.rim_stress.climb import Rover, Uncertainty
-
-DEFAULT_STRESS_NOISE = Noise(share=0.05)  # Noise of the stress where [noise] has no normal_Pa
-#: Fields of `Uncertainty` by their key in [noise]; the speed is a percentage.
-KEYS = {
-    "slope_rad": "slope",
-    "entry_angle_rad": "entry_angle",
-    "speed_scale": "speed_scale",
-    "front_load": "front_load",
-}
 
 
 @final
@@ -54,46 +46,60 @@ def read_rover(path: str | os.PathLike[str]) -> RoverFile:
             "a rover by its wheels is for soilml pull; climb needs mass, radius and width of four "
             "equal wheels"
         )
-    names = [f.name for f in fields(Rover)]
-    needed = ("mass", "radius", "width")
-    values = {name: own.number(name) for name in names if name in own or name in needed}
-    own.permit(names)
-    own.finish()
-    try:
-        rover = Rover(**values)
-        check(rover)
-    except InputError as error:
-        own.fail(str(error))
-    soil = settings.table("soil")
-    fixed = {name: soil.number(name) for name in declared(FixedShearParameters) if name in soil}
-    ranges = soil.table("prior")
-    if both := [name for name in fixed if name in ranges]:
-        ranges.fail(f"{both[0]} is a number in [soil] and has a range here; remove one of them")
-    prior = take_priors(ranges, FixedShearParameters)
-    if "shear_modulus" in prior:
-        prior["shear_modulus"] = replace(prior["shear_modulus"], log=True)
-    soil.permit(declared(FixedShearParameters))
-    soil.finish()
-    check(FixedShearParameters(**fixed), f"{soil.where} ")
+    rover = take_declared(Rover, own)
+    fixed, prior = _take_ground(settings.table("soil"))
     noise, stress = _take_noise(settings.table("noise"))
     settings.finish()
     return RoverFile(rover, fixed, prior, noise, stress)
 
 
-def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
-    """Standard deviations by column, and those of speed scale and front load."""
-    stress = take_noise(settings, "normal_Pa") if "normal_Pa" in settings else DEFAULT_STRESS_NOISE
-    found = {field: settings.number(key) for key, field in KEYS.items() if key in settings}
-    for name, value in found.items():
-        if not 0.0 <= value < 1.0:
-            settings.fail(f"{name} is {value:g}; a standard deviation must lie in [0, 1)")
-    if "speed_m_s" in settings:
-        taken = take_noise(settings, "speed_m_s")
-        if taken.constant:
-            settings.fail(
+def _take_ground(settings: Settings) -> tuple[dict[str, float], dict[str, Prior]]:
+    """Numbers in [soil] are fixed; ranges in [soil.prior] are priors."""
+    priors = settings.table("prior")
+    known = vars(take_declared(FixedShearParameters, settings))
+    fixed = {name: value for name, value in known.items() if value is not None}
+    prior = take_priors(priors, FixedShearParameters)
+    for name, taken in prior.items():
+        if name in fixed:
+            priors.fail(f"{name} is a number in [soil] and has a range here; remove one of them")
+        if name == "shear_modulus" and not taken.log:
+            prior[name] = Prior(taken.lower, taken.upper, log=True)
+    return fixed, prior
+
+
+_SPEED, _STRESS = Noise(share=Uncertainty.speed), Noise(share=0.05)
+_SHARE = Parameter("1", 0.0, 1.0, "standard deviation")
+_ANGLE = Parameter("rad", 0.0, 1.0, "standard deviation")
+
+
+@dataclass(frozen=True)
+class _NoiseTable:
+    """The table [noise]: standard deviations by column, and those of speed scale and front load."""
+
+    speed_m_s: Annotated[Noise, NoiseOfReading()] = _SPEED
+    normal_Pa: Annotated[Noise, NoiseOfReading()] = _STRESS  # noqa: N815
+    slope_rad: Annotated[float, _ANGLE] = Uncertainty.slope
+    entry_angle_rad: Annotated[float, _ANGLE] = Uncertainty.entry_angle
+    speed_scale: Annotated[float, _SHARE] = Uncertainty.speed_scale
+    front_load: Annotated[float, _SHARE] = Uncertainty.front_load
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for a speed whose error is no share of it, and for exact stresses."""
+        if self.speed_m_s.constant or not self.speed_m_s.share:
+            raise InputError(
                 "speed_m_s must be a percentage, such as '0.9 %': slip is a ratio of speeds"
             )
-        found["speed"] = taken.share
-    settings.permit(("speed_m_s", "normal_Pa", *KEYS))
-    settings.finish()
-    return Uncertainty(**found), stress
+        if self.normal_Pa == Noise():
+            raise InputError("normal_Pa is 0; a standard deviation must be above zero")
+
+
+def _take_noise(settings: Settings) -> tuple[Uncertainty, Noise]:
+    found = take_declared(_NoiseTable, settings)
+    own = Uncertainty(
+        speed=found.speed_m_s.share,
+        speed_scale=found.speed_scale,
+        slope=found.slope_rad,
+        entry_angle=found.entry_angle_rad,
+        front_load=found.front_load,
+    )
+    return own, found.normal_Pa

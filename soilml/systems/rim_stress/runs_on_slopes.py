@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats
+from soilml.arrays import Floats, Real
 from soilml.errors import FitError, InputError
 from soilml.physics.model import Model
 from soilml.physics.operating_point import MOST_SLIP, Operating
@@ -146,12 +146,18 @@ def solve_runs(
     cohesion, tangent = float(strength.cohesion), math.tan(float(strength.friction_angle))
     shape = _normal(rng, 1)[:, 0] * (SHAPE_STD if discs else 0.0)
 
-    def parts(profile: StressProfile, at: SteadyRun, modulus: Floats) -> Floats:
+    def parts(profile: StressProfile, at: SteadyRun, modulus: Real) -> Floats:
         size = float(wheel.radius), float(wheel.width)
         return force_components(profile, float(at.slip), modulus, *size)
 
     def load(at: SteadyRun) -> float:
         return float(at.weight) * math.cos(float(at.slope))
+
+    def balance(profile: StressProfile, at: SteadyRun) -> float:
+        def pull(modulus: Floats) -> Floats:
+            return np.asarray(pull_under(parts(profile, at, modulus), load(at), cohesion, tangent))
+
+        return find_modulus(pull, float(at.weight) * math.sin(float(at.slope)))
 
     drawn = {
         name: _drawn(at, profiles(stresses[name], wheel if discs else None, rng), rng)
@@ -160,14 +166,8 @@ def solve_runs(
     solved = np.full((len(runs), DRAWS + 1), np.nan)  # the first draw is what was measured
     for k, name in enumerate(runs):
         for i, (profile, at) in enumerate(drawn[name]):
-            carried, required = load(at), float(at.weight) * math.sin(float(at.slope))
             try:
-                solved[k, i] = find_modulus(
-                    lambda m, p=profile, at=at, w=carried: pull_under(  # type: ignore[misc]
-                        parts(p, at, m), w, cohesion, tangent
-                    ),
-                    required,
-                )
+                solved[k, i] = balance(profile, at)
             except FitError as error:
                 if i == 0:
                     why[name] = str(error)

@@ -37,7 +37,7 @@ class SoilErrors:
     def deviations(self, friction_angle: float, normal_stiffness: float) -> Floats:
         """Errors about these estimates, rad and Pa (2, soils), scaled to unit variance."""
         shares = np.asarray([self.friction, self.stiffness]) * 0.01
-        return shares * np.asarray([[friction_angle], [normal_stiffness]]) / 2.0
+        return np.asarray(shares * [[friction_angle], [normal_stiffness]] / 2.0)
 
 
 #: By relation. The table has no row for torque by "terramechanics", for which EMPIRICAL stands.

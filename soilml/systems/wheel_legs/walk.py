@@ -195,10 +195,15 @@ def walk(
         status[valid], history[:, :, valid] = _simulated(legs, count, 2.0 * np.pi / steps)
     angle = 2.0 * np.pi / steps * np.arange(count)
     speed = np.array([np.nan if w.invalid_reason else w.speed for w in wheels])
+    x, z, vx, vz, torque = history
     return Walk(
-        angle[:, None] / speed,
-        angle,
-        *history,
+        time=angle[:, None] / speed,
+        angle=angle,
+        x=x,
+        z=z,
+        vx=vx,
+        vz=vz,
+        torque=torque,
         status=status,
         length=np.array([w.leg.length for w in wheels]),
         legs=np.array([max(w.legs, 1) for w in wheels]),

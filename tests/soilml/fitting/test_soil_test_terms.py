@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from soilml.identification.posterior_density import PosteriorDensity
 
 from soilml import Case, Model, Operating, Table, Wheel, identify, read_case, soil
 from soilml.config.measurement_noise import Noise
@@ -14,7 +15,6 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.posterior import prior_fractions
-from soilml.identification.posterior_density import PosteriorDensity
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
 from soilml.remarks import texts

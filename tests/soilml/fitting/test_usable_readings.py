@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import MODEL
+from soilml.identification.posterior_density import PosteriorDensity
 
 from soilml import Noise, Operating, gap, identify, read_case, simulate
 from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.remarks import about, texts
 

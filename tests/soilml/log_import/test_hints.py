@@ -151,7 +151,7 @@ def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, caps
     for command in (
         ["identify", model, str(runs), "--method", "nonlinear"],
         ["gap", model, str(runs), "--out", str(tmp_path / "found")],
-        ["estimate", "exported/any_wheel.onnx", str(runs), "--case", model, "--by", "run"],
+        ["estimate", "exported/any_wheel.onnx", str(runs), "--model", model, "--by", "run"],
     ):
         main(command)
         assert "! " + str(runs) + ": torque is" in (said := capsys.readouterr().err), command
