@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from soilml.systems.wheel_legs.slip_models import VIBRATION_SLIP, soil_spring
 
 from soilml import Estimator, Model, Operating
 from soilml.cli import main
@@ -23,7 +24,6 @@ from soilml.io.text_tables import format_table
 from soilml.log_import import import_log
 from soilml.onboard.multi_sensor import fuse_estimates
 from soilml.quantities import Z_90, column
-from soilml.systems.wheel_legs.slip_models import VIBRATION_SLIP, soil_spring
 from soilml.systems.wheel_legs.stances import (
     FOOT,
     GRAVITY,
