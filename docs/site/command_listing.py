@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from soilml.cli.main import leaves, parser
+from soilml.cli.main import parser
+from soilml.cli.options import leaves
 
 PAGE = "docs/reference/commands"
 MARK = "<!-- commands -->"

@@ -177,14 +177,6 @@ def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     return root
 
 
-def leaves(root: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, Any]]:
-    """Every command below a parser, by name, with its own parser."""
-    below: Any = [a.choices for a in root._actions if a.metavar == "COMMAND"]
-    for word, sub in (below[0] if below else {}).items():
-        inner = list(leaves(sub, f"{before}{word} "))
-        yield from inner or [(before + word, sub)]
-
-
 def _command_of(words: Sequence[str]) -> str:
     """The command that a command line begins with; empty where it begins with none."""
     return next((" ".join(words[:n]) for n in (1, 2) if " ".join(words[:n]) in COMMANDS), "")
@@ -278,7 +270,7 @@ def _status(words: list[str]) -> int:
     typed = words or ["--help"]
     words = _join_negative_values(present_words(typed))
     args = parser(words).parse_args(words)
-    args.command_line = typed
+    args.command_line, args.make_parser = typed, parser
     SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()

@@ -7,10 +7,10 @@ of usage answer at once.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
@@ -274,6 +274,14 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of processes (default: one for each core)",
     )
+
+
+def leaves(root: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command below a parser, by name, with its own parser."""
+    below: Any = [a.choices for a in root._actions if a.metavar == "COMMAND"]
+    for word, sub in (below[0] if below else {}).items():
+        inner = list(leaves(sub, f"{before}{word} "))
+        yield from inner or [(before + word, sub)]
 
 
 def number(text: str) -> float:

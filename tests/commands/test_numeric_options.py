@@ -9,8 +9,8 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
-from soilml.cli.main import leaves, parser
-from soilml.cli.options import NumberFrom, number, slip_limit, whole_number
+from soilml.cli.main import parser
+from soilml.cli.options import NumberFrom, leaves, number, slip_limit, whole_number
 from soilml.serve.command import port_number
 
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]

@@ -132,8 +132,8 @@ def test_files_that_read_the_same_are_not_fused_as_if_they_erred_independently(t
 
 
 def test_every_argument_that_names_an_input_file_is_declared_as_one():
-    from soilml.cli.main import leaves, parser
-    from soilml.cli.options import InputFile
+    from soilml.cli.main import parser
+    from soilml.cli.options import InputFile, leaves
 
     outputs = {"out", "picture", "limit", "c", "over_time"}
     for name, command in leaves(parser()):

@@ -6,7 +6,8 @@ from collections import defaultdict
 import pytest
 
 from soilml.cli import main, old_spellings
-from soilml.cli.main import COMMANDS, GROUPS, leaves, parser
+from soilml.cli.main import COMMANDS, GROUPS, parser
+from soilml.cli.options import leaves
 
 PARSERS = dict(leaves(parser()))
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable
 
+from soilml.cli.options import leaves
+
 DESCRIPTION = """\
 Print a script with which a shell completes commands, options, soils, effects,
 released model files and file names. For a shell, and for good:
@@ -33,9 +35,7 @@ def run(args: argparse.Namespace) -> int:
     need("shtab", "setup completion")
     import shtab
 
-    from soilml.cli.main import leaves, parser
-
-    root = parser()
+    root = args.make_parser()
     for name, command in leaves(root):
         for action in command._actions:
             if action.choices is None and action.nargs != 0:

@@ -30,7 +30,7 @@ def test_a_file_is_read_with_its_units(tmp_path):
         ("mass = 12.0\n", "", r"\[rover\]: mass is missing; needed is a number in kg"),
         ("wheelbase = 0.40\n", "", r"\[rover\]: wheelbase is missing"),
         ("centre_of_mass = [0.02, 0.18]\n", "", r"centre_of_mass is missing"),
-        ('gravity = "earth"\n', "", r"gravity is missing; needed is a number in m/s.2, or one of earth"),
+        ('gravity = "earth"\n', "", r"gravity is missing; needed is a number in m/s.2"),
         ("radius = 0.09\n", "", r"\[wheel\]: radius is missing"),
         ('slope = "10 deg"\n', "", r"\[goal\]: slope is missing"),
         ('"10 deg"', "10", r"if 10 are degrees, write 0.1745"),

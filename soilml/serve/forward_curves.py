@@ -16,7 +16,7 @@ from soilml.physics.forces import apply_input_effects
 from soilml.physics.gears.linear_wheel import LinearWheel
 from soilml.physics.operating_point import Operating
 from soilml.row_status import Status
-from soilml.serve.answers.chosen_case import FIRST_WHEEL, WHEELS, forward_case, with_sliders
+from soilml.serve.chosen_case import FIRST_WHEEL, WHEELS, forward_case, with_sliders
 
 #: Slips of the curves when driving, and the braking ones, which are added where the wheel brakes.
 DRIVING = np.linspace(0.0, 0.9, 46)
@@ -50,7 +50,7 @@ _STRENGTH = {
                             text="how far soil is sheared until its strength is mobilised"),
 }  # fmt: skip
 _BEARING = {
-    "kphi": Slider("Frictional modulus", "kφ", "kN/mⁿ⁺²", 1e-3, (10.0, 1e5), log=True),
+    "kphi": Slider("Frictional modulus", "kφ", "MN/mⁿ⁺²", 1e-6, (0.01, 100.0), log=True),
     "kc": Slider("Cohesive modulus", "kc", "kN/mⁿ⁺¹", 1e-3, (0.0, 100.0)),
     "n": Slider("Exponent of sinkage", "n", "", 1.0, (0.3, 2.0)),
     "a0": Slider("Place of the largest stress", "a₀", "", 1.0, (0.1, 0.8),

@@ -11,38 +11,19 @@ from pathlib import Path
 from typing import Any
 
 from soilml.config.case import Case, read_case
-from soilml.config.measurement_noise import Noise
-from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.io.named_files import NO_FILES
-from soilml.numerics.prior import Prior
 from soilml.parameters import located
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.gears import Track, Wheel
 from soilml.physics.gears.base import Gear
 from soilml.physics.model import Model
 from soilml.physics.soils import soil, soil_catalogue
-from soilml.serve.answers.job_files import MODEL_FILE
+from soilml.serve.job_commands import MODEL_FILE
 
 #: Kinds of effects that the page offers; those of sensors belong to a log.
 _OPERATING: tuple[str, ...] = ("slip", "load")
 OFFERED_KINDS = ("soil", "wheel", "rig")
-#: Priors and noise of a model file that the page writes: those of `soilml init`.
-PRIOR = {
-    "cohesion": Prior(0.0, 5000.0),
-    "friction_angle": Prior(0.35, 0.80),
-    "shear_modulus": Prior(0.003, 0.05, log=True),
-}
-NOISE = {
-    "torque_Nm": Noise(share=0.02),
-    "drawbar_pull_N": Noise(share=0.02, constant=0.5),
-    "sinkage_m": Noise(constant=0.001),
-}
-_COMMENTS = (
-    "Wheel and soil as chosen on the page; docs/reference/model-file.md explains all sections. SI.",
-    "[soil.prior] is what may be true before the log: cohesion, friction angle and shear modulus",
-    "are identified in it. [noise] is one standard deviation of each sensor: correct both.",
-)
 
 
 @dataclass(frozen=True)
@@ -188,17 +169,3 @@ def _is_default(effect: Effect) -> bool:
         return False
     default = located(type(effect)())
     return all(default[path][1] == entry[1] for path, entry in located(effect).items())
-
-
-def model_text(request: dict[str, Any]) -> dict[str, str]:
-    """The text of a model file: the one that was given, once checked, or the sliders' own.
-
-    Raises `InputError` as `forward_case` does.
-    """
-    given = request.get("model")
-    if isinstance(given, str) and given.strip() and not request.get("values"):
-        whole_case(request)
-        return {"text": given}
-    case, _ = with_sliders(forward_case(request), request)
-    own = replace(case, prior=case.prior or PRIOR, noise=case.noise or NOISE)
-    return {"text": case_as_toml(own, _COMMENTS)}
