@@ -6,7 +6,7 @@ means for a heavy rover, and `slip_of_strides` gives the slip on a known soil. S
 Saaj, IEEE Transactions on Robotics 33(6), 2017.
 """
 
-from soilml.systems.wheel_legs.gait_metrics import GaitMetrics, gait_metrics
+from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.geometry import FEET, WheelLeg, wheel_leg
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
@@ -34,7 +34,6 @@ __all__ = [
     "GROUNDS",
     "TORQUE_SLIP",
     "VIBRATION_SLIP",
-    "GaitMetrics",
     "LegSoil",
     "LinearGround",
     "Mobility",

@@ -163,8 +163,8 @@ def walk(
     >>> ground = LinearGround(stiffness=0.7e6)
     >>> result = walk(wheel_leg("LTF"), ground, slip=0.25, turns=1.0, steps=200)
     >>> metrics = gait_metrics(result)
-    >>> round(float(metrics.mean_slip[0]), 2), round(float(metrics.mean_sinkage[0]), 2)  # 1, m
-    (0.25, 0.06)
+    >>> [round(float(metrics[name][0]), 2) for name in ("slip_mean", "sinkage_mean_m")]
+    [0.25, 0.06]
     """
     if not (steps >= 100 and 0.0 < turns < np.inf):
         raise InputError(

@@ -1,4 +1,4 @@
-"""Walks of several wheel-legs, grounds and slips as tables, and as a picture."""
+"""Metrics of a turn of walking wheel-legs, and walks of many combinations as tables."""
 
 from __future__ import annotations
 
@@ -9,26 +9,40 @@ from typing import Any
 
 import numpy as np
 
+from soilml.arrays import Array
 from soilml.errors import InputError
 from soilml.report.column_panels import ColumnPanels
-from soilml.systems.wheel_legs.gait_metrics import TURN, gait_metrics
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import LinearGround
-from soilml.systems.wheel_legs.walk import WalkStatus, walk
+from soilml.systems.wheel_legs.walk import Walk, WalkStatus, walk
 
-#: Columns of the metrics of a turn, by the attribute of `GaitMetrics`.
-METRICS = {
-    "mean_slip": "slip_mean",
-    "rms_slip": "slip_rms",
-    "mean_sinkage": "sinkage_mean_m",
-    "rms_sinkage": "sinkage_rms_m",
-    "max_sinkage": "sinkage_largest_m",
-    "midstance_sinkage": "sinkage_midstance_m",
-    "mean_torque": "torque_mean_Nm",
-}
+TURN = 2.0 * np.pi
 MOST = 400  # Walks at once
 MOST_DRAWN = 8  # Walks of one picture over a turn
 SWEPT = 3  # Values of a quantity from which on a picture has it along its axis
+
+
+def gait_metrics(walked: Walk) -> dict[str, Array]:
+    """Metrics of the last full turn of every case by column, (cases,); NaN where one has stopped.
+
+    Mean, root mean square and largest values of slip and sinkage (m), the mean of the motor torque
+    (N m), and the sinkage at midstance. Raises `InputError` for a walk shorter than a turn.
+    """
+    if walked.angle[-1] < TURN - 1e-9:
+        raise InputError(
+            f"a walk of {walked.angle[-1] / TURN:.2g} turns; one full turn or more is needed"
+        )
+    last = walked.after(float(walked.angle[-1]) - TURN)
+    sinkage, slip = last.sinkage, last.slip
+    return {
+        "slip_mean": slip.mean(axis=0),
+        "slip_rms": np.sqrt(np.mean(slip**2, axis=0)),
+        "sinkage_mean_m": sinkage.mean(axis=0),
+        "sinkage_rms_m": np.sqrt(np.mean(sinkage**2, axis=0)),
+        "sinkage_largest_m": sinkage.max(axis=0),
+        "sinkage_midstance_m": last.at_midstance(sinkage),
+        "torque_mean_Nm": last.torque.mean(axis=0),
+    }
 
 
 @dataclass(frozen=True)
@@ -57,19 +71,16 @@ class WalkTables:
             and np.unique(self.columns[name]).size >= SWEPT
         ]
         if swept:
-            slip = ("slip_mean", "slip_rms")
-            sinkage = ("sinkage_mean_m", "sinkage_largest_m")
+            shown = [("slip_mean", "slip_rms"), ("sinkage_mean_m", "sinkage_largest_m")]
             others = tuple(name for name in self.keys if name != swept[0])
-            return ColumnPanels(
-                self.columns, swept[0], [slip, sinkage, ("torque_mean_Nm",)], others
-            )
+            return ColumnPanels(self.columns, swept[0], [*shown, ("torque_mean_Nm",)], others)
         if len(self.columns["foot"]) > MOST_DRAWN:
             raise InputError(
                 f"{len(self.columns['foot'])} walks; a picture shows the turns of {MOST_DRAWN} or "
                 "fewer: ask for fewer, or for three or more values of legs, stiffness or slip"
             )
-        shown = [("slip",), ("sinkage_m",), ("torque_Nm",), ("hub_height_m",)]
-        return ColumnPanels(self.motion, "turned_rad", shown, self.keys)
+        panels = [("slip",), ("sinkage_m",), ("torque_Nm",), ("hub_height_m",)]
+        return ColumnPanels(self.motion, "turned_rad", panels, self.keys)
 
 
 def walk_tables(
@@ -77,7 +88,8 @@ def walk_tables(
     legs: Sequence[int],
     grounds: Mapping[str, LinearGround],
     slips: Sequence[float],
-    **changes: float,
+    turns: float = 2.0,
+    **changes: Any,
 ) -> WalkTables:
     """Walk with every combination of foot, legs, ground and commanded slip (NaN: free).
 
@@ -88,26 +100,26 @@ def walk_tables(
     cases = list(product(feet, legs, grounds, slips))
     if len(cases) > MOST:
         raise InputError(f"{len(cases)} walks; at most {MOST} are possible at once")
+    foot, count, under, slip = (np.asarray(part) for part in zip(*cases, strict=True))
     walked = walk(
         [wheel_leg(foot, legs=count, **changes) for foot, count, _, _ in cases],
-        [grounds[name] for _, _, name, _ in cases],
-        slip=np.asarray([slip for *_, slip in cases]),
+        [grounds[name] for name in under],
+        slip=slip.astype(float),
+        turns=turns,
     )
-    found = gait_metrics(walked)
+    metrics = gait_metrics(walked)
     numbers = {name for name, ground in grounds.items() if name == f"{ground.stiffness:g}"}
     asked: dict[str, Any] = {
-        "foot": np.asarray([foot for foot, *_ in cases]),
-        "legs": np.asarray([count for _, count, _, _ in cases]),
-        "ground": np.asarray(["" if name in numbers else name for _, _, name, _ in cases]),
-        "stiffness_N_m3": np.asarray([grounds[name].stiffness for _, _, name, _ in cases]),
-        "slip_commanded": np.asarray([slip for *_, slip in cases]),
+        "foot": foot,
+        "legs": count,
+        "ground": np.asarray(["" if name in numbers else name for name in under]),
+        "stiffness_N_m3": np.asarray([grounds[name].stiffness for name in under]),
+        "slip_commanded": slip.astype(float),
     }
-    metrics = {column: getattr(found, name) for name, column in METRICS.items()}
-    status = np.asarray([WalkStatus(int(code)).reason for code in found.status])
     last = walked.after(float(walked.angle[-1]) - TURN)
-    goes_on = np.flatnonzero(found.status == WalkStatus.OK)
-    count = last.angle.size
-    motion = {name: np.repeat(values[goes_on], count) for name, values in asked.items()}
+    goes_on = np.flatnonzero(walked.status == WalkStatus.OK)
+    instants = last.angle.size
+    motion = {name: np.repeat(values[goes_on], instants) for name, values in asked.items()}
     motion["turned_rad"] = np.tile(last.angle - last.angle[0], goes_on.size)
     over_time = {
         "time_s": last.time - last.time[:1],
@@ -122,4 +134,5 @@ def walk_tables(
     keys = tuple(
         name for name in ("foot", "legs", soil, "slip_commanded") if np.unique(asked[name]).size > 1
     )
+    status = np.asarray([WalkStatus(int(code)).reason for code in walked.status])
     return WalkTables({**asked, **metrics, "status": status}, motion, keys)
