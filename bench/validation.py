@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from runner import RESULTS
 
-from soilml.io.text_tables import format_table
+from soilml.report.aligned_text import format_table
 
 Line = dict[str, str]
 _NAMED, _FALSE = "right cause in the cause set, SNR >= 3, discrepancy", "falsely unique:"

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from soilml import Estimator, read_case, read_table, soil_map
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.text_tables import csv_text
+from soilml.report.aligned_text import format_table
 from soilml.soil_maps.presentation import map_text
 from soilml.soil_maps.workflow import parameter_moments
 

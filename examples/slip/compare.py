@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from soilml import read_case, read_table
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.text_tables import csv_text
+from soilml.report.aligned_text import format_table
 from soilml.slip_filter.drive import slip_of_drive
 
 HERE = Path(__file__).parent

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 from hidden_world import LaterSoils
+from soilml.gap.report.gap_figure import Bar, draw_bars
 
 from soilml import Estimator
-from soilml.gap.report.gap_figure import Bar, draw_bars
 from soilml.io.atomic_files import atomic_output
 from soilml.quantities import Z_90, column
 from soilml.report.figure_style import AFTER, BEFORE, report_style

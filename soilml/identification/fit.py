@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,18 +17,16 @@ from soilml.fitting.levels import is_one_load
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.identification.soil_explanation import SoilExplanation as SoilExplanation
-from soilml.numerics.prior import Prior
 from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
 from soilml.remarks import Remark
-from soilml.report.numbers import share_left
-from soilml.report.parameter_lines import parameter_lines
-from soilml.report.terminal import significant
+from soilml.report.numbers import share_left, significant
 from soilml.results import EstimatedValue, Interval, Result
 
 if TYPE_CHECKING:
-    from soilml.report.parameter_figure import ParameterIntervals
+    from soilml.fitting.fitted_readings import FittedReadings
+    from soilml.report.report import Report
 
 
 #: Size r of a correlation from which on two parameters are reported as a trade-off: one combination
@@ -81,6 +79,10 @@ class Fit(Result):
     samples
         Weighted samples of the posterior (`soilml.identification.posterior.PosteriorSamples`),
         where the method drew them.
+    draws
+        Equally likely values (n, p) of them, SI units.
+    curves
+        Gives the readings with the predictions at `values`, for pictures.
     explanations
         Of an averaged fit, the explanations of the rows, the likeliest first.
     """
@@ -98,6 +100,8 @@ class Fit(Result):
     low: Floats | None = None
     high: Floats | None = None
     samples: Any = field(default=None, repr=False, compare=False)
+    draws: Floats | None = field(default=None, repr=False, compare=False)
+    curves: Callable[[], FittedReadings] | None = field(default=None, repr=False, compare=False)
     explanations: tuple[SoilExplanation, ...] = ()
 
     @property
@@ -159,11 +163,11 @@ class Fit(Result):
         text += "the soil" if not open_ else f"the soil, but not {', '.join(open_)}"
         return f"{text[0].upper()}{text[1:]}."
 
-    def summary(self) -> str:
-        """The verdict, then each parameter with its 90 % interval."""
-        left = [self.remaining_fraction.get(name) for name in self.names]
-        lines = parameter_lines(self.names, self.units, self.values, self.std, *self.interval, left)
-        return "\n".join([self.verdict, *(line.sentence for line in lines)])
+    def report(self) -> Report:
+        """Verdict, soil, readings beside the model, and what limits the result."""
+        from soilml.identification.report import fit_report
+
+        return fit_report(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each parameter: mean, standard deviation, 90 % interval, unit."""
@@ -176,31 +180,6 @@ class Fit(Result):
             "high": high,
             "unit": list(self.units),
         }
-
-    def intervals(
-        self, prior: Mapping[str, Prior] | None = None, label: str = ""
-    ) -> ParameterIntervals:
-        """Values and 90 % intervals for a figure, with the ranges of their priors where given."""
-        from soilml.report.parameter_figure import ParameterIntervals
-
-        ends = [
-            (np.nan, np.nan) if prior is None or name not in prior else _ends(prior[name])
-            for name in self.names
-        ]
-        low, high = np.asarray(ends, dtype=np.float64).reshape(-1, 2).T
-        values, own = self.values[None], self.interval
-        return ParameterIntervals(
-            self.names, self.units, (label,), values, own[0][None], own[1][None], low, high
-        )
-
-    def plot(self, ax: Any = None, prior: Mapping[str, Prior] | None = None) -> NDArray[Any]:
-        """Draw each parameter with its 90 % interval, in usual units (kPa, degrees, mm).
-
-        `ax`: axes of matplotlib, one for each parameter; a new figure where None. `prior`: priors
-        by parameter, such as those of the case, whose ranges are shaded. Returns the axes, (p,).
-        Raises `InputError` for another number of axes.
-        """
-        return self.intervals(prior).plot(ax)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
@@ -232,14 +211,6 @@ class Fit(Result):
             | ({"remaining_fraction": remaining[name]} if name in remaining else {})
             for name, v, s, low, high, unit in rows
         }
-
-
-def _ends(prior: Prior) -> tuple[float, float]:
-    """Ends of the central 99 % of a normal prior; those of any other."""
-    if prior.normal_std is None:
-        return prior.lower, prior.upper
-    low, high = prior.at(np.asarray([0.005, 0.995]))
-    return float(low), float(high)
 
 
 #: Deviation from a test of the soil, in standard deviations of its scatter, that is remarked on.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -11,13 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.report.figure_style import take_axes
-from soilml.report.terminal import shown_column, significant
+from soilml.report.numbers import shown_column, significant
 
 #: Colours of lines, told apart by colour-blind readers (Okabe and Ito 2008).
 COLOURS = ("#005b96", "#cc7a00", "#009e73", "#b03a7c", "#56b4e9", "#4d4d4d", "#d55e00", "#8a7a00")
 _STYLES = ("-", "--", ":", "-.")
-_UNIT = re.compile(r"_(kPa|deg|mm|Pa|Nm|N_m3|N|m_s2|m_s|s)$")
-_SHOWN = {"Nm": "N m", "m_s": "m/s", "m_s2": "m/s²", "N_m3": "N/m³", "deg": "°"}
 _FEW = 15  # Rows of a line up to which each is marked
 _MOST_ACROSS = 3
 
@@ -60,11 +57,11 @@ class ColumnPanels:
         return axes
 
     def _draw(self, panel: Any, names: Sequence[str], with_legend: bool) -> None:
-        factor, label = column_label(self.x)
+        factor, label = shown_column(self.x)
         for i, (said, rows) in enumerate(self._groups()):
             order = rows[np.argsort(np.asarray(self.columns[self.x], float)[rows], kind="stable")]
             for k, name in enumerate(names):
-                own, words = column_label(name)
+                own, words = shown_column(name)
                 std = self.columns.get(f"{name}_std")
                 # colours tell lines apart, or the columns of the one line
                 panel.errorbar(
@@ -81,10 +78,10 @@ class ColumnPanels:
                 )
             if said and len(names) > 1 and i == 0:
                 for k, name in enumerate(names):
-                    words = column_label(name)[1].partition(",")[0]
+                    words = shown_column(name)[1].partition(",")[0]
                     panel.plot([], [], color="#777777", ls=_STYLES[k % len(_STYLES)], label=words)
         panel.set_xlabel(label)
-        panel.set_ylabel(_shared_label([column_label(name)[1] for name in names]))
+        panel.set_ylabel(_shared_label([shown_column(name)[1] for name in names]))
         panel.grid(color="#eeeeee", lw=0.7)
         panel.set_axisbelow(True)
         if len(names) > 1 or (with_legend and self.lines):
@@ -102,18 +99,6 @@ class ColumnPanels:
         for key in dict.fromkeys(keys):
             rows = np.asarray([i for i, own in enumerate(keys) if own == key], dtype=np.int64)
             yield ", ".join(part for part in key if part), rows
-
-
-def column_label(name: str) -> tuple[float, str]:
-    """Factor and words under which a column is plotted.
-
-    >>> column_label("sinkage_m"), column_label("slip")
-    ((1000.0, 'sinkage, mm'), (1.0, 'slip'))
-    """
-    factor, shown = shown_column(name)
-    unit = _UNIT.search(shown)
-    words = (shown if unit is None else shown[: unit.start()]).replace("_", " ")
-    return factor, words if unit is None else f"{words}, {_SHOWN.get(unit[1], unit[1])}"
 
 
 def _shared_label(labels: Sequence[str]) -> str:
@@ -134,7 +119,7 @@ def _cell(name: str, value: Any) -> str:
         return value
     if np.isnan(value):
         return ""
-    factor, label = column_label(name)
+    factor, label = shown_column(name)
     words, comma, unit = label.partition(", ")
     number = significant(factor * float(value), 3)
     return f"{number} {unit}" if comma else f"{words} {number}"

@@ -88,7 +88,8 @@ def _pull(request: Mapping[str, Any]) -> list[str]:
 def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
     from soilml.config.case import read_case
 
-    read_case(_text_file(MODEL_FILE, request.get("model")), with_bias=True, files=NO_FILES)
+    file = _text_file(MODEL_FILE, request.get("model"))
+    read_case(file, with_bias=True, files=NO_FILES, with_explanations=True)
     run = request.get("run")
     return [MODEL_FILE, request["names"][0], *([f"--where=run={run}"] if run else [])]
 
@@ -105,11 +106,14 @@ def _import(request: Mapping[str, Any]) -> list[str]:
 
 
 def _wheels(request: Mapping[str, Any]) -> list[str]:
+    from soilml.config.case import read_case
     from soilml.rover_design.study import read_study
 
     names = request["names"]
     if request.get("model"):
-        names = [*names, _text_file(MODEL_FILE, request["model"]).name]
+        model = _text_file(MODEL_FILE, request["model"])
+        read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
+        names = [*names, model.name]
     files = NamedFiles(names=names, hint="drop the table of runs first")
     read_study(_text_file(STUDY_FILE, request.get("question")), files)
     effort = request.get("effort", "normal")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES
-from soilml.report.figure_style import AFTER, BEFORE, take_axes
+from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
+from soilml.report.numbers import format_band
+from soilml.report.report import Column, Picture, Report, Table
 from soilml.slip_filter.drive import DriveSlip
 
 SIZE = (9.0, 7.5)  # Width and height of the figure, inches
@@ -35,24 +38,40 @@ def _band(name: str, values: Floats) -> dict[str, Floats]:
     return {f"{name}{ENDS[j]}": values[:, j] for j in (1, 0, 2)}
 
 
-def drive_text(found: DriveSlip) -> str:
-    """The verdict in few lines, and the remarks."""
+def report_of_drive(found: DriveSlip, title: str = "Slip of a drive") -> Report:
+    """The report of a drive: slips at its end, how well they are known, flags."""
     answered = found.answered
-    count, lines = len(answered), []
-    lines.append(
-        f"{count} rows of {len(found.rows.wheels)} wheels: {int(answered.sum())} have a slip, "
-        f"{count - int(answered.sum())} are refused or passed over"
-    )
-    if answered.any():
+    count, known = len(answered), int(answered.sum())
+    verdict = f"None of {count} rows has a slip: see the flags."
+    lines = [f"{known} of {count} rows have a slip; {count - known} are refused or passed over."]
+    if known:
         slip = found.slip[answered].max(axis=2)
-        last = np.flatnonzero(answered)[-1]
-        low, middle, high = found.slip[last].max(axis=1)
-        lines.append(
-            f"largest slip of a wheel: {slip[:, 1].max():.2f}; median width of its 90 % interval: "
-            f"{np.median(slip[:, 2] - slip[:, 0]):.2f}"
-        )
-        lines.append(f"at the last row: slip {middle:.2f} ({low:.2f} to {high:.2f})")
-    return "\n".join([*lines, *(f"! {remark}" for remark in found.remarks())])
+        low, middle, high = found.slip[np.flatnonzero(answered)[-1]].max(axis=1)
+        verdict = f"The largest slip of a wheel is {slip[:, 1].max():.2f}; at the last row it is "
+        verdict += f"{format_band(low, middle, high, digits=2)}."
+        width = np.median(slip[:, 2] - slip[:, 0])
+        lines.append(f"Half of the 90 % intervals are at most {width:.2f} wide.")
+    flags = [name for own in found.flags for name in own]
+    names = sorted(set(flags), key=flags.count, reverse=True)
+    columns = [Column("flag", names), Column("rows", [flags.count(name) for name in names])]
+    return Report(
+        kind="slip",
+        verdict=verdict,
+        lines=lines,
+        tables=[Table("Flags", columns)] if names else [],
+        pictures=[
+            Picture(
+                "The drive", partial(plot_drive, found), 3, 1, SIZE,
+                "largest slip, speed and pitch against time",
+                "Bands: 90 %. Orange: speed of the rims, and times of a hard floor.",
+            )
+        ],
+        remarks=list(found.remarks()),
+        status=f"{known} of {count} rows",
+        tone="good" if known == count else "warn" if known else "bad",
+        title=title,
+        basis=f"{count} rows of {len(found.rows.wheels)} wheels",
+    )  # fmt: skip
 
 
 def drive_json(found: DriveSlip) -> dict[str, Any]:
@@ -73,7 +92,7 @@ def plot_drive(found: DriveSlip, ax: Any = None) -> NDArray[Any]:
         panel.set_ylabel(label)
     middle.plot(time, found.rows.rim_speed.mean(axis=1), color=BEFORE, lw=1.0, label="rims")
     middle.legend(frameon=False)
-    last.plot(time, np.rad2deg(found.rows.slope), color="#4d4d4d", lw=1.0)
+    last.plot(time, np.rad2deg(found.rows.slope), color=UNCHANGED, lw=1.0)
     last.set_ylabel("pitch, degrees")
     last.set_xlabel("time, s")
     hard = found.no_soil > 0.5

@@ -68,11 +68,11 @@ def test_the_interval_contains_the_steepest_slope(folder, true, capsys):
 def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
     assert main([*COMMAND, "--out", "found"]) == 0
     message = capsys.readouterr().out
-    assert "6 climbs on 3 slopes" in message and "steepest slope" in message
+    assert message.startswith("The rover climbs ") and "Stress on slopes" in message
     content = json.loads((folder / "found" / "climb.json").read_text())
     page = (folder / "found" / "report.html").read_text()
     best = np.rad2deg(content["steepest_slope_rad"]["median"])
-    assert f"The steepest slope is {best:.1f}°" in page and "<img" in page
+    assert f"{best:.2f}" in page and "6 climbs on 3 slopes" in page and "<svg" in page
     assert content["report"]["kind"] == "climb" and len(content["report"]["files"]) == 3
     assert sorted(f.name for f in (folder / "found").iterdir()) == [
         "climb.json", "climbs.csv", "curve.csv", "report.html",

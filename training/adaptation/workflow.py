@@ -16,7 +16,7 @@ from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import gap
 from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
-from soilml.gap.presentation import gap_files
+from soilml.gap.report.report import gap_files
 from soilml.gap.verdict.decision import OUTSIDE_PRIORS
 from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
@@ -27,7 +27,7 @@ from soilml.io.text_tables import csv_text
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.table_estimates import sensor_errors_shown
 from soilml.remarks import Remark
-from soilml.report.page import Provenance, json_text, page
+from soilml.report.page import Provenance, json_text, page, report_entry
 from training.adaptation.board_file import FileNames, make_file
 from training.adaptation.campaign import (
     DrivenRange,
@@ -41,7 +41,6 @@ from training.adaptation.campaign import (
     within_carried_loads,
 )
 from training.adaptation.judgement import BoardCandidate, Judgement, check_lengths, judge
-from training.adaptation.page import adapt_page
 from training.adaptation.result import AdaptReport
 from training.adaptation.steps import ResumableSteps
 from training.adaptation.supported_errors import SupportedErrors, supported_errors
@@ -356,8 +355,8 @@ def _finish(
     report = replace(report, files=(*made, *parts, *GAP_FILES[:4]))
     if origin is None:
         origin = Provenance.of(["adapt"], [])
-    shown = adapt_page(report)
-    content = report.as_json() | {"report": shown.as_json(origin)}
+    shown = report.report()
+    content = report.as_json() | {"report": report_entry(shown, origin)}
     stale = [n for n in (*adapted, *before, *SPLIT_FILES) if n not in (*made, *parts)]
     write_files(
         {

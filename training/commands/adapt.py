@@ -92,13 +92,12 @@ def run(args: argparse.Namespace) -> int:
 
     for library in ("jinja2", "matplotlib", "training.adaptation"):
         need(library, "adapt")
-    from soilml.cli.output import origin_of, show, tell
+    from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import stage_progress
     from soilml.cli.tables import print_table_hints, read_long_table
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from training.adaptation import adapt
-    from training.adaptation.page import adapt_text
 
     case = read_case(args.model, with_bias=True)
     truth = None if args.truth is None else _known_soil(args.truth)
@@ -119,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
             model_name=str(args.model),
             origin=origin_of(args),
         )
-    show(adapt_text(report))
+    show_result(report.report(), report.as_json())
     folder = Path(args.out)
     tell(f"\n{', '.join(str(folder / name) for name in ('report.html', *report.files))}")
     return 0

@@ -117,8 +117,8 @@ def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
     from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
-    from soilml.io.text_tables import format_table
     from soilml.quantities import QUANTITIES
+    from soilml.report.aligned_text import format_table
     from training.dataset import read_dataset
     from training.export.learning_curves import plot_learning_curves
     from training.export.model_card import model_card

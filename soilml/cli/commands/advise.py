@@ -116,17 +116,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
+    from functools import partial
+
     import numpy as np
 
     from soilml.cli.options import available_effects, parse_names, parse_numbers
-    from soilml.cli.output import show_verdict, tell, write_columns
+    from soilml.cli.output import save_columns, show_rows, tell, write_columns, write_set
     from soilml.cli.progress import working
-    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
     from soilml.experiment_design.advice_after_results import mean_covariates
     from soilml.experiment_design.next_rows import COUNT, known_soil
-    from soilml.experiment_design.presentation import advice_columns, best_rows, next_row_remarks
+    from soilml.experiment_design.presentation import (
+        advice_columns,
+        best_rows,
+        next_row_remarks,
+        report_of_advice,
+    )
     from soilml.io.read_table import RUNS
     from soilml.remarks import Remark, texts
 
@@ -171,19 +177,6 @@ def run(args: argparse.Namespace) -> int:
         advice = advise(
             case, samples, ranges, measured=at, count=args.count or COUNT, covariates=covariates
         )
-    if args.picture is not None:
-        from soilml.experiment_design.presentation import save_maps
-
-        save_maps(args.picture, advice, at)
-    show_verdict(advice.summary(), args.out)
-    rows = best_rows(advice)
-    if args.all:
-        ranked = sorted(advice.choices, key=lambda c: c.overall)
-        rows = [("candidate", c) for c in ranked]
-    columns = advice_columns(advice, rows)
-    if args.out is None and SCREEN.form_of_rows() == "table" and not args.verbose:
-        columns = _short(columns)
-    write_columns(columns, args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *notes]
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
@@ -195,18 +188,15 @@ def run(args: argparse.Namespace) -> int:
             "are excluded: a twentieth or more of the posterior samples does not carry the wheel"
         )
         remarks.append(Remark("not-carried", text))
-    tell("\n".join(texts(remarks)))
+    report = report_of_advice(advice, at, remarks)
+    rows = best_rows(advice)
+    if args.all:
+        rows = [("candidate", c) for c in sorted(advice.choices, key=lambda c: c.overall)]
+    columns = advice_columns(advice, rows)
+    write_set({args.out: partial(save_columns, columns), args.picture: report.pictures[0].save})
+    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    show_rows(report, columns, content, args.out is not None)
     return 0
-
-
-def _short(columns: dict[str, Any]) -> dict[str, Any]:
-    """The columns that fit 80 characters: channels are in the names of rows, `all` is left out."""
-    kept = {k: v for k, v in columns.items() if k not in ("channels", "all_left")}
-    kept["row"] = [
-        name.replace("best in ", "").replace("best for ", "").replace("all with", "all, with")
-        for name in columns["row"]
-    ]
-    return {k.removesuffix("_left"): v for k, v in kept.items()}
 
 
 def _tests_elsewhere(

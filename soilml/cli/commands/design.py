@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from soilml.cli.options import (
@@ -16,6 +16,7 @@ from soilml.cli.options import (
 )
 
 if TYPE_CHECKING:
+    from soilml.report.page import Content
     from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
@@ -107,10 +108,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.optional_imports import need
 
     need("scipy", "plan wheels")
-    from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
-    from soilml.rover_design.figures import SIZE
-    from soilml.rover_design.presentation import design_page, design_text
+    from soilml.rover_design.presentation import report_of_design
     from soilml.rover_design.report import design_report
 
     study = _study(args)
@@ -123,15 +122,13 @@ def run(args: argparse.Namespace) -> int:
             progress=progress,
         )
     content = found.as_json()
-
-    text, draw = json_text(content), partial(save_png, found.plot, 2, 2, SIZE)
-    write_with_report(
-        args,
-        {args.out: text, args.picture: draw},
-        lambda: (design_page(found, args.study), content),
-        study.soil.files,
-    )
-    show_result(design_text(found), content)
+    report = report_of_design(found, f"Wheels for {Path(args.study).name}")
+    files: dict[str | None, Content] = {
+        args.out: json_text(content),
+        args.picture: report.pictures[0].save,
+    }
+    write_with_report(args, files, lambda: (report, content), study.soil.files)
+    show_result(report, content)
     return 0
 
 

@@ -56,8 +56,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design import simulator_runs as runs
     from soilml.io.atomic_files import save_text
     from soilml.io.cell_text import one_line
-    from soilml.io.text_tables import csv_text, format_table
+    from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
+    from soilml.report.aligned_text import format_table
 
     need("scipy", "plan runs")
     case = read_case(args.model, with_bias=True, with_simulator=False)

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     import platform
 
     from soilml import __version__
-    from soilml.io.text_tables import format_table
+    from soilml.report.aligned_text import format_table
 
     print(f"soilml {__version__}, Python {platform.python_version()}, {platform.platform()}")
     print(f"{_cores()} usable cores; {sys.executable}\n")

@@ -25,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
     from soilml.cli.options import available_effects
-    from soilml.io.text_tables import format_table
     from soilml.parameters import declared
     from soilml.physics.effects.base import STAGES
     from soilml.physics.operating_point import COVARIATES
-    from soilml.report.terminal import shown_unit, significant
+    from soilml.report.aligned_text import format_table
+    from soilml.report.numbers import shown_unit, significant
 
     effects = available_effects(args)
     if args.name is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from soilml.onboard.estimate import Estimate
     from soilml.onboard.estimator import Estimator
     from soilml.remarks import Remark
-    from soilml.report.page import Report
 
 #: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
 FUSION_RULES = (
@@ -130,9 +130,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import (
         save_columns,
         show,
-        show_verdict,
-        tell,
-        tell_columns,
+        show_rows,
         write_with_report,
     )
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
@@ -199,18 +197,17 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         presentation.check_size(len(columns["in_range"]))
 
-    def build() -> tuple[Report, dict[str, Any]]:
-        content = {"columns": {k: np.asarray(v).tolist() for k, v in columns.items()}}
-        files = args.trained, args.runs
-        page = presentation.estimate_report(columns, remarks, estimators[0], args.by, files)
-        return page, {**content, "notes": [remark.as_json() for remark in remarks]}
-
+    title = f"Estimates of {Path(args.runs).name} by {Path(args.trained).name}"
+    report = presentation.estimate_report(columns, remarks, estimators[0], args.by, title)
+    content = {k: np.asarray(v).tolist() for k, v in columns.items()}
+    notes = [remark.as_json() for remark in remarks]
     write_with_report(
-        args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
+        args,
+        {args.out: partial(save_columns, columns)},
+        lambda: (report, {"columns": content, "notes": notes}),
+        [str(e.path) for e in estimators],
     )
-    show_verdict(presentation.verdict(columns, args.by, remarks), args.out)
-    tell_columns(columns, args.out)
-    tell("\n".join(texts(remarks)))
+    show_rows(report, columns, content, args.out is not None)
     return 0
 
 

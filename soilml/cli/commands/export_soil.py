@@ -78,8 +78,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Write the folder and say what is in it."""
     from soilml.cli.output import show
-    from soilml.io.text_tables import format_table
-    from soilml.report.terminal import significant
+    from soilml.report.aligned_text import format_table
+    from soilml.report.numbers import significant
     from soilml.soil_export import export_soil
 
     given = named_numbers(args.given, "--set", "NAME=NUMBER, such as elastic_K=1e8")

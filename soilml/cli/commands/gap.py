@@ -104,14 +104,14 @@ def run(args: argparse.Namespace) -> int:
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
     from soilml.gap import gap
-    from soilml.gap.presentation import gap_files, gap_text
+    from soilml.gap.report.report import gap_files
 
     table, costs = read_rows(args, RUNS), parse_costs(args)
     effects = available_effects(args)
     if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects)
+        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
     else:
-        case = read_case(args.model, effects, with_bias=True)
+        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(
@@ -129,7 +129,7 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.out)
     files = {folder / name: text for name, text in texts.items()}
     write_files(files, folders=[folder])
-    show_result(gap_text(report), report.as_json())
+    show_result(report.report(), report.as_json())
     tell(f"\n{', '.join(str(name) for name in files)}")
     return BAD_DATA if report.status == "bad-data" else 0
 

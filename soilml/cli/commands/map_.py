@@ -79,15 +79,14 @@ def run(args: argparse.Namespace) -> int:
     import numpy as np
 
     from soilml.cli.options import available_effects, parse_numbers
-    from soilml.cli.output import show
+    from soilml.cli.output import show_result
     from soilml.cli.progress import stage_progress
     from soilml.cli.tables import read_case_of_rows, read_rows
     from soilml.io.atomic_files import write_files
     from soilml.onboard.estimator import Estimator
     from soilml.optional_imports import need
-    from soilml.report.figure_style import save_png
     from soilml.soil_maps.drive import NEEDED
-    from soilml.soil_maps.presentation import FILES, map_files, map_panels, map_text, plot_map
+    from soilml.soil_maps.presentation import FILES, map_files, map_json
     from soilml.soil_maps.raster import read_elevation
     from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
 
@@ -108,14 +107,11 @@ def run(args: argparse.Namespace) -> int:
             elevation=None if args.elevation is None else read_elevation(args.elevation),
             progress=progress,
         )  # fmt: skip
+    report = found.report()
     if args.out is not None:
-
-        def draw(path: Path) -> None:
-            save_png(lambda ax: plot_map(found, ax), *map_panels(found), path)
-
         folder = Path(args.out)
-        files = map_files(found, folder, args.epsg, draw)
+        files = map_files(found, folder, args.epsg, report.pictures[0].save)
         earlier = [folder / name for name in FILES if folder / name not in files]
         write_files(files, folders=[folder], remove=[p for p in earlier if p.exists()])
-    show(map_text(found))
+    show_result(report, map_json(found))
     return 0

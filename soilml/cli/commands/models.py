@@ -23,11 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the list."""
-    from soilml.io.text_tables import format_table
     from soilml.onboard.estimator import Estimator
     from soilml.onboard.model_file import released_models
     from soilml.optional_imports import need
     from soilml.quantities import QUANTITIES, SHEAR
+    from soilml.report.aligned_text import format_table
 
     need("onnxruntime", "show models")
     files = released_models()

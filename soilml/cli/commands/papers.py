@@ -106,8 +106,8 @@ def _said(counts: dict[str, dict[str, int]]) -> str:
 
 def _summary(found: list[Comparison], counts: dict[str, dict[str, int]]) -> str:
     """Counts by status and paper, and how many of those reproduced are orders or counts."""
-    from soilml.io.text_tables import format_table
     from soilml.papers.published import ORDINAL, STATUSES
+    from soilml.report.aligned_text import format_table
 
     papers = list(counts) if len(counts) == 1 else [*counts, "all"]
     columns = [Counter(numbers) for numbers in counts.values()]
@@ -130,7 +130,7 @@ def _summary(found: list[Comparison], counts: dict[str, dict[str, int]]) -> str:
 
 def _page(paper: str, found: list[Comparison], every: bool) -> str:
     """One paper as an aligned table with the reasons under it, then what the table omits."""
-    from soilml.io.text_tables import format_table
+    from soilml.report.aligned_text import format_table
 
     rows = [c for c in found if every or c.status not in OMITTED]
     notes = list(dict.fromkeys(c.row.reason for c in rows if c.row.reason))

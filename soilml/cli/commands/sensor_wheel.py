@@ -69,11 +69,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Solve the balances and write the table."""
-    from soilml.cli.output import tell, write_columns
+    from soilml.cli.output import write_rows
     from soilml.config.case import read_case_of_one_gear
     from soilml.physics.effects import EFFECTS
     from soilml.physics.gears import Wheel
-    from soilml.report.column_panels import ColumnPanels
     from soilml.systems.rim_stress import MohrCoulomb, SensingWheel, solve_runs
     from soilml.systems.rim_stress.tables import (
         read_readings,
@@ -102,14 +101,6 @@ def run(args: argparse.Namespace) -> int:
     found = solve_runs(
         runs, stresses, wheel, strength, args.reference, discs=discs, model=(case.model, soil)
     )
-    columns = found.columns
-    panels = [
-        ("shear_modulus_m",),
-        ("drawbar_pull_N", "pull_on_slope_N", "pull_by_bekker_N"),
-        ("slope_climbed_rad", "slope_rad", "slope_by_bekker_rad"),
-    ]
-    write_columns(columns, args.out, args.picture, ColumnPanels(columns, "slip", panels))
-    for remark in found.warnings:
-        tell(f"! {remark}" if remark.severity == "warning" else str(remark))
-    tell(f"drawbar_pull_N and slope_climbed_rad are predicted by k_x of run {found.reference}")
+    report = found.report(f"Pull of {args.model} from the stress on its rim")
+    write_rows(report, found.columns, args.out, args.picture)
     return 0

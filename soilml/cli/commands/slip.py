@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import Any
 
 from soilml.cli.options import (
     InputFile,
@@ -51,41 +49,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
     from soilml.cli.options import available_effects, is_json
-    from soilml.cli.output import show, tell, tell_columns
+    from soilml.cli.output import show_rows, write_set
     from soilml.cli.progress import working
-    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.io.atomic_files import write_files
     from soilml.io.text_tables import csv_text
-    from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
     from soilml.slip_filter.drive import read_drive, slip_of_drive
     from soilml.slip_filter.presentation import (
-        SIZE,
         drive_columns,
         drive_json,
-        drive_text,
-        plot_drive,
+        report_of_drive,
     )
 
     driven = read_long_table(args.drive, ignore_extra=args.ignore_extra)
-    case = read_case(args.rover, available_effects(args))
+    case = read_case(args.rover, available_effects(args), with_explanations=True)
     rows = read_drive(driven, case)
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)
 
-    def draw(path: Path) -> None:
-        save_png(lambda ax: plot_drive(found, ax), 3, 1, SIZE, path)
-
+    report, columns, content = report_of_drive(found), drive_columns(found), drive_json(found)
     whole = args.out is not None and is_json(args)
-    table = json_text(drive_json(found)) if whole else csv_text(drive_columns(found))
-    contents: dict[str | None, Any] = {args.out: table, args.picture: draw}
-    write_files({Path(path): content for path, content in contents.items() if path is not None})
-    if args.out is None and SCREEN.form_of_rows() != "table":
-        tell_columns(drive_columns(found), None)
-        for remark in found.remarks():
-            tell(f"! {remark}")
-    else:
-        show(drive_text(found))
+    table = json_text(content) if whole else csv_text(columns)
+    write_set({args.out: table, args.picture: report.pictures[0].save})
+    show_rows(report, columns, content, args.out is not None)
     return 0

@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(entries: list[SoilEntry]) -> str:
-    from soilml.io.text_tables import format_table
+    from soilml.report.aligned_text import format_table
 
     header = ("soil", "c kPa ", "phi deg ", "K mm ", "n ", "what")
     rows = []
@@ -69,17 +69,17 @@ def _text(entry: SoilEntry, field: str) -> str:
     """The value of a parameter in the unit of a terminal."""
     from soilml.parameters import declared
     from soilml.physics.soils import Soil
-    from soilml.report.terminal import shown_unit, significant
+    from soilml.report.numbers import shown_unit, significant
 
     value = float(getattr(entry.soil, field))
     return significant(shown_unit(declared(Soil)[field].unit, value)[0] * value)
 
 
 def _one(entry: SoilEntry) -> str:
-    from soilml.io.text_tables import format_table
     from soilml.parameters import declared
     from soilml.physics.soils import Soil
-    from soilml.report.terminal import shown_unit, significant
+    from soilml.report.aligned_text import format_table
+    from soilml.report.numbers import shown_unit, significant
 
     rows = []
     for name, parameter in declared(Soil).items():

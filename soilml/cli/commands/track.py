@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from soilml.cli.options import InputFile, NumberFrom, add_gear_option, add_output
 from soilml.errors import InputError
@@ -53,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Evaluate the log and write the table."""
     from soilml.cli.options import parse_numbers
-    from soilml.cli.output import tell, write_columns
+    from soilml.cli.output import write_rows
     from soilml.config.case import read_case_of_one_gear
     from soilml.io.read_table import read_table
     from soilml.physics.effects import EFFECTS
@@ -69,8 +68,6 @@ def run(args: argparse.Namespace) -> int:
             raise InputError(f"--grousers is {args.grousers!r}; needed are pitch, tip, f_g and j_k")
         pitch, tip, friction, yielding = sizes
         grousers = Grousers(pitch=pitch, tip=tip, friction=friction, yielding=yielding)
-    found: Any = evaluate_log(case, log, 0.5 * args.mass * 9.81, args.spacing, grousers)
-    write_columns(found.columns, args.out, args.picture, found)
-    if found.fit is not None:
-        tell(found.fit.summary())
+    found = evaluate_log(case, log, 0.5 * args.mass * 9.81, args.spacing, grousers)
+    write_rows(found.report(), found.columns, args.out, args.picture)
     return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
@@ -17,7 +16,6 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
-    from soilml.report.parameter_figure import ParameterIntervals
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -53,7 +51,6 @@ STRIDES.csv is then passed on as slip_measured.
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque.
 """
-QUANTITIES = ("friction_angle_rad", "normal_stiffness_Pa")
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
 
 
@@ -171,40 +168,21 @@ def _known_soil(text: str) -> tuple[float, float]:
 
 def _soil(args: argparse.Namespace, table: Table) -> int:
     """The soil by each sensor and fused, and what it means for a heavy rover."""
-    from soilml.cli.output import tell, write_columns
-    from soilml.cli.tables import result_by_group, tell_failures
-    from soilml.systems.wheel_legs import StrideSoil, mobility, soil_of_strides
+    from soilml.cli.output import write_rows
+    from soilml.cli.tables import result_by_group
+    from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
+    from soilml.systems.wheel_legs.strides import stride_report
 
     heavy = _heavy(args)
 
-    def estimate(rows: Table) -> StrideSoil:
+    def estimate(rows: Table) -> tuple[StrideSoil, Mobility]:
         readings = {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows}
-        return soil_of_strides(rows["slip"], readings, **_options(args))
+        soil = soil_of_strides(rows["slip"], readings, **_options(args))
+        return soil, mobility(soil, **heavy)
 
     found, failed = result_by_group(args, table, "estimating", estimate)
-    columns: dict[str, list[Any]] = {}
-    for name, one in found.items():
-        head, blank = f"{args.by} {name}: " if args.by else "", [""] * (len(one.sensors) - 1)
-        unread = [float("nan")] * len(blank)
-        means = mobility(one, **heavy)
-        own = {args.by: [name] * len(one.sensors)} if args.by else {}
-        own |= one.columns | {
-            "kphi_SI": [*unread, means.kphi],
-            "pull_efficiency": [*unread, means.efficiency],
-            "pull_efficiency_p05": [*unread, means.ends[0]],
-            "pull_efficiency_p95": [*unread, means.ends[1]],
-            "traffic_class": [*blank, means.traffic_class],
-            "class_probability": [*unread, means.probability[means.traffic_class]],
-        }
-        own["strides"] = own.pop("strides")  # the last
-        for key, values in own.items():
-            columns.setdefault(key, []).extend(values)
-        for sensor, why in one.unused.items():
-            tell(f"{head}no estimate from {sensor}: {why}")
-        if not one.in_range:
-            tell(f"{head}the mean sinkage is outside of the 2 to 36 mm of its relation")
-    write_columns(columns, args.out, args.picture, _intervals(args.by, columns))
-    tell_failures(args.by, failed)
+    report, rows = stride_report(found, failed, args.by)
+    write_rows(report, rows, args.out, args.picture)
     return 0
 
 
@@ -234,25 +212,3 @@ def _heavy(args: argparse.Namespace) -> dict[str, Any]:
         found["wheel"] = Wheel(radius=sizes[0], width=sizes[1])
         found["at"] = Operating(slip=0.2, load=sizes[2])
     return found
-
-
-def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> ParameterIntervals:
-    """Angle and stiffness by sensor, with their 90 % intervals."""
-    import numpy as np
-
-    from soilml.quantities import Z_90
-    from soilml.report.parameter_figure import ParameterIntervals
-
-    groups = [f"{name}: " for name in columns[by]] if by else [""] * len(columns["sensor"])
-    value, std = (np.stack([columns[f"{n}{end}"] for n in QUANTITIES], -1) for end in ("", "_std"))
-    unknown = np.full(2, np.nan)
-    return ParameterIntervals(
-        names=("friction_angle", "normal_stiffness"),
-        units=("rad", "Pa"),
-        labels=[head + sensor for head, sensor in zip(groups, columns["sensor"], strict=True)],
-        values=value,
-        low=value - Z_90 * std,
-        high=value + Z_90 * std,
-        prior_low=unknown,
-        prior_high=unknown,
-    )

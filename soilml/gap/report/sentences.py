@@ -29,8 +29,8 @@ from soilml.report.numbers import (
     decimal,
     format_probability,
     format_residual,
+    shown_unit,
 )
-from soilml.report.terminal import shown_unit
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")

@@ -16,6 +16,9 @@ from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.physics.soils import Soil
 from soilml.quantities import Z_90
 from soilml.remarks import Remark
+from soilml.report.column_panels import ColumnPanels
+from soilml.report.numbers import format_quantity
+from soilml.report.report import Picture, Report, Table
 from soilml.systems.rim_stress.deconvolution import deconvolve, fit_stress_arc
 from soilml.systems.rim_stress.force_balance import (
     MohrCoulomb,
@@ -36,6 +39,14 @@ DRAWS = 64  # Draws of the errors of each run, from which standard deviations fo
 SHAPE_STD = 0.015
 #: Slip up to which a k_x of small slip holds (Table I); saturated share of samples that is told.
 MAX_VALID_SLIP, MAX_SATURATED = 0.5, 0.01
+
+
+#: Columns of each panel of the picture; the last is fig. 7 of the source.
+PANELS = (
+    ("shear_modulus_m",),
+    ("drawbar_pull_N", "pull_on_slope_N", "pull_by_bekker_N"),
+    ("slope_climbed_rad", "slope_rad", "slope_by_bekker_rad"),
+)
 
 
 @dataclass(frozen=True)
@@ -76,20 +87,58 @@ class RunsOnSlopes:
             "slip": slip,
             "shear_modulus_m": self.shear_modulus,
             "shear_modulus_m_std": self.shear_modulus_std,
-            "magnification": self.magnification,
             "drawbar_pull_N": pull,
             "drawbar_pull_N_std": std,
-            "drawbar_pull_N_p05": pull - Z_90 * std,
-            "drawbar_pull_N_p95": pull + Z_90 * std,
             "pull_on_slope_N": weight * np.sin(slope),
-            "slope_rad": slope,
             "slope_climbed_rad": self.climbed,
             "slope_climbed_rad_std": self.climbed_std,
+            "slope_rad": slope,
         }
         if self.conventional is not None:
             angle = np.arctan2(self.conventional, weight * np.cos(slope))
             found |= {"pull_by_bekker_N": self.conventional, "slope_by_bekker_rad": angle}
+        found["magnification"] = self.magnification
+        found["drawbar_pull_N_p05"] = pull - Z_90 * std
+        found["drawbar_pull_N_p95"] = pull + Z_90 * std
         return found
+
+    def report(self, title: str = "Pull of a wheel from the stress on its rim") -> Report:
+        """How well one k_x predicts the pulls that the slopes require, then a row for each run."""
+        columns = self.columns
+        needed, pull = columns["pull_on_slope_N"], self.drawbar_pull
+        others = np.asarray([name != self.reference for name in self.at])
+        within = np.abs(pull - needed) < Z_90 * self.drawbar_pull_std
+        verdict = f"The k_x of run {self.reference} is {self._modulus}"
+        if others.any():
+            verdict += (
+                f"; the pull that the slope requires is in the 90 % interval of "
+                f"{int((within & others).sum())} of {int(others.sum())} other runs"
+            )
+        lines = []
+        if self.conventional is not None and others.any():
+            off, own = (
+                format_quantity(float(np.sqrt(np.nanmean((v - needed)[others] ** 2))), "N")
+                for v in (pull, self.conventional)
+            )
+            lines = [f"The pull of the others is off by {off}, that of Bekker's stress by {own}."]
+        panels = ColumnPanels(columns, "slip", PANELS)
+        return Report(
+            kind="sensor-wheel",
+            verdict=f"{verdict}.",
+            lines=lines,
+            tables=[Table.of("Runs", columns)],
+            pictures=[
+                Picture("k_x, pull, slope", panels.plot, *panels.shape, panels.size, verdict)
+            ],
+            remarks=self.warnings,
+            title=title,
+        )
+
+    @property
+    def _modulus(self) -> str:
+        k = list(self.at).index(self.reference)
+        value, std = float(self.shear_modulus[k]), float(self.shear_modulus_std[k])
+        return format_quantity(value, "m", std)
 
 
 def solve_runs(

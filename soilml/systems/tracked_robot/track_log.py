@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -16,7 +15,10 @@ from soilml.identification import Fit, identify
 from soilml.io.table import Table
 from soilml.physics.gears.track_belt import Belt
 from soilml.physics.operating_point import Operating
-from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
+from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
+from soilml.report.numbers import format_quantity
+from soilml.report.report import Picture, Report
+from soilml.report.report import Table as ReportTable
 from soilml.systems.tracked_robot.robot import (
     Grousers,
     TrackedRobot,
@@ -53,8 +55,6 @@ class TrackLog:
     fit: Fit | None
     case: Case
     grousers: Grousers | None
-
-    shape, size = (2, 2), (9.0, 6.8)
 
     @property
     def at(self) -> Operating:
@@ -96,9 +96,28 @@ class TrackLog:
             0.0, np.cumsum(np.sin(middle) * step)
         )
 
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Pull and sinkage against slip, the belt in the soil and its angles; axes (2, 2)."""
-        axes = take_axes(ax, *self.shape, self.size)
+    def report(self, title: str = "Soil from the pulls of a tracked robot") -> Report:
+        """The soil by the pulls, how far the model is off, and a row for each pull."""
+        found = self.columns
+        off = format_quantity(
+            float(np.sqrt(np.mean((found["pull_predicted_N"] - found["drawbar_pull_N"]) ** 2))), "N"
+        )
+        said = f"The pull of a track is off by {off} in {len(self.rows)} pulls"
+        fit = self.fit
+        return Report(
+            kind="track",
+            verdict=f"{said}." if fit is None else fit.verdict,
+            lines=[] if fit is None else [f"{said}."],
+            figures=None if fit is None else ReportTable.of_parameters("Soil", fit.frame_columns()),
+            tables=[ReportTable.of("Pulls", found)],
+            pictures=[
+                Picture("Pull, sinkage, belt and angles", self._draw, 2, 2, (9.0, 6.8), f"{said}.")
+            ],
+            remarks=() if fit is None else fit.warnings,
+            title=title,
+        )
+
+    def _draw(self, axes: Any) -> None:
         found, slip = self.columns, self.rows["slip"]
         curve = Operating(slip=np.linspace(0.01, 0.95, 60), load=self.rows["load_N"][0])
         pull, sunk, line, angles = axes.flat
@@ -109,7 +128,7 @@ class TrackLog:
         if self.grousers is not None:
             pull.plot(slip, found["pull_with_grousers_N"], "s", color=UNCHANGED, label="grousers")
         pull.set(xlabel="slip", ylabel="drawbar pull of a track, N")
-        pull.legend(frameon=False)
+        pull.legend()
         if "rear_sinkage_m" in found:
             sunk.plot(found["drawbar_pull_N"], 1e3 * found["rear_sinkage_m"], "o", color=BEFORE)
         order = np.argsort(found["pull_predicted_N"])
@@ -127,8 +146,7 @@ class TrackLog:
             words = name.replace("_", " ")
             angles.plot(slip, np.rad2deg(found[f"{name}_rad"]), "o-", ms=3, label=words)
         angles.set(xlabel="slip", ylabel="angle, degrees")
-        angles.legend(frameon=False, fontsize=8)
-        return axes
+        angles.legend(fontsize=8)
 
 
 def steady_pulls(log: Table, load: float, spacing: float | None = None) -> Table:
@@ -185,6 +203,7 @@ def evaluate_log(
     if case.prior:
         kept = ("run", "slip", "load_N", "drawbar_pull_N", "drawbar_pull_N_std")
         measured = Table({name: rows[name] for name in kept}, rows.source)
+        measured.columns["run"] = np.full(len(rows), "log")  # one soil
         fit = identify(case, measured, method="nonlinear")
         case = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
     return TrackLog(rows, fit, case, grousers)

@@ -17,6 +17,11 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import CLASSES, pull_efficiency, traffic_class
 from soilml.physics.soils import Soil
+from soilml.quantities import Z_90
+from soilml.remarks import Remark
+from soilml.report.numbers import format_quantity
+from soilml.report.parameter_figure import ParameterIntervals
+from soilml.report.report import Report, Table
 from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     SINKAGE_RANGE,
@@ -58,16 +63,17 @@ class StrideSoil:
     in_range: bool
 
     @property
-    def columns(self) -> dict[str, Any]:
-        """A row for each sensor, by names of columns."""
-        return {
-            "sensor": list(self.sensors),
-            "friction_angle_rad": self.mean[:, 0],
-            "friction_angle_rad_std": self.std[:, 0],
-            "normal_stiffness_Pa": self.mean[:, 1],
-            "normal_stiffness_Pa_std": self.std[:, 1],
-            "strides": list(self.strides),
-        }
+    def remarks(self) -> list[Remark]:
+        """Sensors without an estimate, and a sinkage outside of the range of its relation."""
+        found = [
+            Remark("unused", f"no estimate from {sensor}: {why}", (sensor,))
+            for sensor, why in self.unused.items()
+        ]
+        if not self.in_range:
+            low, high = (1e3 * end for end in SINKAGE_RANGE)
+            text = f"the mean sinkage is outside of the {low:.0f} to {high:.0f} mm of its relation"
+            found.append(Remark("outside-range", text, ("sinkage",)))
+        return found
 
 
 def soil_of_strides(
@@ -224,6 +230,66 @@ def mobility(
         ends=(float(np.quantile(carried, 0.05)), float(np.quantile(carried, 0.95))),
         probability={name: float(np.mean(classes == name)) for name in CLASSES},
     )
+
+
+def stride_report(
+    found: Mapping[str, tuple[StrideSoil, Mobility]], failed: Mapping[str, str], by: str | None
+) -> tuple[Report, dict[str, Any]]:
+    """What strides say of soils by name, and a row for each sensor by names of columns.
+
+    failed: Why other groups have no soil. by: What tells the groups apart.
+    """
+    rows: dict[str, list[Any]] = {}
+    lines, remarks = [], []
+    for name, (soil, means) in found.items():
+        head, last = f"{by} {name}: " if by else "", len(soil.sensors) - 1
+        for k, sensor in enumerate(soil.sensors):
+            own = means if k == last else None
+            row: dict[str, Any] = {by: name} if by else {}
+            row |= {"sensor": sensor}
+            for i, column in enumerate(("friction_angle_rad", "normal_stiffness_Pa")):
+                row |= {column: soil.mean[k, i], f"{column}_std": soil.std[k, i]}
+            row |= {
+                "kphi_SI": own.kphi if own else np.nan,
+                "pull_efficiency": own.efficiency if own else np.nan,
+                "pull_efficiency_p05": own.ends[0] if own else np.nan,
+                "pull_efficiency_p95": own.ends[1] if own else np.nan,
+                "traffic_class": own.traffic_class if own else "",
+                "class_probability": own.probability[own.traffic_class] if own else np.nan,
+                "strides": soil.strides[k],
+            }
+            for key, value in row.items():
+                rows.setdefault(key, []).append(value)
+        angle, efficiency = (
+            format_quantity(float(soil.mean[-1, 0]), "rad", float(soil.std[-1, 0])),
+            format_quantity(means.efficiency, "share", 0.0, means.ends),
+        )
+        lines.append(
+            f"{head}friction angle {angle}; a heavy rover has a pull efficiency of {efficiency}: "
+            f"{means.traffic_class} ({means.probability[means.traffic_class]:.0%})"
+        )
+        remarks += [remark.under(head) for remark in soil.remarks]
+    remarks += [Remark("no-result", f"{by} {n} has no result: {why}") for n, why in failed.items()]
+    labels = [f"{n}: {s}" if by else s for n, (soil, _) in found.items() for s in soil.sensors]
+    value = np.concatenate([soil.mean for soil, _ in found.values()])
+    std = np.concatenate([soil.std for soil, _ in found.values()])
+    blank = np.full(2, np.nan)
+    figure = ParameterIntervals(
+        ("friction_angle", "normal_stiffness"), ("rad", "Pa"), labels,
+        value, value - Z_90 * std, value + Z_90 * std, blank, blank,
+    )  # fmt: skip
+    worst = min((means.efficiency, name) for name, (_, means) in found.items())
+    verdict = lines[0] if len(found) == 1 else f"The worst of {len(found)} soils is {worst[1]}"
+    report = Report(
+        kind="wheel-leg",
+        verdict=f"{verdict[0].upper()}{verdict[1:]}.",
+        lines=[f"{line}." for line in lines] if len(found) > 1 else [],
+        tables=[Table.of("Soil by sensor", rows)],
+        pictures=[figure.picture()],
+        remarks=remarks,
+        title="Soil from strides",
+    )
+    return report, rows
 
 
 @dataclass(frozen=True)

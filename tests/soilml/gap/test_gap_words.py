@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import pytest
 from gap_sets import analysed, case_of, driven, hidden
+from soilml.gap.presentation import gap_files, gap_text
+from soilml.gap.report.page import summary, suspect_table
+from soilml.serve.answers.gap import verdict
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
 from soilml.gap import gap
-from soilml.gap.presentation import gap_files, gap_text
 from soilml.gap.report.listed_explanations import next_run_in_words
-from soilml.gap.report.page import summary, suspect_table
 from soilml.gap.report.reasons_in_short import SENTENCE_WORDS
 from soilml.gap.report.results import (
     STATUSES,
@@ -25,7 +26,6 @@ from soilml.gap.report.results import (
 from soilml.gap.report.sentences import HEADLINE_WORDS, MOST_LINES, headline, report_lines
 from soilml.io.table import Table
 from soilml.remarks import Remark, texts
-from soilml.serve.answers.gap import verdict
 
 STORIES = {
     "torque-sensor": Plan("S", "torque-gain", 1.0, 0.01, 8, "dry-sand", 3, seed=3),

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from soilml import EFFECTS, Model, Operating, Wheel, read_case, soil
+from soilml import EFFECTS, Model, Operating, Wheel, soil
 from soilml.errors import InputError
-from soilml.serve.answers.chosen_case import WHEELS, model_text
-from soilml.serve.answers.forward import controls, forward
+from soilml.serve.chosen_case import WHEELS
+from soilml.serve.forward_curves import controls, forward
 
 MODEL = """\
 [gear]
@@ -56,16 +56,6 @@ def test_every_wheel_stands_on_every_soil_that_carries_it(wheel):
     found = forward({"wheel": wheel, "values": values})
     assert found["reason"] == "" and np.isfinite(found["torque"]).all()
     assert len(found["profile"]["angle"]) == 97
-
-
-def test_the_text_of_the_sliders_is_a_model_file(tmp_path):
-    values = {"cohesion": 500.0, "gear.radius": 0.2, "bulldozing.share": 0.3, "slip": 0.2}
-    (tmp_path / "model.toml").write_text(model_text({"values": values})["text"])
-    case = read_case(tmp_path / "model.toml")
-    assert case.soil.cohesion == 500.0 and case.model.gear.radius == 0.2
-    assert [effect.name for effect in case.model.effects] == ["bulldozing"]
-    assert set(case.prior) == {"cohesion", "friction_angle", "shear_modulus"}
-    assert set(case.noise) == {"torque_Nm", "drawbar_pull_N", "sinkage_m"}
 
 
 @pytest.mark.parametrize(
