@@ -17,8 +17,8 @@ from soilml.systems.tracked_robot import (
     BEYOND_PEAK,
     GROUSERS,
     WANG2018,
+    DiscreteGrousers,
     GroupFits,
-    Grousers,
     grouser_pull,
     identify_groups,
     linear_regression,
@@ -88,7 +88,7 @@ def grouser_gains() -> None:
         tangent = float(np.tan(known.friction_angle))
 
         def gain(friction: float, known=known, ground=ground, bare=bare) -> float:
-            lugs = Grousers(
+            lugs = DiscreteGrousers(
                 pitch=0.05, tip=0.01, friction=friction, yielding=3.0 * float(known.shear_modulus)
             )
             pulls = [

@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.config.case import read_case_of_one_gear
     from soilml.io.read_table import read_table
     from soilml.physics.effects import EFFECTS
-    from soilml.systems.tracked_robot import Grousers
+    from soilml.systems.tracked_robot import DiscreteGrousers
     from soilml.systems.tracked_robot.track_log import LOG, evaluate_log
 
     case = read_case_of_one_gear(args.model, EFFECTS, args.gear)
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
         if len(sizes) != 4:
             raise InputError(f"--grousers is {args.grousers!r}; needed are pitch, tip, f_g and j_k")
         pitch, tip, friction, yielding = sizes
-        grousers = Grousers(pitch=pitch, tip=tip, friction=friction, yielding=yielding)
+        grousers = DiscreteGrousers(pitch=pitch, tip=tip, friction=friction, yielding=yielding)
     found = evaluate_log(case, log, 0.5 * args.mass * 9.81, args.spacing, grousers)
     write_rows(found.report(), found.columns, args.out, args.picture)
     return 0

@@ -60,8 +60,8 @@ BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Grousers:
-    """Grousers of a track one by one, as eqs. 10 to 14 of Wang et al. 2018 have them.
+class DiscreteGrousers:
+    """DiscreteGrousers of a track one by one, as eqs. 10 to 14 of Wang et al. 2018 have them.
 
     pitch, tip: Distance from one to the next, l_l, and length of its top, l_w, m.
     friction: f_g, coefficient of friction of soil that has yielded.
@@ -87,7 +87,7 @@ def grouser_pull(
     robot: TrackedRobot,
     soil: Soil,
     slip: float,
-    grousers: Grousers,
+    grousers: DiscreteGrousers,
     effects: tuple[Effect, ...] = (),
     points: int = 801,
 ) -> Floats:
@@ -106,7 +106,7 @@ def grouser_pull(
     Examples
     --------
     >>> from soilml import soil
-    >>> twelve = Grousers(pitch=0.05, tip=0.01, friction=0.6, yielding=0.1)
+    >>> twelve = DiscreteGrousers(pitch=0.05, tip=0.01, friction=0.6, yielding=0.1)
     >>> round(float(grouser_pull(WANG2018, soil("wang2018/clay"), 0.7, twelve).mean()), -1)
     520.0
     """

@@ -20,7 +20,7 @@ from soilml.report.numbers import format_quantity
 from soilml.report.report import Picture, Report
 from soilml.report.report import Table as ReportTable
 from soilml.systems.tracked_robot.robot import (
-    Grousers,
+    DiscreteGrousers,
     TrackedRobot,
     grouser_pull,
     track_of,
@@ -54,7 +54,7 @@ class TrackLog:
     rows: Table
     fit: Fit | None
     case: Case
-    grousers: Grousers | None
+    grousers: DiscreteGrousers | None
 
     @property
     def at(self) -> Operating:
@@ -191,7 +191,7 @@ def evaluate_log(
     log: Table,
     load: float,
     spacing: float | None = None,
-    grousers: Grousers | None = None,
+    grousers: DiscreteGrousers | None = None,
 ) -> TrackLog:
     """From a log to the soil: steady pulls, and the fit of the case's free parameters to them.
 
