@@ -84,6 +84,15 @@ def test_a_folder_receives_report_curve_and_climbs(folder, capsys):
         assert low <= middle <= high
 
 
+@pytest.mark.slow
+def test_stress_in_kpa_is_told(folder, tables, capsys):
+    """The force balance is the same: only M, the true over the measured stress, shows it."""
+    stress = {**tables[1], "normal_Pa": [v / 1000.0 for v in tables[1]["normal_Pa"]]}
+    (folder / "stress.csv").write_text(csv_text(stress))
+    assert main(COMMAND) == 0
+    assert "probably normal_Pa is in kPa" in " ".join(capsys.readouterr().out.split())
+
+
 def changed(table, name, change):
     return {**table, name: [change(v) for v in table[name]]}
 
