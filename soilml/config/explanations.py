@@ -160,3 +160,11 @@ def one_of(case: Case, what: str) -> Case:
             "command needs one model: keep one [[explanation]]"
         )
     return case.of_explanation(case.explanations[0])
+
+
+def likeliest_with_effects(case: Case) -> Case:
+    """The likeliest explanation that adds an effect; the case as it is where none does."""
+    adding = [one for one in case.explanations if added_effects(case, one)]
+    if not adding:
+        return replace(case, explanations=())
+    return case.of_explanation(max(adding, key=lambda one: one.weight))
