@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from soilml.config.model_settings import Effects, take_effects, take_prior, take_quantity
+from soilml.config.model_settings import Effects, take_effects, take_prior
 from soilml.errors import InputError
+from soilml.io.declared_settings import take_quantity
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import check, declared, with_values

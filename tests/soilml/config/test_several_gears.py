@@ -76,7 +76,7 @@ name = "bulldozing"
 """
     path = tmp_path / "mixed.toml"
     path.write_text(GEARS + REST + several)
-    with pytest.raises(InputError, match="has 2 explanations .* keep one"):
+    with pytest.raises(InputError, match=r"has 2 explanations .* keep one"):
         read_case(path)
     case = read_case(path, with_explanations=True)
     first, second = (case.of_explanation(one) for one in case.explanations)
