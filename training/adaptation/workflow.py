@@ -328,7 +328,7 @@ def _errors_remark(errors: SupportedErrors) -> Remark:
 def _exact_remark() -> Remark:
     """A note on the answer by which the old file is judged."""
     text = (
-        "the old file is judged with its model taken as right (model_error 0), as which it "
+        "the old file is judged assuming a perfect model (model_error 0), with which it "
         "predicts the runs kept back better than with its own errors of the model"
     )
     return Remark("old-model-right", text, severity="note")

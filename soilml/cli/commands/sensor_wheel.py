@@ -129,7 +129,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if discs is None:
         tell(
-            "the stress is taken as given: where round sensors averaged it over their disc, k_x is "
+            "the stress is used as given: where round sensors averaged it over their disc, k_x is "
             "too large (by 14 % on the wheel of the source); --diameter removes that"
         )
     tell(f"drawbar_pull_N is predicted by k_x of run {found.reference}")
