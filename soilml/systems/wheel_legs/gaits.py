@@ -60,7 +60,7 @@ class WalkTables:
     keys: tuple[str, ...]
 
     @property
-    def panels(self) -> Picture:
+    def picture(self) -> Picture:
         """Metrics against the first quantity of three values or more; else the turns themselves.
 
         Raises `InputError` for more turns than a picture shows.
