@@ -50,6 +50,21 @@ def write_columns(
     tell_columns(columns, out)
 
 
+def write_rows(
+    report: Report,
+    columns: Mapping[str, Any],
+    out: str | None,
+    picture: str | None,
+) -> None:
+    """Write the columns to the CSV file `out` and the report's picture to a PNG file; say the rest.
+
+    None as a path is an option that was not given; without `out`, the columns go into a pipe.
+    """
+    write_set({out: partial(save_columns, columns), picture: report.pictures[0].save})
+    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    show_rows(report, columns, content, written=out is not None)
+
+
 def write_set(contents: Mapping[str | None, Content]) -> None:
     """Write files as one set; None as a path is an option that was not given."""
     write_files({Path(path): content for path, content in contents.items() if path is not None})

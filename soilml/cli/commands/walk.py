@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
-    from soilml.systems.wheel_legs.walk_tables import walk_tables
+    from soilml.systems.wheel_legs.gaits import walk_tables
 
     feet = parse_names(args.foot) or []
     counts = parse_numbers("--legs", args.legs)

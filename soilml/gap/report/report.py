@@ -306,9 +306,8 @@ def gap_files(
     report = gap_report(found, f"Gap report: {model_name} against {runs_name}")
     comments = [found.sentence]
     if count := len(found.model.explanations):
-        comments += [
-            f"{count} explanations with their weights follow; every prediction mixes them."
-        ]
+        which = "One explanation follows" if count == 1 else f"{count} explanations follow"
+        comments += [f"{which}, with weights; every prediction mixes them."]
     return {
         "report.html": page(report, origin),
         "gap.json": json_text(found.as_json() | {"report": report_entry(report, origin)}),

@@ -16,9 +16,7 @@ def vesc_tool(rng, folder):
     """Motor controller VESC, log of VESC Tool: electrical rpm, current, one speed of its own."""
     d = steps(rng)
     n, poles, gear = d.t.size, 7, 20
-    names = ("ms_today;input_voltage;temp_mos_max;temp_motor;current_motor;current_in;d_axis_current;"
-             "q_axis_current;erpm;duty_cycle;amp_hours_used;tachometer;fault_code;vesc_id;"
-             "speed_meters_per_sec;num_vescs;roll;pitch;yaw;accX;accY;accZ").split(";")  # fmt: skip
+    names = ["ms_today", "input_voltage", "temp_mos_max", "temp_motor", "current_motor", "current_in", "d_axis_current", "q_axis_current", "erpm", "duty_cycle", "amp_hours_used", "tachometer", "fault_code", "vesc_id", "speed_meters_per_sec", "num_vescs", "roll", "pitch", "yaw", "accX", "accY", "accZ"]  # fmt: skip
     known = {
         "ms_today": 1000 * d.t + 4e7, "input_voltage": noisy(rng, 36 + 0 * d.t, 0.1),
         "current_motor": d.torque / 3, "current_in": d.torque / 9, "q_axis_current": d.torque / 3,
@@ -40,7 +38,23 @@ def tyre_test_consortium(rng, folder):
         "FX": d.pull, "FY": noisy(rng, 0 * d.t, 2), "FZ": -d.load, "MX": noisy(rng, 0 * d.t, 0.3),
         "MZ": noisy(rng, 0 * d.t, 0.2), "SR": slip, "TSTC": noisy(rng, 40 + 0 * d.t, 0.5),
     }  # fmt: skip
-    units = "sec kph rpm deg deg cm cm kPa N N N Nm Nm none degC".split()
+    units = [
+        "sec",
+        "kph",
+        "rpm",
+        "deg",
+        "deg",
+        "cm",
+        "cm",
+        "kPa",
+        "N",
+        "N",
+        "N",
+        "Nm",
+        "Nm",
+        "none",
+        "degC",
+    ]
     log = write(folder / "B1654run21.dat", columns, separator="\t", units=units)
     return [log], Truth(d, "rotation travel load pull")
 
