@@ -27,6 +27,7 @@ MODULES = (
     "wheel_leg_slip",
     "adapt",
     "gap_bench",
+    "gap_pull",
     "gap_speed",
     "challenge",
 )

@@ -21,7 +21,7 @@ from soilml.physics.soils import Soil, soil
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength, SoilTest
 
 UNNAMED_GEAR = "gear"  # Name of the gear in [gear], beside those in [gears.NAME]
-SUSPECTED = "suspected"  # Key of an effect that predicts, and that nothing names
+SUSPECTED = "suspected"  # Key by which earlier versions marked what predicts and is not named
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 #: Kinds of tests; the key of the measured quantity identifies the kind.

@@ -33,7 +33,6 @@ from soilml.remarks import Remark
 NOISE_ROUNDS = 3
 #: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
 INITIAL_NOISE = 0.05
-FEW = 16  # Readings of each channel of the few rows that tell good starts from bad ones
 
 
 @dataclass(frozen=True)
@@ -77,11 +76,6 @@ class WeightedRows:
         whiten = Whitening.of(self.readings.std, self.columns)
         return LeastSquaresProblem(self.case, self.free, self.readings, whiten)
 
-    def of_few_rows(self) -> WeightedRows:
-        """A few of the rows, from the lightest to the heaviest of each channel."""
-        selected, few = self.readings.of_rows(_few_rows(self.readings))
-        return replace(self, readings=few, shared=self.shared[selected])
-
     def with_noise_at(self, optimum: Solution) -> WeightedRows:
         """The same with noise and shared errors at an optimum, or noise from its residuals."""
         prediction, readings = optimum.prediction, self.declared
@@ -102,18 +96,6 @@ def _shared(case: Case, readings: Readings) -> Floats:
     if not readings.shared_errors:
         return np.zeros((len(readings), 0))
     return stacked(error_columns(case, readings, readings.shared_errors), len(readings))
-
-
-def _few_rows(readings: Readings) -> NDArray[np.int64]:
-    """Rows that stand for all: from the lightest to the heaviest with a reading of each channel."""
-    rows = []
-    for i in range(len(readings.channels)):
-        measured = readings.row[readings.channel == i]
-        slip, load = readings.row_slip[measured], readings.row_load[measured]
-        in_order = measured[np.lexsort((slip, load))]
-        few = np.linspace(0, len(in_order) - 1, min(FEW, len(in_order)))
-        rows.append(in_order[few.round().astype(int)])
-    return np.unique(np.concatenate(rows))
 
 
 def _initial_noise(readings: Readings) -> Floats:
@@ -208,7 +190,7 @@ def fit_under_declared_noise(
     """
     weighted = WeightedRows.of(case, readings, free)
     if start is None:
-        optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
+        optimum = global_optimum(weighted.problem)
     else:
         optimum = levenberg_marquardt(weighted.problem, start)
     for _ in range(NOISE_ROUNDS if readings.undeclared or readings.shared_errors else 1):

@@ -21,6 +21,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.joined_cases import CaseSets, join_keys, joined_load_case
+from soilml.fitting.mixtures import mixed_forces
 from soilml.fitting.operating_points import rows_by_gear
 from soilml.fitting.readings import Readings
 from soilml.physics.contact import Force
@@ -186,6 +187,8 @@ def forces(case: Case, at: Operating) -> Force:
     """Forces (n,) of a case, with its remainder, at points (n,) that several gears may drive."""
     if not case.gears:
         return forces_of_one_gear(case, at)
+    if case.explanations:
+        return mixed_forces(case, lambda one: forces(one, at))
     count = np.broadcast(at.slip, at.load).size
     joined: dict[str, Any] = {
         f.name: np.zeros(count, np.int64 if f.name == "status" else np.float64)
@@ -199,7 +202,12 @@ def forces(case: Case, at: Operating) -> Force:
 
 
 def forces_of_one_gear(case: Case, at: Operating) -> Force:
-    """Forces of a case of one gear, with the mean of its remainder."""
+    """Forces of a case of one gear, with the mean of its remainder.
+
+    Of several explanations, their mean by weight, without faults of sensors and rig.
+    """
+    if case.explanations:
+        return mixed_forces(case, lambda one: forces_of_one_gear(one, at))
     force = case.model(case.soil, at)
     return force if case.remainder is None else case.remainder.added_to(force, at.slip, at.load)
 

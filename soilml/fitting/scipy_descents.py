@@ -25,15 +25,12 @@ SAME_OPTIMUM = 1e-4
 EQUAL_COST = 0.02
 
 
-def global_optimum(problem: LeastSquaresProblem, few: LeastSquaresProblem) -> Solution:
+def global_optimum(problem: LeastSquaresProblem) -> Solution:
     """The lowest optimum; among equally low ones the nearest to the middle of the prior.
-
-    `few` is the problem of a few rows, which
-    tell good starts from bad ones.
 
     Raises `FitError` where no parameters in the prior carry the measured loads.
     """
-    starts, order = _ranked_starts(few)
+    starts, order = _ranked_starts(problem)
     found: list[Solution] = []
     for i in dict.fromkeys([*order[:STARTS], 0]):  # the nominal point too
         optimum = descend(problem, starts[i], tolerance=START_TOLERANCE)

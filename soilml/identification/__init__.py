@@ -108,7 +108,7 @@ def identify(
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
     0.494 +- 0.040 rad
     """
-    case, table = as_case(case), as_table(table)
+    case, table = as_case(case).without_explanations(), as_table(table)
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     if method in CLOSED_FORM and case.gears:

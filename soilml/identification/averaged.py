@@ -10,7 +10,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.config.measurement_noise import checked_sensors
-from soilml.errors import FitError, InputError
+from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
@@ -21,14 +21,18 @@ from soilml.identification.posterior import (
     PosteriorSamples,
     check_declared,
     fit_of_samples,
+    posterior,
     posterior_samples,
 )
+from soilml.inference import constants
 from soilml.inference.draws import Draws
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
+from soilml.inference.shared_columns import shared_columns
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
+from soilml.remarks import Remark
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,9 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
         p(\theta | y) = \sum_h p(h | y) \int p(\theta | y, h, \eta)\, p(\eta | y, h)\, d\eta
 
     over the hypotheses h on what the model lacks and the hyperparameters of its Gaussian terms; see
-    `soilml.inference`. Soils outside of the priors of the case have no weight.
+    `soilml.inference`. Soils outside of the priors of the case have no weight. A case that states
+    the error of its model in [discrepancy] or [remainder] has one explanation, itself: the result
+    is that of the exact posterior.
 
     Parameters
     ----------
@@ -66,9 +72,14 @@ def averaged(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit:
     FitError
         Where no parameters in the prior carry the measured loads.
     """
+    if case.states_model_error:
+        return posterior(case, readings, free)
     found = averaged_samples(case, readings, free)
     fit, mean_u = fit_of_samples("averaged", found, readings, free)
     fit = replace(fit, explanations=found.explanations)
+    if sum(one.probability for one in found.explanations if one.exact) < constants.UNLIKELY_MODEL:
+        text = "other explanations are a hundred times as likely as the model as in its file"
+        fit = replace(fit, warnings=(*fit.warnings, Remark("unlikely", text)))
     return with_warnings(
         fit,
         case,
@@ -109,10 +120,12 @@ def averaged_samples(
     )
     try:
         found = infer(problem)
-    except InputError as error:
-        raise FitError(str(error)) from error
+    except InputError:
+        raise_uncarried(case, readings.at)
     if found.refused is not None:
         raise_uncarried(case, readings.at)
+    fixed, inner = shared_columns(found.soil.fit.fitted(), found.terms.readings, free)
+    found = found.beside(fixed, inner)
     parts = [_fractions(own, free) for own in found.draws(0)]
     sample = ImportanceSample(
         np.concatenate([u for u, _ in parts]), _normalised([w for _, w in parts]), 0.0
@@ -125,11 +138,14 @@ def soil_samples(
 ) -> PosteriorSamples:
     """Samples of the soil over all explanations of the rows, as `averaged` takes them.
 
-    With `exact_model`, those of the exact posterior. Raises `FitError` as `averaged`, and where
+    With `exact_model`, and where the case states the error of its model, those of the exact
+    posterior. Raises `FitError` as `averaged`, and where
     noise is not declared.
     """
     check_declared(readings)
-    return (posterior_samples if exact_model else averaged_samples)(case, readings, free)
+    if exact_model or case.states_model_error:
+        return posterior_samples(case, readings, free)
+    return averaged_samples(case, readings, free)
 
 
 def _fractions(own: Draws, free: Sequence[Coordinate]) -> tuple[Floats, Floats]:

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: Distance from the ends of an opened prior at which a fit starts: one at a bound would stay there.
 OFF_BOUNDS = 0.02
-#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
-LARGE_DISCREPANCY = 3.0
 
 
 def additions(
@@ -131,7 +129,7 @@ def _opened(
         for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)
         if not c.of_candidate
     ]
-    large = search.terms.amplitude(node.at).max(initial=0.0) > LARGE_DISCREPANCY
+    large = search.terms.amplitude(node.at).max(initial=0.0) > constants.LARGE_DISCREPANCY
     if min(ends, default=1.0) >= constants.PRESSED and not large:
         return {}
     values = node.fit.values()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,8 +27,6 @@ Names = tuple[str, ...]
 
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
-#: Probability of a component below which it is not drawn from.
-LEAST_DRAWN = 0.003
 #: Largest change of other channels, in sigma and relative to that of one, that counts as none.
 UNCHANGED = 0.01
 
@@ -254,7 +252,7 @@ class Posterior:
         """The likeliest fitted hypothesis of exactly these effects."""
         return next((n for n in self.nodes if n.hypothesis.effects == effects), None)
 
-    def components(self, least: float = LEAST_DRAWN) -> list[Component]:
+    def components(self, least: float = constants.LEAST_DRAWN) -> list[Component]:
         """Hypotheses, each with and without a discrepancy, and their probabilities; sum one."""
         found = []
         for node, weight in zip(self.nodes, self._weights[1], strict=False):
@@ -292,6 +290,11 @@ class Posterior:
         ]
         predicted = predict_many(requests)
         return [weighted(o, self.terms, y) for o, y in zip(proposed, predicted, strict=True)]
+
+    def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
+        """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
+        prior = constants.SOIL_DISCREPANCY_PRIOR
+        return Posterior(self.search.beside(fixed, inner, prior, constants.LEAST_DRAWN))
 
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
         """Marginals of the soil parameters that are free within the case's priors, by path.

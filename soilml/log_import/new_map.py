@@ -11,10 +11,10 @@ from soilml.log_import.guesses.map_guess import MapGuess
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import map_from
 from soilml.log_import.mapping.written_map import WrittenMap
-from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
-from soilml.log_import.workflow import import_recordings
+from soilml.log_import.wheel_rows import Progress
+from soilml.log_import.workflow import import_recordings, read_logs, silent
 from soilml.quantities import COLUMNS
 
 #: Remarks on rows that say that a column, a unit or a sign of the map is wrong.
@@ -46,9 +46,11 @@ def init_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) ->
     return draft_map(logs).text
 
 
-def draft_map(logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> DraftedMap:
+def draft_map(
+    logs: str | os.PathLike[str] | Sequence[str | os.PathLike[str]], progress: Progress = silent
+) -> DraftedMap:
     """What `init_map` gives, with the number of lines that are marked."""
-    recordings = [read_log(file) for file in log_files(logs)]
+    recordings = read_logs(log_files(logs), progress)
     guess = MapGuess(recordings)
     found = guess.map()
     if doubts := _doubts(recordings, found):

@@ -14,6 +14,7 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.shared_errors import SharedError, shared_errors
 from soilml.log_import.channels.wheel_quantities import Conversion
 from soilml.log_import.checks.column_units import differing_units, unit_hints
+from soilml.log_import.checks.independence import with_shared_errors
 from soilml.log_import.checks.row_hints import RowsToCheck
 from soilml.log_import.checks.sensors import (
     dead_sensors,
@@ -51,6 +52,7 @@ class WheelRows:
     def __init__(
         self, log_map: LogMap, wheel: WheelMap, runs: Sequence[Run], progress: Progress
     ) -> None:
+        wheel, self.computed = with_shared_errors(wheel, runs)
         self.log_map, self.wheel, self.runs = log_map, wheel, runs
         self.conversion = Conversion(wheel, log_map.vehicle)
         self.inputs: list[Inputs] = []
@@ -120,13 +122,13 @@ class WheelRows:
     def remarks(self) -> list[Remark]:
         """Dead and untared sensors; rows of a table that are left out."""
         if self.log_map.runs.each_row:
-            return [
+            return self.computed + [
                 replace(s.why, text=f"row {s.start + 1:.0f} of {run.recordings[0].file.name} is "
                         f"left out: {s.why}")
                 for run, own in zip(self.runs, self.stretches, strict=True) for s in own if s.why
             ]  # fmt: skip
         of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
-        found = []
+        found = list(self.computed)
         for run, dead, inputs in zip(self.runs, self.dead, self.inputs, strict=True):
             if len(dead) > 2 and len(dead) >= len(inputs.values) - 1:
                 text = f"run {run.name}: no sensor{of} says anything: an empty log?"

@@ -72,21 +72,32 @@ def import_log(
     MissingLibraryError
         Where a reader's library is not installed.
     """
-    said = progress or _silent
+    said = progress or silent
     files = log_files(logs)
     if isinstance(log_map, LogMap):
         found = log_map
     else:
         found = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
-    recordings = []
+    return import_recordings(read_logs(files, said), found, accept, said)
+
+
+def read_logs(files: Sequence[Path], progress: Progress) -> list[list[Recording]]:
+    """The recordings of each log; the progress counts bytes."""
+    sizes = [file.stat().st_size if file.is_file() else 0 for file in files]
+    total, recordings = sum(sizes), []
     for i, file in enumerate(files):
-        said("reading logs", i, len(files))
-        recordings.append(read_log(Path(file)))
-    said("reading logs", len(files), len(files))
-    return import_recordings(recordings, found, accept, said)
+        before = sum(sizes[:i])
+        progress("reading logs", before, total)
+
+        def told(done: int, before: int = before) -> None:
+            progress("reading logs", before + done, total)
+
+        recordings.append(read_log(file, told))
+    progress("reading logs", total, total)
+    return recordings
 
 
-def _silent(stage: str, done: int, total: int) -> None:
+def silent(stage: str, done: int, total: int) -> None:
     """Progress that is not shown."""
 
 
@@ -94,7 +105,7 @@ def import_recordings(
     recordings: Sequence[Sequence[Recording]],
     found: LogMap,
     accept: bool = False,
-    progress: Progress = _silent,
+    progress: Progress = silent,
 ) -> ImportedLog:
     """What `import_log` gives, of logs that are read already; raises as it does."""
     steady = found.runs.each_row

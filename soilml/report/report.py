@@ -30,6 +30,7 @@ from soilml.report.numbers import (
 MOST_LINES = 5  # Lines below a verdict, at most
 MOST_PICTURES = 6  # Pictures of groups on a page
 MOST_WARNINGS = 5  # Warnings that a terminal shows without details
+TERMINAL_ROWS = 40  # Rows of a table on a terminal without details
 MOST_ROWS = 200  # Rows of a table on a page; the JSON file has all
 _MOST_TEXT = 36  # Characters of a cell of text on a terminal
 _LEAST_LAST = 24  # Characters of a last column of words, at least
@@ -224,13 +225,14 @@ class Table:
                 words.append(column.is_text or heading == "unit")
         return heads, [list(row) for row in zip(*columns, strict=True)], words
 
-    def text(self, width: int = WIDTH) -> str:
+    def text(self, width: int = WIDTH, most: int | None = None) -> str:
         """The table for a terminal; columns that do not fit are left out, and a line names them.
 
         Those are first the intervals of numbers whose standard deviation is shown, then the last
         ones. A last column of words is broken into lines.
         """
         heads, rows, words = self.cells()
+        count, rows = len(rows), rows[:most]
         cut = [[_cut(cell) for cell in row[:-1]] + row[-1:] for row in rows]
         widths = [max(map(len, column)) + 2 for column in zip(heads, *cut, strict=True)]
         widths[-1] = min(widths[-1], _LEAST_LAST) if words[-1] else widths[-1]
@@ -249,7 +251,9 @@ class Table:
         text_columns = next((n for n, k in enumerate(kept) if not words[k]), len(kept))
         shown = [[row[k] for k in kept] for row in cut]
         table = format_table([heads[k] for k in kept], shown, text_columns, words[kept[-1]], width)
-        return f"{table}\n{textwrap.fill(f'not shown here: {left}', width)}" if left else table
+        more = f"\nand {count - len(rows)} more rows" if count > len(rows) else ""
+        named = f"\n{textwrap.fill(f'not shown here: {left}', width)}" if left else ""
+        return f"{table}{more}{named}"
 
     def sentences(self) -> list[str]:
         """A line for each row: its first cell, and the numbers of the second column."""
@@ -344,7 +348,7 @@ class Report:
         tables = [*([self.figures] if self.figures is not None else []), *self.tables]
         for i, table in enumerate(tables if details else tables[:1]):
             head = f"{capitalised(table.title)}\n" if details or i else ""
-            parts.append(head + table.text())
+            parts.append(head + table.text(most=None if details else TERMINAL_ROWS))
         if details:
             parts += [
                 f"{head}\n" + "\n".join(f"- {t}" for t in texts) for head, texts in self.details

@@ -212,7 +212,7 @@ def soil_of_rows(question: SoilQuestion) -> RowsSoil | None:
     if question.rows is None:
         return None
     model, runs = question.rows
-    case = read_case(model, with_bias=True, files=question.named)
+    case = read_case(model, with_bias=True, files=question.named, with_explanations=True)
     if case.gears:
         raise InputError(f"{model} has several gears; needed is one with [gear]")
     return RowsSoil(case, measured_soil(replace(case, rover=None), read_table(runs, RUNS)))

@@ -115,7 +115,7 @@ def case_of_text(text: str) -> Case:
         path = Path(folder) / MODEL_FILE
         path.write_text(text, encoding="utf-8")
         try:
-            return read_case(path, with_bias=True, files=NO_FILES)
+            return read_case(path, with_bias=True, files=NO_FILES, with_explanations=True)
         except InputError as error:
             raise InputError(str(error).replace(str(path), MODEL_FILE)) from None
 

@@ -88,7 +88,8 @@ def _pull(request: Mapping[str, Any]) -> list[str]:
 def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
     from soilml.config.case import read_case
 
-    read_case(_text_file(MODEL_FILE, request.get("model")), with_bias=True, files=NO_FILES)
+    model = _text_file(MODEL_FILE, request.get("model"))
+    read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
     run = request.get("run")
     return [MODEL_FILE, request["names"][0], *([f"--where=run={run}"] if run else [])]
 
@@ -110,7 +111,8 @@ def _wheels(request: Mapping[str, Any]) -> list[str]:
 
     names = request["names"]
     if request.get("model"):
-        read_case(model := _text_file(MODEL_FILE, request["model"]), with_bias=True, files=NO_FILES)
+        model = _text_file(MODEL_FILE, request["model"])
+        read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
         names = [*names, model.name]
     files = NamedFiles(names=names, hint="drop the table of runs first")
     read_study(_text_file(STUDY_FILE, request.get("question")), files)

@@ -27,7 +27,7 @@ from soilml.traction.by_load import (
     slip_grid,
 )
 from soilml.traction.gravity import gravity_remark
-from soilml.traction.model_errors import draw_model_errors
+from soilml.traction.model_errors import ON_SLOPES
 from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.soil_draws import measured_soil, prior_draws
 
@@ -122,7 +122,8 @@ def pull_report(
     """
     case, table = as_case(case), as_table(table)
     soil = measured_soil(case, table, free, estimator, exact_model)
-    draws, unknown, warnings = soil.draws, soil.unknown, [*soil.warnings, *excluded_effects(case)]
+    case, draws, unknown = soil.case, soil.draws, soil.unknown
+    warnings = [*soil.warnings, *excluded_effects(case)]
     table = table.rows(table.answered)
     at = operating_points(table)
     measured_range = MeasuredRange.of(table["slip"], table["load_N"])
@@ -133,10 +134,8 @@ def pull_report(
     }
     loads = measured_loads(table["load_N"]) if loads is None else loads
     slip = slip_grid(slip_limit, measured_range)
-    before, error, scale = prior_draws(unknown, case=case), None, soil.noise_scale
-    errors = draw_model_errors(
-        case, table, draws, slip, loads, channels=("drawbar_pull",), noise_scale=scale
-    )
+    before, error = prior_draws(unknown, case=case), None
+    errors = soil.errors(slip, _on_slopes(loads), ("drawbar_pull",))
     if errors is not None:
         draws, before = replace(draws, errors=errors[0]), replace(before, errors=errors[1])
         error = errors[1].amplitude("drawbar_pull")
@@ -156,3 +155,8 @@ def pull_report(
         measured_pull,
         (*warnings, limitations(error)),
     )
+
+
+def _on_slopes(loads: Sequence[float]) -> list[float]:
+    """Loads with the smallest normal component on a slope that errors are asked for."""
+    return [*loads, ON_SLOPES * min(loads)]

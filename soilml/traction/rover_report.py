@@ -29,7 +29,6 @@ from soilml.traction.gravity import (
     draws_at_gravity,
     gravity_remark,
 )
-from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.pull_and_slope import excluded_effects
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import measured_soil, prior_draws
@@ -103,7 +102,7 @@ def rover_report(
         slopes = SLOPES[tipping >= SLOPES]
     table = with_rover_columns(case, as_table(table))
     soil = measured_soil(case, table, free, estimator, exact_model)
-    table = table.rows(table.answered)
+    case, table = soil.case, table.rows(table.answered)
     if gravity is not None:
         case = with_gravity(case, gravity.target)
     measured = MeasuredRange.of(table["slip"], table["load_N"])
@@ -113,7 +112,7 @@ def rover_report(
     draws, prior = soil.draws, prior_draws(soil.unknown, case=case)
     assert case.rover is not None
     loads = np.ravel(case.rover.loads(slopes)).tolist()
-    errors = draw_model_errors(case, table, draws, slip, loads, noise_scale=soil.noise_scale)
+    errors = soil.errors(slip, loads, ("drawbar_pull", "torque", "sinkage"))
     if errors is not None:
         draws, prior = replace(draws, errors=errors[0]), replace(prior, errors=errors[1])
     laws = None

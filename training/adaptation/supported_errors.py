@@ -26,8 +26,7 @@ from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorS
 
 #: A model that is all but right: errors of bearing, contact and channels are a seventh of the usual
 #: ones. Those of the laws are what they are in most models, because readings on one soil do not
-#: tell them from another soil. Its probability before any row is that one model in five is so
-#: right.
+#: tell them from another soil. One model in five is so right before any row is seen.
 CHECKED = ErrorScale(0.2, bearing=0.15, channels=0.15, laws=0.6)
 
 #: Share of the prior that no campaign rules out: errors on other soils than its own.

@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     design = read_long_table(args.design, ("run", "slip", "load_N"), ignore_extra=args.ignore_extra)
     costs = parse_costs(args)
     effects = available_effects(args)
-    case = read_case(args.model, effects)
+    case = read_case(args.model, effects, with_explanations=True)
     with working(f"auditing {len(design)} rows"):
         found = audit(case, design, free=parse_names(args.free), effects=effects, costs=costs)
     if args.out is not None:

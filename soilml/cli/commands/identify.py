@@ -129,9 +129,9 @@ def run(args: argparse.Namespace) -> int:
     table = read_rows(args, RUNS)
     effects = available_effects(args)
     if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects)
+        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
     else:
-        case = read_case(args.model, effects, with_bias=True)
+        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
     print_table_hints(table, case)
     free = parse_names(args.free)
 

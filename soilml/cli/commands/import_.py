@@ -147,9 +147,11 @@ def _init(args: argparse.Namespace) -> int:
     import shlex
 
     from soilml.cli.output import tell, write_stdout
+    from soilml.cli.progress import stage_progress
     from soilml.log_import.new_map import draft_map
 
-    draft = draft_map(args.files)
+    with stage_progress() as progress:
+        draft = draft_map(args.files, progress)
     if args.explain:
         tell(draft.evidence.rstrip())
     if args.out is None:

@@ -128,13 +128,17 @@ def run(args: argparse.Namespace) -> int:
     if len(loads or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
     if args.load is None and args.gear is None:
-        whole = read_case(args.model, available_effects(args), with_bias=True)
+        whole = read_case(
+            args.model, available_effects(args), with_bias=True, with_explanations=True
+        )
         if whole.rover is not None:
             print_table_hints(table, whole)
             return _run_rover(args, whole, table, options)
     if args.slope is not None:
         raise InputError("--slope needs a model file with [rover], and neither --load nor --gear")
-    case = read_case_of_rows(args, args.model, table, available_effects(args))
+    case = read_case_of_rows(
+        args, args.model, table, available_effects(args), with_explanations=True
+    )
     print_table_hints(table, case)
     options |= {
         "loads": loads,

@@ -127,7 +127,9 @@ def run(args: argparse.Namespace) -> int:
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
+    case = read_case_of_one_gear(
+        args.model, available_effects(args), args.gear, with_explanations=True
+    )
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
     most = MOST_BALANCED if args.balance else ROWS.most

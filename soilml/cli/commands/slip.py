@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     )
 
     driven = read_long_table(args.drive, ignore_extra=args.ignore_extra)
-    case = read_case(args.rover, available_effects(args))
+    case = read_case(args.rover, available_effects(args), with_explanations=True)
     rows = read_drive(driven, case)
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)

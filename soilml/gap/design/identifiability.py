@@ -141,7 +141,7 @@ def audit(
     >>> e.name, e.separating_snr > 3.0, round(e.absorbed, 3)
     ('slip-sinkage', True, 0.121)
     """
-    case = case.without_suspected()
+    case = case.without_explanations()
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
     design, _ = answered_rows(as_table(design))

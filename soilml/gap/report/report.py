@@ -302,13 +302,10 @@ def gap_files(
         origin = Provenance.of(["gap", model_name, runs_name], [])
     report = gap_report(found, f"Gap report: {model_name} against {runs_name}")
     comments = [found.sentence]
-    if names := found.model.suspected:
-        why = (
-            "the likeliest of several explanations that these runs cannot distinguish"
-            if found.status == "class"
-            else "suspected, not named: beside a remainder, it predicts rows kept back no worse"
-        )
-        comments += [f"{' + '.join(names)} is {why}."]
+    if count := len(found.model.explanations):
+        comments += [
+            f"{count} explanations with their weights follow; every prediction mixes them."
+        ]
     return {
         "report.html": page(report, origin),
         "gap.json": json_text(found.as_json() | {"report": report_entry(report, origin)}),

@@ -292,7 +292,7 @@ _NOT_SUPPORTED_BY = {
     "suspected": [
         (
             "cause",
-            "any cause: an effect that model.toml marks as suspected predicts, and is not named",
+            "any cause: model.toml predicts by a mixture of the explanations",
         )
     ],
 }

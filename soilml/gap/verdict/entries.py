@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,6 @@ from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.least_squares import Solution
 from soilml.gap.checks import ONE_LOAD
-from soilml.gap.evidence.held_out import PredictiveGain
 from soilml.gap.evidence.repeats import overstated_noise_notes
 from soilml.gap.evidence.similarity import SignatureSimilarity
 from soilml.gap.report.listed_explanations import SUSPECTS_IN_LINE
@@ -32,10 +31,10 @@ from soilml.gap.verdict.fit_notes import (
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.constants import NEAR, SCATTER_UNITS
 from soilml.inference.explanation import Explanation
-from soilml.inference.posterior import Names, Posterior
+from soilml.inference.posterior import Posterior
 from soilml.quantities import column
-from soilml.remarks import Remark, texts
-from soilml.report.numbers import LEAST_STATED, format_log_density
+from soilml.remarks import Remark
+from soilml.report.numbers import LEAST_STATED
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
@@ -75,28 +74,6 @@ def candidate_summaries(posterior: Posterior, decision: Decision) -> list[Candid
             )
         )
     return summaries
-
-
-def prediction_notes(
-    names: Names, gains: Mapping[Names, PredictiveGain], not_reduced: Sequence[Remark]
-) -> list[Remark]:
-    """A note on effects that the model contains because they predict, or else on figures.
-
-    not_reduced: Figures that do not shrink without a remainder, which that note contains.
-    """
-    gain = gains.get(names)
-    if not names or gain is None:
-        return list(not_reduced)
-    how = "better" if gain.is_clearly_better else "no worse"
-    text = (
-        f"model.toml contains {' + '.join(names)}, which is suspected and not named. Beside a "
-        f"smooth remainder, it predicts rows kept back {how} than the soil alone does "
-        f"(ln density {format_log_density(gain.value, gain.std_error)})"
-    )
-    if not_reduced:
-        each = [f"{figure[:1].upper()}{figure[1:]}" for figure in texts(not_reduced)]
-        text = ". ".join([text, "Without a remainder it does not", *each])
-    return [Remark("suspect-predicts", text, tuple(names), "note")]
 
 
 def conditions_of_suspects(

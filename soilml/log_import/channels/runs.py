@@ -305,9 +305,9 @@ def _divided(
         labels = [f"{name}_{part + 1:02d}" for part in parts]
     else:
         return [(name, list(members))]
-    found = []
+    found, every = [], np.asarray(labels)
     for label in dict.fromkeys(labels):
-        keep = np.asarray([cell == label for cell in labels])
+        keep = every == label
         part = [
             (r.rows(keep), kind) if i == at[0] else (r, kind) for i, (r, kind) in enumerate(members)
         ]

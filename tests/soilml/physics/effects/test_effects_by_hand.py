@@ -501,3 +501,12 @@ def test_stresses_are_those_of_the_true_sinkage_whatever_the_sensor_says():
         found = (WHEEL + effect).profile(SAND, RIG_AT)
         np.testing.assert_array_equal(found.angle, expected.angle)
         np.testing.assert_array_equal(found.normal, expected.normal)
+
+
+def test_a_soft_crust_takes_a_constant_pressure_where_the_ground_bears_much():
+    before, scene = sheared_by(np.asarray([0.001, 0.01]))
+    pressure = np.asarray(before.normal)
+    found = EFFECTS["soft-crust"](deficit=2000.0).on_stress(before, scene)
+    np.testing.assert_allclose(found.normal, pressure - 2000.0 * -np.expm1(-pressure / 2000.0))
+    hardly = EFFECTS["soft-crust"](deficit=50.0).on_stress(before, scene)
+    np.testing.assert_allclose(hardly.normal, pressure - 50.0, rtol=1e-6)
