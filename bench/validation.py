@@ -202,7 +202,7 @@ def adapt_line() -> str:
     return (
         f"Adaptations.\n{len(rows)} campaigns, each with a hidden effect. On other soils the "
         f"error after over before has the\nmedian {own[1]}; it is larger in {own[3]}. Over that "
-        f"with the old model taken as right: {right[1]}; {right[3]}."
+        f"with the old model assumed perfect: {right[1]}; {right[3]}."
     )
 
 

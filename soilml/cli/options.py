@@ -116,7 +116,7 @@ def add_exact_model_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--exact-model",
         action="store_true",
-        help="take model and sensors to be exactly as in MODEL.toml",
+        help="assume a perfect model, and sensors exactly as in MODEL.toml",
     )
 
 

@@ -14,8 +14,9 @@ from soilml.experiment_design.design import Advice, RatedRow, channel_label
 from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import NEXT_ROW, Remark
-from soilml.report import numbers
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.numbers import parameter_name, share_left
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 
 #: Differences of remaining fractions that are not reported: the sampling error of one call.
 NEGLIGIBLE = 0.02
@@ -31,7 +32,7 @@ def is_identified(remaining_fraction: Floats) -> NDArray[np.bool_]:
 def abstention_message(name: str, remaining_fraction: float, rows: str = "these rows") -> str:
     """That a parameter is not identified; `rows` is "these rows" or "this row"."""
     name = name.replace("_", " ")
-    left = numbers.share_left(remaining_fraction)
+    left = share_left(remaining_fraction)
     return f"{name}: not identified by {rows}, {left} the prior's width remains"
 
 
@@ -166,7 +167,8 @@ def report_of_advice(
     rows, columns = best_rows(advice), []
     for name, values in advice_columns(advice, rows).items():
         if name.endswith("_left"):
-            columns.append(Column(name.replace("_", " "), values.tolist(), "share", digits=2))
+            symbol = parameter_name(name.removesuffix("_left")).split()[-1]
+            columns.append(Column(f"{symbol} left", values.tolist(), "share", digits=2))
         elif name != "channels":
             unit = "N" if name == "load_N" else "1"
             columns.append(Column(name.removesuffix("_N"), list(values), unit, digits=3))
@@ -178,7 +180,7 @@ def report_of_advice(
     return Report(
         kind="plan",
         verdict=advice_verdict(advice),
-        tables=[Table("Rows to measure next", columns, "Width that is left of each prior.")],
+        tables=[ReportTable("Rows to measure next", columns, "Width that is left of each prior.")],
         pictures=[
             Picture(
                 "Next rows", partial(_draw_maps, advice, measured), 1, count, (3.8 * count, 3.6),

@@ -68,7 +68,6 @@ from soilml.gap.verdict.estimates import (
     whole_answer,
 )
 from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
-from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
     grown_channels,
@@ -353,8 +352,6 @@ def _build_report(
     if not smooth_gap:
         return report
     conditions = conditions_of_suspects(posterior, obstacles)
-    if decision.status == "suspected" and shown is not None:
-        conditions = (*conditions, noise_range(posterior, shown.hypothesis.effects))
     rivals = competing_explanations(posterior, decision, listed)
     return replace(
         report,

@@ -26,13 +26,13 @@ class SoilExplanation:
 
     @property
     def exact(self) -> bool:
-        """Whether it takes the model to be exactly as in the file."""
+        """Whether it takes the model, but for its sensors, to be as in the file."""
         return not self.effects and not self.discrepancy
 
     def __str__(self) -> str:
         """What it says, in words."""
         if self.exact:
-            return "the model as in its file"
+            return "typical errors of the sensors alone"
         errors = ("a smooth error of the model",) if self.discrepancy else ()
         return " and ".join((*self.effects, *errors))
 

@@ -88,8 +88,8 @@ def _pull(request: Mapping[str, Any]) -> list[str]:
 def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
     from soilml.config.case import read_case
 
-    file = _text_file(MODEL_FILE, request.get("model"))
-    read_case(file, with_bias=True, files=NO_FILES, with_explanations=True)
+    model = _text_file(MODEL_FILE, request.get("model"))
+    read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
     run = request.get("run")
     return [MODEL_FILE, request["names"][0], *([f"--where=run={run}"] if run else [])]
 

@@ -28,7 +28,7 @@ BEHIND = 0.8  # Rim speed over the commanded one below which the drives do not k
 FLAGS = {
     "standing": "all wheels stand: there is no slip",
     "wheel-stopped": "a wheel stands or turns against the others: not described, passed over",
-    "not-steady": "the rims speed up or slow down: the force balance does not hold, passed over",
+    "not-steady": "the rims speed up or slow down: the force balance does not apply, passed over",
     "no-soil": "no soil of the prior explains torque and pull, a hard floor does: refused",
     "no-fit": "neither a soil of the prior nor a hard floor explains the torques: do not use them",
     "beyond": "more slip than the table has, or stuck: the slip is a lower limit",

@@ -15,7 +15,7 @@ from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.physics.operating_point import Operating
 from soilml.traction.draws import SoilDraws
-from soilml.traction.soil_draws import prior_draws
+from soilml.traction.soil_draws import mixed_prior_draws, prior_draws
 
 #: Slips of the table: close where forces rise steeply.
 SLIP = np.asarray([
@@ -69,6 +69,8 @@ def force_table(
     rover = case.rover
     if rover is None:
         raise InputError("the model file has no [rover]; soilml drive slip needs mass and wheels")
+    if case.explanations and soils is None:
+        case, soils = mixed_prior_draws(case, count)
     draws = soils or prior_draws(select_free(case, None), count, case)
     steps = int(np.ceil(np.log(loads[1] / loads[0]) / np.log(LOAD_RATIO))) + 1
     load = np.geomspace(loads[0] * 0.999, loads[1] * 1.001, max(steps, 2))

@@ -221,7 +221,7 @@ def soil_map(
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
-    case, (low, high) = as_case(case), SIZES
+    case, (low, high) = as_case(case, with_explanations=False), SIZES
     if not (low <= cell <= high and low <= reach <= high):
         raise InputError(
             f"cell is {cell:g} m and reach {reach:g} m; needed are {low:g} to {high:g} m"

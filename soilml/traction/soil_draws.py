@@ -21,6 +21,7 @@ from soilml.config.explanations import one_of
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.misfit import excess_residuals_remark
+from soilml.fitting.mixtures import with_all_effects
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification.condensing import condensed
@@ -75,6 +76,28 @@ def prior_draws(
 ) -> SoilDraws:
     """Draws of the priors by Latin hypercube; tests of the case's soil take part."""
     return _soil_draws(free, prior_fractions(free, count, np.random.default_rng(0), case))
+
+
+def mixed_prior_draws(case: Case, count: int) -> tuple[Case, SoilDraws]:
+    """Draws of the priors of all explanations by their weights, and the case that has them all."""
+    each = [case.of_explanation(one) for one in case.explanations]
+    weights = np.asarray([one.weight for one in case.explanations])
+    place = systematic_resampling(weights / weights.sum(), count, 0.5)
+    whole = with_all_effects(case, each)
+    paths = list(dict.fromkeys(path for own in each for path in own.numbers))
+    paths = [path for path in paths if not path.startswith(("gear.", "gears."))]
+    values = np.tile([float(whole.numbers[path]) for path in paths], (count, 1))
+    for i, own in enumerate(each):
+        rows = np.flatnonzero(place == i)
+        known = {
+            path: np.asarray(float(own.numbers[path])) for path in paths if path in own.numbers
+        }
+        if len(rows) and own.prior:
+            drawn = prior_draws(select_free(own, None), len(rows), own)
+            known |= {path: drawn.values[:, k] for k, path in enumerate(drawn.names)}
+        for path, value in known.items():
+            values[rows, paths.index(path)] = value
+    return whole, SoilDraws(tuple(paths), values)
 
 
 def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:

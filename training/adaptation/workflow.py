@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from soilml.config.case import Case, read_case
+from soilml.config.explanations import likeliest_with_effects
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import gap
@@ -276,7 +277,9 @@ def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
     """The gap of a campaign from its files, and whether it supports a change."""
     content = json.loads((folder / "gap.json").read_text(encoding="utf-8"))
     status = content["status"]
-    found = read_case(folder / "model.toml", with_bias=True)
+    found = likeliest_with_effects(
+        read_case(folder / "model.toml", with_bias=True, with_explanations=True)
+    )
     known = {effect.name for effect in case.model.effects}
     effects = tuple(e.name for e in found.model.effects if e.name not in known)
     refusal = None
@@ -325,7 +328,7 @@ def _errors_remark(errors: SupportedErrors) -> Remark:
 def _exact_remark() -> Remark:
     """A note on the answer by which the old file is judged."""
     text = (
-        "the old file is judged with its model taken as right (model_error 0), as which it "
+        "the old file is judged assuming a perfect model (model_error 0), with which it "
         "predicts the runs kept back better than with its own errors of the model"
     )
     return Remark("old-model-right", text, severity="note")

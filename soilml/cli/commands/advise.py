@@ -50,7 +50,7 @@ the posterior samples does not carry the wheel. Model errors are considered wher
 [discrepancy] declares them or [remainder] has them.
 
 With --gravity, rate tests made where --tested-at says (on Earth) by what they
-tell of the drawbar pull of the wheel there, under --target-load:
+reveal of the drawbar pull of the wheel there, under --target-load:
 
   soilml plan next MODEL.toml --gravity moon --target-load 20 --radius 0.1,0.15
 

@@ -44,7 +44,7 @@ are those of the onboard runtime.
   soilml estimate exported/any_wheel.onnx RUNS.csv --model MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
-Without a table, one line tells what the file is for: wheel, effects and priors.
+Without a table, one line says what the file is for: wheel, effects and priors.
 --model compares them with those of your model file, and refuses another wheel.
 
 Each row of the table gives mean, standard deviation (_std) and 90 % interval
@@ -85,7 +85,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         type=InputFile,
         metavar="RUNS.csv",
-        help="measured rows: CSV, Parquet or .xlsx; without it, tell what the file is for",
+        help="measured rows: CSV, Parquet or .xlsx; without it, print what the file is for",
     )
     parser.add_argument(
         "--by",
@@ -113,7 +113,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--exact-model",
         action="store_true",
-        help="take the model of wheel and soil as exact, as for a model checked on a known soil",
+        help="assume a perfect model of wheel and soil, as for one checked on a known soil",
     )
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the estimates to this file")

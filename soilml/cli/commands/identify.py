@@ -42,7 +42,7 @@ Methods:
   averaged   (default) the soil averaged over explanations of the rows, each
              weighted by its evidence: the model as it is, a smooth error of
              it, effects of the catalogue; typical errors of sensors beside all
-The others take the model as exact, and sensors but for [noise] and [bias]:
+The others assume a perfect model, and sensors with [noise] and [bias] alone:
   posterior  mean, standard deviation and 90 % interval of the exact posterior
              under the priors and the noise
   nonlinear  bounded least squares on the full model, from several starts

@@ -93,7 +93,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="trained",
         type=InputFile,
         metavar="MODEL.onnx",
-        help="take the soil from the estimate of this model file",
+        help="use the soil that this trained file estimates",
     )
     add_effects_option(parser)
     add_by_option(parser)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -86,34 +86,37 @@ def bars_picture(found: GapReport, parts: Mapping[str, str]) -> Picture:
 
 
 def _draw_bars(gap: Mapping[str, GapReduction], parts: Mapping[str, str], axes: Any) -> None:
-    every = [
-        value
-        for part in gap.values()
-        for pair in ((part.before, part.after), *part.channels.values())
-        for value in pair
-        if math.isfinite(value)
-    ]
-    high = 10.0 ** (1.45 * math.log10(max(*every, 4.0)) + 0.2) if every else 10.0
-    low = min([0.5, *(0.7 * max(value, 1e-3) for value in every)])
-    for (key, part), panel in zip(gap.items(), axes.flat, strict=True):
-        rows = [("all readings", (part.before, part.after))]
-        rows += [(channel_name(name), pair) for name, pair in part.channels.items()]
-        for i, (_, (before, after)) in enumerate(rows):
-            pair = [(before, BEFORE, -0.18), (after, AFTER, 0.18)]
-            if not part.shrinks:
-                pair = [(before, UNCHANGED, 0.0)]
-            for value, colour, shift in pair:
-                end = float(np.clip(value, low, high)) if math.isfinite(value) else 1.0
-                panel.barh(i + shift, end - 1.0, 0.3, left=1.0, color=colour)
-                panel.annotate(
-                    format_residual(value), (max(end, 1.0), i + shift), xytext=(5, 0),
-                    textcoords="offset points", va="center", annotation_clip=False,
-                )  # fmt: skip
-        panel.set_xscale("log")
-        panel.set_xlim(low, high)
-        panel.set_ylim(len(rows) - 0.5, -0.5)
-        panel.axvline(1.0, color=UNCHANGED, lw=1.2)
-        panel.set_yticks(range(len(rows)), [name for name, _ in rows])
-        panel.xaxis.set_major_formatter("{x:g}")
-        panel.minorticks_off()
+    every = [[(part.before, part.after), *part.channels.values()] for part in gap.values()]
+    values = [value for pairs in every for pair in pairs for value in pair]
+    for (key, part), pairs, panel in zip(gap.items(), every, axes.flat, strict=True):
+        names = ["all readings", *map(channel_name, part.channels)]
+        shown = [pair if part.shrinks else (pair[0], math.nan) for pair in pairs]
+        draw_bars(panel, dict(zip(names, shown, strict=True)), values)
         panel.set_title(parts.get(key, key.replace("_", " ")))
+
+
+def draw_bars(panel: Any, rows: Mapping[str, tuple[float, float]], values: Sequence[float]) -> None:
+    """Draw pairs of gaps as bars that start at 1, which is noise alone, on a logarithmic axis.
+
+    rows: Before and after by name; NaN after where it is not smaller. values: All that the axis
+        spans.
+    """
+    known = [value for value in values if math.isfinite(value)]
+    high = 10.0 ** (1.45 * math.log10(max([4.0, *known])) + 0.2)
+    low = min([0.5, *(0.7 * max(value, 1e-3) for value in known)])
+    for i, (before, after) in enumerate(rows.values()):
+        pair = [(before, BEFORE, -0.18), (after, AFTER, 0.18)]
+        for value, colour, shift in [(before, UNCHANGED, 0.0)] if math.isnan(after) else pair:
+            end = float(np.clip(value, low, high)) if math.isfinite(value) else 1.0
+            panel.barh(i + shift, end - 1.0, 0.3, left=1.0, color=colour)
+            panel.annotate(
+                format_residual(value), (max(end, 1.0), i + shift), xytext=(5, 0),
+                textcoords="offset points", va="center", annotation_clip=False,
+            )  # fmt: skip
+    panel.set_xscale("log")
+    panel.set_xlim(low, high)
+    panel.set_ylim(len(rows) - 0.5, -0.5)
+    panel.axvline(1.0, color=UNCHANGED, lw=1.2)
+    panel.set_yticks(range(len(rows)), list(rows))
+    panel.xaxis.set_major_formatter("{x:g}")
+    panel.minorticks_off()

@@ -197,8 +197,8 @@ class GapReport(Result):
     lines : tuple of Remark
         At most five below it: what was tried, what is left and where, what to drive next.
     model : Case
-        The fitted model. It contains the effects that are claimed, or those of the first suspect
-        where its `predictive_gain` is above zero; `model.suspected` names the latter.
+        The fitted model, with the effects that are claimed where they are the whole answer. Else it
+        has `explanations` with their weights, and predicts by their mixture.
     effects : tuple of NamedEffect
         The effects that were added.
     cause_set : tuple of tuple of str

@@ -163,7 +163,7 @@ def analysis_notes(
     if 1 < len(readings.runs) < FEW_RUNS:
         found = variance_component_entries(posterior)
         text = (
-            f"run-to-run variation of the soil is hardly told by fewer than {FEW_RUNS} runs. "
+            f"run-to-run variation of the soil is poorly known from fewer than {FEW_RUNS} runs. "
             f"Assumed are {np.degrees(found['friction_angle_std']):.2g} deg of friction angle and "
             f"{100.0 * found['bearing_std']:.2g} % of bearing strength, so mean squared residuals "
             "may be below 1"

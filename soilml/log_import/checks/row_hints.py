@@ -29,11 +29,11 @@ _FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that n
 #: Mistakes that make T / (W r) too large, by factor. One of thousand is of the torque, or where the
 #: load is that of no wheel, of the load; and those that make it too small.
 _TOO_LARGE = (
-    (9.80665, "the load is in kg and was taken as N"),
-    (100.0, "the torque is in N cm and was taken as N m"),
+    (9.80665, "the load is in kg and was read as N"),
+    (100.0, "the torque is in N cm and was read as N m"),
 )
-_MILLI = (1000.0, "the torque is in mN m and was taken as N m")
-_KILO = (1000.0, "the load is in kN and was taken as N")
+_MILLI = (1000.0, "the torque is in mN m and was read as N m")
+_KILO = (1000.0, "the load is in kN and was read as N")
 _TOO_SMALL = (
     (1000.0, "the torque is in kN m, or the radius in mm"),
     (9.80665, "the torque is in kgf m"),

@@ -60,7 +60,7 @@ def table_remarks(table: Table, case: Case | None, radius: float | None = None) 
     told = any(hint.code == "slip-definition" for hint in hints)
     if case is not None and not case.gears and not told and other_definition_fits(case, used):
         text = (
-            "the rows fit the model far better where slip is taken as (r omega - v)/v: how was it "
+            "the rows fit the model far better where slip is read as (r omega - v)/v: how was it "
             "defined? Needed is 1 - v/(r omega), which is 0.5 where the rim goes twice as far as "
             "the wheel travels; (r omega - v)/v is 1 there"
         )

@@ -1,14 +1,10 @@
 """A report says the same everywhere: a short headline, few lines, and suspects by probability."""
 
-import json
 import re
 from dataclasses import replace
 
 import pytest
 from gap_sets import analysed, case_of, driven, hidden
-from soilml.gap.presentation import gap_files, gap_text
-from soilml.gap.report.page import summary, suspect_table
-from soilml.serve.answers.gap import verdict
 
 from datagen.blind_sets.blind_set import draw_blind_set
 from datagen.blind_sets.plans import Plan
@@ -61,21 +57,6 @@ def check_order(report):
         assert report.best_unclaimed == report.suspects[0].effects
 
 
-def check_outputs(report):
-    origin = summary(report, "m", "r")
-    found = json.loads(gap_files(report, "m", "r")["gap.json"])
-    lines = [line["text"] for line in found["lines"]]
-    assert found["sentence"] == report.sentence and lines == texts(report.lines)
-    shown = [text.replace(" -> ", " → ") for text in (report.sentence, *lines)]
-    assert list(origin.answer) == shown
-    live = verdict(report)
-    assert [live["sentence"], *live["lines"]] == shown
-    text = gap_text(report)
-    assert text.startswith("\n".join([f"{report.status}: {report.sentence}", *lines]))
-    listed = [s["probability"] for s in suspect_table(report)]
-    assert [s["probability"] for s in live["suspects"]] == listed
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", STORIES)
 def test_stories_are_told_shortly_and_alike_everywhere(name):
@@ -83,7 +64,6 @@ def test_stories_are_told_shortly_and_alike_everywhere(name):
     report = gap(case_of(drawn.model), Table(dict(drawn.columns)))
     check_words(report, set(drawn.columns["run"]))
     check_order(report)
-    check_outputs(report)
 
 
 @pytest.mark.slow
