@@ -85,7 +85,7 @@ def _family(metadata: Mapping[str, str], sets: Mapping[str, Any], path: Path) ->
 
 
 def _scales(metadata: Mapping[str, str]) -> ErrorScales:
-    """Scales of the model's errors that the spec of a file states; the usual ones if it has none."""
+    """Scales of the model's errors that the spec of a file states, else the usual ones."""
     stated = json.loads(metadata["spec"]).get("set_posterior", {}).get("model_errors")
     return USUAL_SCALES if stated is None else ErrorScales.of_list(stated)
 
