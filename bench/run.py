@@ -14,7 +14,6 @@ MODULES = (
     "training_bench",
     "peers",
     "sets",
-    "flags",
     "faults_on_board",
     "model_errors",
     "streams",
@@ -29,6 +28,7 @@ MODULES = (
     "wheel_leg_slip",
     "adapt",
     "gap_bench",
+    "gap_pull",
     "gap_speed",
     "challenge",
 )

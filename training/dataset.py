@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
 from soilml.config.compatibility import recipe_content
-from soilml.config.model_settings import text_in_si
 from soilml.errors import InputError, TableError
+from soilml.io.declared_settings import text_in_si
 from soilml.io.read_table import read_table
 from soilml.onboard.features import compute_features, inputs_of
 from soilml.parameters import declared

@@ -7,10 +7,10 @@ of usage answer at once.
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
@@ -46,19 +46,30 @@ class OutputFile(str):
     __slots__ = ()
 
 
-def add_output(parser: argparse.ArgumentParser, name: str, file: str, text: str) -> None:
-    """Declare an option or argument for an output, whose ending is that of `file`."""
+def add_output(
+    parser: argparse.ArgumentParser, name: str, file: str, text: str, other: str = ""
+) -> None:
+    """Declare an option or argument for an output, whose ending is that of `file`, or `other`."""
     suffix = Path(file).suffix
 
     def checked(path: str) -> OutputFile:
         try:
-            output_files(path, suffix)
+            output_files(path, other if other and path.lower().endswith(other) else suffix)
         except InputError as error:
             raise argparse.ArgumentTypeError(str(error)) from None
         return OutputFile(path)
 
     short = ("-o",) if name == "--out" else ()
     parser.add_argument(*short, name, type=checked, metavar=file, help=text)
+
+
+def is_json(args: argparse.Namespace) -> bool:
+    """Whether the output is JSON, by its ending; raises `InputError` where --format differs."""
+    found = args.out.lower().endswith(".json")
+    wanted = {"json": True, "csv": False}.get(args.format or "", found)
+    if wanted != found:
+        raise InputError(f"--format {args.format} and --out {args.out} differ: omit --format")
+    return bool(found)
 
 
 def add_screen_options(parser: argparse.ArgumentParser, formats: Sequence[str] = ()) -> None:
@@ -105,7 +116,7 @@ def add_exact_model_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--exact-model",
         action="store_true",
-        help="take model and sensors to be exactly as in MODEL.toml",
+        help="assume a perfect model, and sensors exactly as in MODEL.toml",
     )
 
 
@@ -263,6 +274,14 @@ def add_workers_option(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="number of processes (default: one for each core)",
     )
+
+
+def leaves(root: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, Any]]:
+    """Every command below a parser, by name, with its own parser."""
+    below: Any = [a.choices for a in root._actions if a.metavar == "COMMAND"]
+    for word, sub in (below[0] if below else {}).items():
+        inner = list(leaves(sub, f"{before}{word} "))
+        yield from inner or [(before + word, sub)]
 
 
 def number(text: str) -> float:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import MISSING, fields, replace
 from typing import Any
 
 from soilml.errors import InputError, did_you_mean
+from soilml.io.declared_settings import in_si, take_quantity
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared, with_values
@@ -20,68 +20,8 @@ from soilml.physics.model import Model
 from soilml.physics.soils import Soil, soil
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength, SoilTest
 
-#: Size of each unit in the SI unit that a parameter is declared in.
-UNITS: dict[str, dict[str, float]] = {
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "°": math.pi / 180.0},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "m/N": {"m/N": 1.0, "mm/N": 1e-3},
-    "Pa/m": {"Pa/m": 1.0, "kPa/m": 1e3, "MPa/m": 1e6},
-    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
-    "N": {"N": 1.0, "kN": 1e3},
-    "N m": {"N m": 1.0, "Nm": 1.0, "mNm": 1e-3, "mN m": 1e-3},
-    "kg": {"kg": 1.0, "g": 1e-3},
-    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    "m/s^2": {"m/s^2": 1.0},
-    "N/m": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3},
-    "N/m^2": {"N/m^2": 1.0, "kN/m^2": 1e3},
-    "N/m^3": {"N/m^3": 1.0, "kN/m^3": 1e3},
-    "N/m^(n+1)": {"N/m^(n+1)": 1.0, "kN/m^(n+1)": 1e3},
-    "N/m^(n+2)": {"N/m^(n+2)": 1.0, "kN/m^(n+2)": 1e3},
-    "1/m": {"1/m": 1.0, "1/mm": 1e3},
-    "1/Pa": {"1/Pa": 1.0, "1/kPa": 1e-3, "1/MPa": 1e-6},
-    "1": {"%": 1e-2},
-}
-_VALUE = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
-
-
-def take_quantity(settings: Settings, key: str, unit: str) -> float:
-    """The value of `key` in a parameter's SI unit: a number, or a text with a unit.
-
-    >>> settings = Settings({"friction_angle": "33 deg"}, "model.toml [soil]")
-    >>> round(take_quantity(settings, "friction_angle", "rad"), 4)
-    0.576
-    """
-    value = settings.take(key, (int, float, str), _number(unit))
-    return in_si(settings, key, value, unit)
-
-
-def in_si(settings: Settings, key: str, value: Any, unit: str) -> float:
-    """A number, or a text with a unit, in the SI unit `unit`; `InputError` for another value."""
-    if not isinstance(value, str):
-        return float(value)
-    return text_in_si(value, unit, f"{settings.where}: {key}")
-
-
-def text_in_si(text: str, unit: str, what: str) -> float:
-    """The value of a text with a unit, in the SI unit `unit`.
-
-    Raises `InputError`, beginning with `what` it is of, for another text.
-    """
-    known = UNITS.get(unit, {})
-    match = _VALUE.fullmatch(text)
-    if match is not None and match[2] in known:
-        with suppress(ValueError):
-            return float(match[1]) * known[match[2]]
-    units = f", or a text with one of the units {', '.join(known)}" if known else ""
-    raise InputError(f"{what} is {text!r}; needed is {_number(unit)}{units}")
-
-
-def _number(unit: str) -> str:
-    return "a number" if unit == "1" else f"a number in {unit}"
-
-
 UNNAMED_GEAR = "gear"  # Name of the gear in [gear], beside those in [gears.NAME]
-SUSPECTED = "suspected"  # Key of an effect that predicts, and that nothing names
+SUSPECTED = "suspected"  # Key by which earlier versions marked what predicts and is not named
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 #: Kinds of tests; the key of the measured quantity identifies the kind.

@@ -22,6 +22,9 @@ OTHER_LAW_PRIOR = 0.5
 OUTSIDE_PRIORS = 0.05
 #: Prior probability that a smooth discrepancy is present.
 DISCREPANCY_PRIOR = 0.5
+#: The same for the soil: a model is never quite right, and rows hardly show what another soil does
+#: too. `gap`, which decides between both, gives them equal odds.
+SOIL_DISCREPANCY_PRIOR = 0.9
 #: Range over which the logarithm of the size of an effect of soil or gear is uniform, in reference
 #: sizes; the density falls with two further powers beyond it.
 SMALLEST_SIZE, LARGEST_SIZE, TAIL_POWER = 0.01, 5.0, 2.0
@@ -76,9 +79,21 @@ START_SIZE = 0.7
 MOVED = 0.5
 #: Distance from an end of its prior, as a fraction, at which a soil parameter presses against it.
 PRESSED = 0.02
+#: Objective within which of the best first fit of the soil others are optima to keep.
+OTHER_OPTIMUM = 50.0
+#: Nodes from which additions are predicted, the likeliest first.
+EXTENDED = 6
+#: Evidence within which fits without a discrepancy, which may hide their effects, are kept.
+NEAR_HIDDEN = 40.0
+#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
+LARGE_DISCREPANCY = 3.0
 
 # ---- the answer
 
+#: Probability of a component below which it is not drawn from.
+LEAST_DRAWN = 0.003
+#: Probability of the model as in its file below which `identify` says that it does not fit.
+UNLIKELY_MODEL = 0.01
 #: Discrepancy, root mean square in the noise of a reading, that is no gap: with noise it makes
 #: residuals five per cent larger than noise alone.
 NEGLIGIBLE_DISCREPANCY = 0.3

@@ -33,8 +33,8 @@ def folder(tmp_path, monkeypatch):
         ("pull model.toml runs.csv --gravity moon --gravity-law bekker", "one of open, constant"),
         ("pull rover.toml runs.csv --tested-at earth", "--tested-at needs --gravity"),
         ("advise model.toml --gravity moon", "needs --target-load"),
-        ("advise model.toml --gravity moon --target-load 20 --radii -1", "radius -1 m"),
-        ("advise model.toml --loads 20 --radii 0.1", "--radii needs --gravity"),
+        ("advise model.toml --gravity moon --target-load 20 --radius -1", "radius -1 m"),
+        ("advise model.toml --load 20 --radius 0.1", "--radius needs --gravity"),
     ],
 )
 def test_what_is_none_is_refused_in_one_line(folder, capsys, words, said):

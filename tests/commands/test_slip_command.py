@@ -1,4 +1,4 @@
-"""`soilml slip`: files, flags, and one line for bad input."""
+"""`soilml drive slip`: files, flags, and one line for bad input."""
 
 import csv
 import io

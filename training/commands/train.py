@@ -10,7 +10,6 @@ from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 
-HELP = "train regressors on data and export one ONNX model file"
 DESCRIPTION = """\
 Train the regressors of SPEC.toml on all rows of DATA.parquet, calibrate their
 uncertainty by fits without each row's run, and export one ONNX file.
@@ -118,8 +117,8 @@ def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
     from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
-    from soilml.io.text_tables import format_table
     from soilml.quantities import QUANTITIES
+    from soilml.report.aligned_text import format_table
     from training.dataset import read_dataset
     from training.export.learning_curves import plot_learning_curves
     from training.export.model_card import model_card

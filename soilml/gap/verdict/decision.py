@@ -262,21 +262,6 @@ def reasons(
     return (decision.reason,) if decision.reason else ()
 
 
-def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]) -> Names:
-    """The effects of the first suspect where it predicts rows kept back better than the soil alone.
-
-    Or of the likeliest of a class. What is wrong with a model and what predicts best are two
-    questions: this one is no name.
-    """
-    if decision.status == "class":
-        return decision.claimed[0]
-    if decision.status != "suspected" or decision.shown is None:
-        return ()
-    names = decision.shown.hypothesis.effects
-    gain = gains.get(names)
-    return names if gain is not None and gain.is_better else ()
-
-
 def law_matters(posterior: Posterior, node: Explanation) -> bool:
     """Whether the free law and the catalogue's differ in the measured range by more than matters.
 

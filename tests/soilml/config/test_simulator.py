@@ -156,7 +156,7 @@ def test_the_averaged_soil_has_typical_errors_beside_the_emulator_s(folder, box)
     rows = read_table(folder / "runs.csv")
     fit = identify(box, rows)
     exact = identify(box, rows, method="posterior")
-    assert {one.error_scale for one in fit.explanations} > {0.0}
+    assert any(one.discrepancy for one in fit.explanations)
     assert np.all(fit.std >= exact.std)
     # effects that act at a contact explain nothing of a simulator
     assert not {"slip-sinkage", "exit-angle", "grousers"} & {e.effect for e in fit.explanations}

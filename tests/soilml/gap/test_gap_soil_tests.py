@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from remarked import remarked
+from soilml.gap.report.page import page
 
 from soilml import Case, Model, Operating, Table, Wheel, soil
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.gap import audit, gap
-from soilml.gap.report.page import page
 from soilml.identification.bevameter import bevameter
 from soilml.identification.bevameter.soil_section import updated_soil
 from soilml.numerics.prior import Prior

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-
-from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.surface_sampling import normal_sample, surface_sample
 from soilml.numerics.surrogate_density import LogarithmicDensity
+
+from soilml.numerics.importance_sampling import importance_sample
 
 RATIO = np.asarray([50.0, 1.0, 4.0])
 
