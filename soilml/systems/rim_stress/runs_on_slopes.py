@@ -18,7 +18,8 @@ from soilml.quantities import Z_90
 from soilml.remarks import Remark
 from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity
-from soilml.report.report import Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 from soilml.systems.rim_stress.deconvolution import deconvolve, fit_stress_arc
 from soilml.systems.rim_stress.force_balance import (
     MohrCoulomb,
@@ -125,7 +126,7 @@ class RunsOnSlopes:
             kind="sensor-wheel",
             verdict=f"{verdict}.",
             lines=lines,
-            tables=[Table.of("Runs", columns)],
+            tables=[ReportTable.of("Runs", columns)],
             pictures=[column_picture(columns, "slip", PANELS, title="k_x, pull, slope")],
             remarks=self.warnings,
             title=title,
