@@ -58,11 +58,7 @@ def take_gears(
             named.fail(f"{name!r} is no name of a gear; needed are letters, digits, - and _")
         if name in tables:
             named.fail(f"{name!r} is the name of the gear in [gear]; take another one")
-        tables[name] = Settings(
-            named.take(name, dict, f"a table [gears.{name}]"),
-            f"{settings.where} [gears.{name}]",
-            settings.files,
-        )
+        tables[name] = named.table(name)
     gears, priors, suspected = {}, {}, []
     for name, own in tables.items():
         entries = own.tables("effect")

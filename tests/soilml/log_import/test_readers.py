@@ -1,12 +1,9 @@
 """Text logs in the dialects of loggers, units and values with uncertainties."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from soilml.errors import InputError, MissingLibraryError, SoilmlError
-from soilml.io import bounds
 from soilml.log_import.readers import message_fields, read_log, text_by_arrow
 from soilml.remarks import texts
 
@@ -167,9 +164,8 @@ def test_a_long_log_of_numbers_is_read_as_its_lines_are(mark, tmp_path):
 
 def test_a_log_that_memory_has_no_room_for_is_thinned(tmp_path, monkeypatch):
     """Text and messages: evenly over the whole, and said."""
-    few = replace(bounds.LOG_VALUES, most=12_000)
-    monkeypatch.setattr(text_by_arrow, "LOG_VALUES", few)
-    monkeypatch.setattr(message_fields, "LOG_VALUES", few)
+    for module in (text_by_arrow, message_fields):
+        monkeypatch.setattr(module, "KEPT_VALUES", 12_000)
     t = np.arange(20_000) / 1000
     lines = ["t,run,v", *(f"{x:.3f},{'ab'[int(x > 10)]},{x * x:.4f}" for x in t)]
     lines[7000] += ",7"
@@ -185,5 +181,5 @@ def test_a_log_that_memory_has_no_room_for_is_thinned(tmp_path, monkeypatch):
     for x in t:
         topic.add(x, {"v": x * x})
         message_fields.thin_largest([topic])
-    assert topic.size <= few.most and topic.notes("/v")
+    assert topic.size <= 12_000 and topic.notes("/v")
     np.testing.assert_allclose(topic.columns()["v"], topic.times() ** 2)
