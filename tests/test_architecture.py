@@ -53,7 +53,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/log_import/readers/matlab.py": {"scipy", "h5py"},
     "soilml/log_import/readers/parquet_log.py": {"pyarrow"},
     "soilml/log_import/units.py": {"pint"},
-    "soilml/log_import/mapping/written_map.py": {"tomlkit"},
     "soilml/physics/computing_device.py": {"torch"},
     "soilml/processes.py": {"threadpoolctl"},
     "soilml/results.py": {"pandas"},

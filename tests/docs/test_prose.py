@@ -22,7 +22,7 @@ HOUSE_WORDS = re.compile(
     r"\b(takes?|taken|took) (the |its )?(model|sensors?|stress) as\b"
     r"|\btak(es?|en) as (right|given)\b|\btells? of\b|\btold by\b|\b(leaves?|left) open\b"
     r"|\bspeaks? against\b|\bas usual\b"
-    r"|\b(files?|states?|rows?|model|fit|batch) (does not |do not )?carr(y|ies)\b"
+    r"|\b(files?|states?|rows?|model|fit|batch) (does not |do not )?carr(y|ies)\b(?! the load)"
     r"|\b(does not|do not) hold\b",
     re.IGNORECASE,
 )

@@ -124,7 +124,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     import numpy as np
 
     from soilml.cli.output import tell, write_columns
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.column_figure import column_picture
     from soilml.systems.wheel_legs import slip_of_strides
 
     sensors = {
@@ -137,7 +137,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     columns |= {"slip": found.fused, "slip_std": found.fused_std, "in_range": found.in_range}
     numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
     panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
-    write_columns(columns, args.out, args.picture, ColumnPanels(numbered, "stride", [panel]))
+    write_columns(columns, args.out, args.picture, column_picture(numbered, "stride", [panel]))
     outside = int(np.count_nonzero(~found.in_range & np.isfinite(found.fused)))
     if outside:
         tell(f"{outside} of {len(table)} slips are outside of the 0 to 0.5 of the relations")

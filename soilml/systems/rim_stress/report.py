@@ -13,7 +13,8 @@ from soilml.quantities import SHEAR
 from soilml.remarks import Remark, about
 from soilml.report.figure_style import AFTER, BEFORE
 from soilml.report.numbers import format_band
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.systems.rim_stress.ability import (
     ClimbingAbility,
     check_slip,
@@ -174,8 +175,8 @@ class ClimbingReport:
         left = [fit.remaining_fraction.get(name) for name in fit.names]
         at = np.linspace(0, len(ability.slip) - 1, SLIPS).astype(int)
         tables = [
-            Table.of("Pull and slope over slip", {k: v[at] for k, v in self.curve.items()}),
-            Table.of("Climbs", self.climbs),
+            ReportTable.of("Pull and slope over slip", {k: v[at] for k, v in self.curve.items()}),
+            ReportTable.of("Climbs", self.climbs),
         ]
         if checked:
             ends = [f"{wheel} {end}" for wheel in checked for end in ("exit", "entry", "centre")]
@@ -184,14 +185,16 @@ class ClimbingReport:
                 for name in ("difference", "std")
             )
             columns = [Column("angle", ends), Column("difference", apart, "rad", std)]
-            tables.append(Table("Stressed arc on slopes less that at artificial slip", columns))
+            tables.append(
+                ReportTable("Stressed arc on slopes less that at artificial slip", columns)
+            )
         climbs, slopes = fit.rows_used, self.ground.distinct_slopes
         vague = about(self.warnings, "not-identified")
         return Report(
             kind="climb",
             verdict=verdict,
             lines=lines,
-            figures=Table.of_parameters(
+            figures=ReportTable.of_parameters(
                 "Soil",
                 fit.frame_columns(),
                 left_of_prior=Column("left of prior", left, "share", digits=2),

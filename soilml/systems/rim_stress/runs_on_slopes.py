@@ -16,9 +16,10 @@ from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.physics.soils import Soil
 from soilml.quantities import Z_90
 from soilml.remarks import Remark
-from soilml.report.column_panels import ColumnPanels
+from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_quantity
-from soilml.report.report import Picture, Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 from soilml.systems.rim_stress.deconvolution import deconvolve, fit_stress_arc
 from soilml.systems.rim_stress.force_balance import (
     MohrCoulomb,
@@ -121,15 +122,12 @@ class RunsOnSlopes:
                 for v in (pull, self.conventional)
             )
             lines = [f"The pull of the others is off by {off}, that of Bekker's stress by {own}."]
-        panels = ColumnPanels(columns, "slip", PANELS)
         return Report(
             kind="sensor-wheel",
             verdict=f"{verdict}.",
             lines=lines,
-            tables=[Table.of("Runs", columns)],
-            pictures=[
-                Picture("k_x, pull, slope", panels.plot, *panels.shape, panels.size, verdict)
-            ],
+            tables=[ReportTable.of("Runs", columns)],
+            pictures=[column_picture(columns, "slip", PANELS, title="k_x, pull, slope")],
             remarks=self.warnings,
             title=title,
         )

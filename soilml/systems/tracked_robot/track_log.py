@@ -18,7 +18,7 @@ from soilml.physics.operating_point import Operating
 from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
 from soilml.report.numbers import format_quantity
 from soilml.report.report import Picture, Report
-from soilml.report.report import Table as ReportTable
+from soilml.report.tables import ReportTable
 from soilml.systems.tracked_robot.robot import (
     DiscreteGrousers,
     TrackedRobot,

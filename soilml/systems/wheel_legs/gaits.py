@@ -11,7 +11,8 @@ import numpy as np
 
 from soilml.arrays import Array
 from soilml.errors import InputError
-from soilml.report.column_panels import ColumnPanels
+from soilml.report.column_figure import column_picture
+from soilml.report.report import Picture
 from soilml.systems.wheel_legs.geometry import wheel_leg
 from soilml.systems.wheel_legs.resistive_force import LinearGround
 from soilml.systems.wheel_legs.walk import Walk, WalkStatus, walk
@@ -59,7 +60,7 @@ class WalkTables:
     keys: tuple[str, ...]
 
     @property
-    def panels(self) -> ColumnPanels:
+    def picture(self) -> Picture:
         """Metrics against the first quantity of three values or more; else the turns themselves.
 
         Raises `InputError` for more turns than a picture shows.
@@ -73,14 +74,14 @@ class WalkTables:
         if swept:
             shown = [("slip_mean", "slip_rms"), ("sinkage_mean_m", "sinkage_largest_m")]
             others = tuple(name for name in self.keys if name != swept[0])
-            return ColumnPanels(self.columns, swept[0], [*shown, ("torque_mean_Nm",)], others)
+            return column_picture(self.columns, swept[0], [*shown, ("torque_mean_Nm",)], others)
         if len(self.columns["foot"]) > MOST_DRAWN:
             raise InputError(
                 f"{len(self.columns['foot'])} walks; a picture shows the turns of {MOST_DRAWN} or "
                 "fewer: ask for fewer, or for three or more values of legs, stiffness or slip"
             )
         panels = [("slip",), ("sinkage_m",), ("torque_Nm",), ("hub_height_m",)]
-        return ColumnPanels(self.motion, "turned_rad", panels, self.keys)
+        return column_picture(self.motion, "turned_rad", panels, self.keys)
 
 
 def walk_tables(

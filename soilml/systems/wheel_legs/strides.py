@@ -21,7 +21,8 @@ from soilml.quantities import Z_90
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.report import Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     SINKAGE_RANGE,
@@ -284,7 +285,7 @@ def stride_report(
         kind="wheel-leg",
         verdict=f"{verdict[0].upper()}{verdict[1:]}.",
         lines=[f"{line}." for line in lines] if len(found) > 1 else [],
-        tables=[Table.of("Soil by sensor", rows)],
+        tables=[ReportTable.of("Soil by sensor", rows)],
         pictures=[figure.picture()],
         remarks=remarks,
         title="Soil from strides",

@@ -229,7 +229,7 @@ CUT = """() => [...document.querySelectorAll('label, dt, dd, h1, h2, h3, button,
 def test_it_fits_has_contrast_and_names(tab):
     tab.get_by_role("button", name="Try an example").click()
     answer(tab, "The soil")
-    while (closed := tab.locator("main details:not([open]) > summary")).count():
+    while (closed := tab.locator("main details:not([open]) > summary:visible")).count():
         closed.first.click()
     for width, scheme in ((1280, "light"), (1280, "dark"), (390, "dark"), (360, "light")):
         tab.emulate_media(color_scheme=scheme)

@@ -20,6 +20,7 @@ from soilml.fitting.covariance import USUAL
 from soilml.fitting.mixtures import with_all_effects
 from soilml.fitting.predictions import forces
 from soilml.fitting.readings import Readings
+from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.draws import Draws
 from soilml.inference.gaussian_terms import FIXED
 from soilml.inference.posterior import Posterior, infer
@@ -163,6 +164,7 @@ def _equally_weighted(
         if not len(place):
             continue
         taken, fit = chosen[place] - start, part.node.fit
+        part = _widened(part, [p for _, p, _ in groups if p.node is part.node])
         own = values_at(fit.coordinates, part.x[taken])
         fixed = fit.case.numbers
         for i, path in enumerate(paths):
@@ -172,6 +174,24 @@ def _equally_weighted(
             values[place, paths.index(c.path)] = own[:, i]
         parts.append((posterior, part, taken, place))
     return PosteriorDraws(whole, SoilDraws(tuple(paths), values), tuple(parts))
+
+
+def _widened(part: Draws, of_node: Sequence[Draws]) -> Draws:
+    """Draws of an explanation with their distances from its mean times `INTERVAL_FACTOR`.
+
+    What they leave of the readings moves with them, to first order, but where a bound ends it.
+    """
+    x, weight = (np.concatenate([getattr(p, n) for p in of_node]) for n in ("x", "weight"))
+    residual = np.concatenate([p.residual for p in of_node])
+    share = weight / max(float(weight.sum()), 1e-300)
+    middle, left = share @ x, share @ residual
+    coordinates = part.node.fit.coordinates
+    low, high = (np.asarray([getattr(c, end) for c in coordinates]) for end in ("lower", "upper"))
+    return replace(
+        part,
+        x=np.clip(middle + INTERVAL_FACTOR * (part.x - middle), low, high),
+        residual=left + INTERVAL_FACTOR * (part.residual - left),
+    )
 
 
 @dataclass(frozen=True)
@@ -280,7 +300,7 @@ def _weights(
         residual = np.asarray(whiten @ drawn.residual[taken].T)
         factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white)
         half = np.linalg.solve(factor, white.T @ residual)
-        z = np.concatenate([normal[key] for key in keys], axis=1).T
+        z = INTERVAL_FACTOR * np.concatenate([normal[key] for key in keys], axis=1).T
         weights = np.linalg.solve(factor.T, half + z).T
         ends = np.cumsum([0, *(functions[key].inside.count for key in keys)])
         given |= {key: weights[:, a:b] for key, a, b in zip(keys, ends, ends[1:], strict=False)}
