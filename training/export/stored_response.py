@@ -103,7 +103,7 @@ def _branch(model: Any, name: str) -> Any:
 
 def _beside_single_rows(model: Any, sets: Graph, posterior: SetPosteriorGraph) -> Any:
     """The model with another branch for sets."""
-    from onnx import checker, numpy_helper
+    from onnx import checker, helper, numpy_helper
 
     kinds = {o.name: (o.type.tensor_type.elem_type, o) for o in model.graph.output}
     outputs: dict[str, Output] = {
@@ -118,6 +118,8 @@ def _beside_single_rows(model: Any, sets: Graph, posterior: SetPosteriorGraph) -
         if attribute.name == "then_branch":
             attribute.g.CopyFrom(sets.as_branch(outputs))
     defaults = posterior.defaults()
+    changed.functions.extend(sets.functions.values())
+    changed.opset_import.extend(helper.make_opsetid(*one) for one in sets.opsets[1:])
     del changed.graph.initializer[:]
     for name, value in (defaults | {SET_SWITCH: np.zeros(1, bool)}).items():
         changed.graph.initializer.append(numpy_helper.from_array(np.asarray(value), name))
