@@ -104,7 +104,7 @@ class Value:
         """A value as it is; a number or an array as a constant of this value's type."""
         return other if isinstance(other, Value) else constant(self.graph, other, self.dtype)
 
-    def indices(self, numbers: Sequence[int]) -> Value:
+    def indices(self, numbers: Sequence[int] | NDArray[Any]) -> Value:
         """A constant of whole numbers (int64), as ONNX takes indices, axes and shapes."""
         return self._output(self.graph.constant(np.asarray(numbers, dtype=np.int64)))
 

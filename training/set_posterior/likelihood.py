@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
-from operator import mul
+from operator import add, mul
 
 import numpy as np
 
@@ -34,7 +34,12 @@ from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.residual_system import ResidualRows
 from training.set_posterior.sampler import Polynomials, adapted_rounds, first_round
-from training.set_posterior.scale_mixture import Scaled, integrate_out, scale_mixture
+from training.set_posterior.scale_mixture import (
+    Scaled,
+    integrate_out,
+    judged_first,
+    scale_mixture,
+)
 
 #: Columns of errors in the residual system: of the sensors, and of the model.
 OF_SENSORS, OF_MODEL = len(SENSOR_ERROR_COLUMNS), len(MODEL_ERROR_COLUMNS)
@@ -96,52 +101,59 @@ class Linear:
         soil: Monomials (sampled terms, 1) of x.
         system: State, columns and use of the readings.
         """
-        of_x = self.parts.T.argmax(axis=1).tolist()
+        whole, columns = composite(
+            "LikeliestSoil", ["whole", "unknowns"], self._likeliest, **system, soil=soil,
+            std=self.std, part=soil.indices(self.parts.T.argmax(axis=1)),
+            powers=soil.indices([[term.count(axis) for term in self.terms] for axis in self.axes]),
+            derivatives=soil.indices(
+                [derivative(self.terms, axis).argmax(axis=1) for axis in self.axes]
+            ),
+        )  # fmt: skip
+        return whole, columns
+
+    def _likeliest(
+        self, state: Value, columns: Value, used: Value, soil: Value, std: Value, part: Value,
+        powers: Value, derivatives: Value,
+    ) -> list[Value]:  # fmt: skip
+        """The likeliest values of z, one after another, each from its residuals' change."""
+        system, _ = _joined(state, columns, used, [OF_SENSORS])
+        of_x, count = soil.node("Gather", part, axis=0), len(self.axes)
+        powers = powers.astype(np.float32)
+        stds, rows = std.split(count, axis=0), powers.split(count, axis=0)
+        places = derivatives.split(count, axis=0)
         units = [constant(soil.graph, [[0.0]]) for _ in self.axes]
-        whole = soil.take(of_x, axis=0) * self._of_z(units)
+
+        def at_units() -> tuple[Value, Value, list[Value]]:
+            factors = [
+                (unit * one).node("Pow", row).reshape(-1, 1)
+                for unit, one, row in zip(units, stds, rows, strict=True)
+            ]
+            of_z = reduce(mul, factors)
+            whole = of_x * of_z
+            changes = [
+                whole.node("Gather", place.reshape(-1), axis=0) * row.reshape(-1, 1) * one
+                for place, row, one in zip(places, rows, stds, strict=True)
+            ]
+            return of_z, whole, changes
+
         for _ in range(SWEEPS):
-            for place in range(len(self.axes)):
-                (units[place],) = composite(
-                    "LikeliestError", ["unit"], _likeliest, **system, whole=whole,
-                    change=self._changes(whole)[place], before=units[place],
-                )  # fmt: skip
-                whole = soil.take(of_x, axis=0) * self._of_z(units)
-        changes = self._changes(whole)
+            for place in range(count):
+                _, whole, changes = at_units()
+                own = system @ changes[place]
+                residual = system @ whole - own * units[place]
+                against = gemm(own, residual, transpose_a=True)
+                units[place] = -against / (own.sum_of_squares(keepdims=True) + 1.0)
+        of_z, whole, changes = at_units()
         first = np.eye(1, len(self.sampled))
-        offset = reduce(lambda a, b: a + b, (c * u for c, u in zip(changes, units, strict=True)))
-        in_x = self.parts.T * self._of_z(units) - offset * first
-        return whole, concat([in_x, *changes], axis=1)
+        offset = reduce(add, (c * u for c, u in zip(changes, units, strict=True)))
+        in_x = self.parts.T * of_z - offset * first
+        return [whole, concat([in_x, *changes], axis=1)]
 
     def _changes(self, whole: Value) -> list[Value]:
         """Changes (terms, 1) of monomials (terms, 1) with one standard deviation of each z."""
         stds = self.std.split(len(self.axes), axis=0)
         derivatives = (derivative(self.terms, axis) for axis in self.axes)
         return [whole.derived(d) * std for d, std in zip(derivatives, stds, strict=True)]
-
-    def _of_z(self, units: list[Value]) -> Value:
-        """The factors of z in each term, (terms, 1)."""
-        z = concat(units, axis=0) * self.std
-        table = concat([constant(z.graph, [[1.0]]), z], axis=0)
-        rows = [
-            sorted((self.axes.index(f) + 1 if f in self.axes else 0 for f in term), reverse=True)
-            for term in self.terms
-        ]
-        most = max(sum(factor > 0 for factor in row) for row in rows)
-        return reduce(mul, [table.take([row[k] for row in rows], axis=0) for k in range(most)])
-
-
-def _likeliest(
-    state: Value, columns: Value, used: Value, whole: Value, change: Value, before: Value
-) -> list[Value]:
-    """The likeliest value (1, 1) of one linear unknown in standard deviations, others as they are.
-
-    change: Changes (terms, 1) of the monomials with it; before: its value.
-    """
-    system, _ = _joined(state, columns, used, [OF_SENSORS])
-    own = system @ change
-    residual = system @ whole - own * before
-    against = gemm(own, residual, transpose_a=True)
-    return [-against / (own.sum_of_squares(keepdims=True) + 1.0)]
 
 
 def _joined(state: Value, columns: Value, used: Value, errors: list[int]) -> list[Value]:
@@ -195,9 +207,25 @@ class Likelihood:
         nearly = self.nearly_known
         linear = nearly if isinstance(nearly, Linear) else None
         given = {} if nearly is None else {"unknowns": _of_unknowns(nearly)}
+        graph, polynomials = self.size.graph, self.polynomials
+        # what follows is for C, which has these methods as templates
+        of_c = {
+            "terms": self.size.indices(polynomials.rows),
+            "tilts": constant(graph, polynomials.tilts, name="tilts"),
+        }
+        if isinstance(nearly, Standardised):
+            of_c["prior_rows"] = constant(graph, nearly.prior, name="prior_rows")
+        of_columns, probabilities = judged_first(self.scales)
+        present = np.flatnonzero(self.present)
+        of_scales = {
+            "present": self.size.indices(present),
+            "scales": constant(graph, of_columns[:, present], name="scales"),
+            "log_probabilities": constant(graph, np.log(probabilities), name="log_probabilities"),
+            "rounds": self.size.indices([sizes.rounds]), "targets": self.size.indices([targets]),
+        }  # fmt: skip
         soil, *first = composite(
             "FirstRound", ["soil", "solved", "free", "outside"], self._first_body(),
-            **system, **given, **dict(zip(("draws", "t", "log_prior"), prior, strict=True)),
+            **system, **given, **dict(zip(("draws", "t", "log_prior"), prior, strict=True)), **of_c,
         )  # fmt: skip
         if linear is not None:
             soil, given["unknowns"] = linear.at(soil, system)
@@ -206,7 +234,7 @@ class Likelihood:
             "Posterior", ["points", "weights", "misfit", "grown"],
             self._posterior_body(sizes, targets), **system, **given, size=self.size, limit=limit,
             prior=prior.normal, **dict(zip(("solved", "free", "outside"), first, strict=True)),
-            **adapted._asdict(),
+            **adapted._asdict(), **of_scales,
         )  # fmt: skip
 
     def _first_body(self) -> Callable[..., list[Value]]:
@@ -214,7 +242,7 @@ class Likelihood:
 
         def body(
             state: Value, columns: Value, used: Value, draws: Value, t: Value, log_prior: Value,
-            unknowns: Value | None = None,
+            unknowns: Value | None = None, **_: Value,
         ) -> list[Value]:  # fmt: skip
             whole, sensors = _joined(state, columns, used, [OF_SENSORS])
             whole, taken = self._in_unknowns(whole, sensors, unknowns)
@@ -232,7 +260,7 @@ class Likelihood:
         def body(
             state: Value, columns: Value, used: Value, size: Value, limit: Value, prior: Value,
             solved: Value, free: Value, outside: Value, normal: Value, t: Value,
-            log_density: Value, unknowns: Value | None = None,
+            log_density: Value, unknowns: Value | None = None, **_: Value,
         ) -> list[Value]:  # fmt: skip
             whole, sensors, model = _joined(state, columns, used, [OF_SENSORS, OF_MODEL])
             grown = concat([whole, sensors, model], axis=1)

@@ -63,6 +63,8 @@ def add_quantiles(deviations: Value, std: Value, weights: Value) -> Value:
     weights: Weights (1, n) with sum 1.
     """
     given = {"deviations": deviations, "std": std, "weights": weights}
+    for name, numbers in (("grid", GRID), ("spacing", [SPACING]), ("probabilities", INTERVAL)):
+        given[name] = constant(std.graph, numbers, name=name)  # for C, which has a template
     return composite("Quantiles", ["ends"], _quantiles, **given)[0]
 
 
@@ -70,7 +72,7 @@ def add_quantiles(deviations: Value, std: Value, weights: Value) -> Value:
 GRID = np.concatenate([-DISTANCES[::-1], DISTANCES]) / SPACING
 
 
-def _quantiles(deviations: Value, std: Value, weights: Value) -> list[Value]:
+def _quantiles(deviations: Value, std: Value, weights: Value, **_: Value) -> list[Value]:
     segments, spacing = len(DISTANCES) - 1, std * SPACING
     relative = (deviations / spacing.reshape(-1, 1)).reshape(0, 1, -1)
     below = ((GRID + 0.5)[:, None] - relative).clip(0.0, 1.0)
