@@ -9,10 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from training.export_c.tensor import Shape, Tensor, strides
+from training.export_c.tensor import LARGEST_INT, Shape, Tensor, strides
 
 WIDTH = 100  # Width of the lines that hold the numbers of an array
-LARGEST_INT = 2**31 - 1  # The largest whole number that every C compiler's int holds (32 bits)
 INDENT = "    "
 
 
@@ -135,9 +134,7 @@ def _text(tensor: Tensor, places: dict[Tensor, str]) -> str:
 def _broadcast_steps(own: Shape, shape: Shape) -> list[int]:
     """Steps of a tensor along the axes of the shape that it is broadcast to."""
     padded = (1,) * (len(shape) - len(own)) + own
-    return [
-        0 if size == 1 else step for size, step in zip(padded, strides(padded), strict=True)
-    ]
+    return [0 if size == 1 else step for size, step in zip(padded, strides(padded), strict=True)]
 
 
 def _merge(sizes: list[int], steps: list[list[int]]) -> tuple[list[int], list[list[int]]]:

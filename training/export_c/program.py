@@ -74,9 +74,7 @@ class Program:
         self.statements.append((self._comment, code, names))
         self._comment = ""
 
-    def computed(
-        self, kind: str, shape: Shape, text: str, operands: Iterable[Tensor]
-    ) -> Tensor:
+    def computed(self, kind: str, shape: Shape, text: str, operands: Iterable[Tensor]) -> Tensor:
         """A tensor whose elements follow from those of others, by a C expression."""
         parts = tuple(
             t if (t.text and t.shape == shape) or (t.value is not None and t.count == 1)

@@ -70,9 +70,7 @@ class SetFunctions:
     values: dict[str, Any]  # for the template
 
 
-def set_functions(
-    model: Any, interface: Interface, shared: SharedParts, rows: int
-) -> SetFunctions:
+def set_functions(model: Any, interface: Interface, shared: SharedParts, rows: int) -> SetFunctions:
     """Of a model with a set posterior, for steps of so many rows.
 
     Raises `ModelFileError` for a graph without the composites: one of an earlier version.
@@ -151,9 +149,7 @@ def set_functions(
         )
     )
     outputs = [o.name for o in model.graph.output if o.name.startswith(SET_PREFIX)]
-    answer = translate(
-        "answer_graph", nodes, known, {**of_set, **total, **sample}, outputs, shared
-    )
+    answer = translate("answer_graph", nodes, known, {**of_set, **total, **sample}, outputs, shared)
     of_c = {basis: "work->soil", counted: "work->counted"}
     of_c |= {n: f"work->{t.name.removeprefix('in_')}" for n, t in sample.items()}
     return SetFunctions(
@@ -202,7 +198,7 @@ def _values(
     order = np.argsort(powers, kind="stable")
     others = np.where(factors == unknowns, 0, factors)[order]
     present = value(posterior, "present")
-    zs = value(_arguments(model, likeliest), "powers") if likeliest is not None else []
+    zs: Any = value(_arguments(model, likeliest), "powers") if likeliest is not None else []
     prior_rows = value(first, "prior_rows") if "prior_rows" in first else np.zeros((0, len(order)))
     sizes = {
         "MONOMIALS": interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS),
@@ -231,7 +227,8 @@ def _values(
     arrays = {
         "column_of": order, "power_of": powers[order],
         "power_ends": np.searchsorted(powers[order], range(powers.max() + 1), "right"),
-        "factor_rows": -np.sort(-others, axis=1), "present_errors": present, "prior_draws": value(first, "draws"), "prior_t": value(first, "t"),
+        "factor_rows": -np.sort(-others, axis=1), "present_errors": present,
+        "prior_draws": value(first, "draws"), "prior_t": value(first, "t"),
         "log_prior": value(first, "log_prior"), "adapted_draws": value(posterior, "normal"),
         "adapted_t": value(posterior, "t"), "log_density": value(posterior, "log_density"),
         "error_scales": value(posterior, "scales"), "tilts": value(first, "tilts"),

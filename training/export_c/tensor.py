@@ -18,6 +18,7 @@ Shape = tuple[int, ...]
 KINDS = {1: "float", 11: "double", 6: "int", 7: "int", 9: "bool"}
 DTYPES = {"double": np.float64, "float": np.float32, "int": np.int32, "bool": np.bool_}
 REAL = ("float", "double")
+LARGEST_INT = 2**31 - 1  # The largest whole number that every C compiler's int holds (32 bits)
 
 
 def kind_of(element_type: int, name: str) -> str:
@@ -69,6 +70,8 @@ class Tensor:
     def constant(values: NDArray[Any]) -> Tensor:
         """A constant."""
         kind = kind_of_array(values, "of the graph")
+        if kind == "int":
+            values = np.clip(values, -LARGEST_INT, LARGEST_INT)
         return Tensor("", kind, values.shape, np.ascontiguousarray(values.astype(DTYPES[kind])))
 
     @property

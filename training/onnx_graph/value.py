@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ class Value:
         """A value as it is; a number or an array as a constant of this value's type."""
         return other if isinstance(other, Value) else constant(self.graph, other, self.dtype)
 
-    def indices(self, numbers: Sequence[int] | NDArray[Any]) -> Value:
+    def indices(self, numbers: Sequence[Any] | NDArray[Any]) -> Value:
         """A constant of whole numbers (int64), as ONNX takes indices, axes and shapes."""
         return self._output(self.graph.constant(np.asarray(numbers, dtype=np.int64)))
 
@@ -141,10 +142,7 @@ class Value:
         ends = [self.indices([-start]) for start in starts]
         ends = [self.indices([0]), *ends, self.indices([np.iinfo(np.int64).max])]
         axis = self.indices([-1])
-        return [
-            self.node("Slice", first, last, axis)
-            for first, last in zip(ends[:-1], ends[1:], strict=True)
-        ]
+        return [self.node("Slice", first, last, axis) for first, last in pairwise(ends)]
 
     def largest(self, count: int, axis: int) -> Value:
         """The largest entries along an axis, in descending order."""
@@ -197,7 +195,7 @@ Operand = Value | float | NDArray[Any]  # What stands on either side of an opera
 
 def constant(graph: Graph, value: Any, dtype: type = np.float32, name: str = "") -> Value:
     """A constant number or array of a floating-point type; a name that is given is kept."""
-    array = np.asarray(value, dtype=dtype)
+    array: NDArray[Any] = np.asarray(value, dtype=dtype)
     return Value(graph, graph.constant(array, exact=True, name=name), dtype)
 
 

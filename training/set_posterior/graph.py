@@ -139,7 +139,8 @@ class SetPosteriorGraph:
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
-        family, terms, nearly, std = self.family, self.response.terms, None, context.axis_std
+        family, terms, std = self.family, self.response.terms, context.axis_std
+        nearly: Linear | Standardised | None = None
         if std is not None and self.small:
             nearly = Linear.of(terms, family.free, std)
             terms, family = nearly.sampled, family.with_axes(family.free)

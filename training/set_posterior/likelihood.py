@@ -274,9 +274,7 @@ class Likelihood:
             mixture = Scaled(systems, mixture.log_weight)
             first = (prior, solved, free, outside)
             draws = ProposalDraws(normal, t, log_density)
-            found = adapted_rounds(
-                self.polynomials, mixture, limit, targets, sizes, first, draws
-            )
+            found = adapted_rounds(self.polynomials, mixture, limit, targets, sizes, first, draws)
             return [*found, grown]
 
         return body

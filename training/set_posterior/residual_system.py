@@ -148,5 +148,7 @@ def _all_below(response: Response, distance: Value) -> Value:
     Distances that are not numbers, of a wheel without size, are not.
     """
     half_width = (0.5 + BOX_TOLERANCE) * (response.upper - response.lower)[:, None]
-    inside = (distance <= constant(distance.graph, half_width, name="range_half")).astype(np.float32)
+    inside = (distance <= constant(distance.graph, half_width, name="range_half")).astype(
+        np.float32
+    )
     return inside.reduce("ReduceMin", axis=0, keepdims=False)

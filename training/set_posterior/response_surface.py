@@ -144,7 +144,7 @@ class Response:
 
         The offset (channels, rows) is subtracted from the channels.
         """
-        graph, tangent = features.graph, directions[:, :, None]
+        graph, tangent = features.graph, constant(features.graph, directions[:, :, None])
         layers = self._add_hidden(features, "response")
         for weights, hidden in layers:
             tangent = (weights @ tangent) * (1.0 - hidden * hidden)
@@ -165,7 +165,9 @@ class Response:
         graph, layers = features.graph, []
         mean = constant(graph, self.scaling.mean[:, None], name=f"{name}_mean")
         hidden = features - mean
-        for k, (weights, bias) in enumerate(zip(self.layers[:-2:2], self.layers[1:-2:2], strict=True)):
+        for k, (weights, bias) in enumerate(
+            zip(self.layers[:-2:2], self.layers[1:-2:2], strict=True)
+        ):
             scale = self.scaling.scale if k == 0 else 1.0
             own = constant(graph, weights.T / scale, name=f"{name}_weights_{k}")
             of_layer = constant(graph, bias[:, None], name=f"{name}_bias_{k}")

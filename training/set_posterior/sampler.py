@@ -119,9 +119,7 @@ class Polynomials:
             row_of = [0, *(1 + self.order.index(i) for i in range(self.unknowns))]
             factors = pair_factors(self.terms)
             pairs = sorted({pair for term in factors for pair in term})
-            left, right = (
-                points.take([row_of[pair[k]] for pair in pairs], axis=0) for k in (0, 1)
-            )
+            left, right = (points.take([row_of[pair[k]] for pair in pairs], axis=0) for k in (0, 1))
             table = left * right
             per_term = [
                 table.take([pairs.index(term[k]) for term in factors], axis=0)

@@ -61,12 +61,9 @@ class Scaled:
             total = parts.sum(axis=0, keepdims=True)
             return [squares.take([0], axis=0), log(total) + largest, parts, total]
 
-        return Misfit(
-            *composite(
-                "Misfit", Misfit._fields, body, systems=self.systems, log_weight=self.log_weight,
-                basis=basis, variance=variance,
-            )  # fmt: skip
-        )
+        given = {"systems": self.systems, "log_weight": self.log_weight}
+        found = composite("Misfit", Misfit._fields, body, **given, basis=basis, variance=variance)
+        return Misfit(*found)
 
     def mean(self, misfit: Misfit, weights: Value) -> Value:
         """One system (m, terms) for proposals: the mean of all by the posterior of their scales.
