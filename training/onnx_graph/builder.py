@@ -125,7 +125,9 @@ class Graph:
         for one, wanted in zip(made, outputs, strict=True):
             inner.op("Identity", one, out=wanted)
         nodes, constants = inner.needed(outputs)
-        given = [helper.make_node("Constant", [], [c.name], value=c) for c in constants]
+        given = [
+            helper.make_node("Constant", [], [c.name], name=c.name, value=c) for c in constants
+        ]
         opsets = [helper.make_opsetid("", OPSET), helper.make_opsetid(DOMAIN, 1)]
         found = helper.make_function(
             DOMAIN, name, list(inputs), list(outputs), given + nodes, opsets

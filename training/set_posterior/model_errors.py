@@ -10,6 +10,7 @@ import numpy as np
 from soilml.onboard.set_contract import (
     LAW_ERROR_COLUMNS,
     MODEL_ERROR_COLUMNS,
+    MODEL_ERROR_INPUT,
     RESPONSE_CHANNELS,
 )
 from training.onnx_graph.value import Value, concat, exp, gemm, log, maximum
@@ -47,7 +48,8 @@ class ModelErrors:
             - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
 
         A scale of torque without load changes with the logarithm of torque itself in addition.
-        The strength is cohesion and the tangent of the friction angle. They are of usual size.
+        The strength is cohesion and the tangent of the friction angle. They are of usual size,
+        and zero where the model is right.
 
         slopes: Derivatives of the channels by log slip and log load, at the same soil, (2,
             channels, rows).
@@ -82,7 +84,9 @@ class ModelErrors:
             of_modulus * stds["shear_modulus"],
         ]
         columns = concat([change * profile, contact, own, *laws], axis=0)
-        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
+        size = self.readings[MODEL_ERROR_INPUT]
+        some = (size * size > 0.0).astype(np.float32)
+        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1) * some
 
     def _by_logarithms(self, names: Sequence[str], coefficients: Value, basis: Value) -> Value:
         """Sum (1, channels, rows) of the changes with the logarithms of these unknowns.
