@@ -62,7 +62,7 @@ def write_rows(
     """
     write_set({out: partial(save_columns, columns), picture: report.pictures[0].save})
     content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, written=out is not None)
+    show_rows(report, columns, content, out)
 
 
 def write_set(contents: Mapping[str | None, Content]) -> None:
