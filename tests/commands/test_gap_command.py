@@ -156,7 +156,7 @@ def analysed(inputs, tmp_path, capsys, *arguments):
     assert written == set(FILES)
     found = content(tmp_path / "out")
     assert status == (3 if found["status"] == "bad-data" else 0)
-    assert capsys.readouterr().out.startswith(f"{found['status']}: ")
+    assert capsys.readouterr().out.startswith(found["sentence"])
     return found
 
 

@@ -64,11 +64,9 @@ def test_curves_picture_and_words_agree_and_hold_the_truth(folder, capsys):
     assert ((efficiency[0] < drive) & (drive < efficiency[2])).all()
     order = [CLASSES.index(r["traffic_class"]) for r in rows]
     assert order == sorted(order) and order[0] < order[-1]
-    assert f"traffic class   {rows[-1]['traffic_class']}" in said
-    best = f"{column['largest_drawbar_pull_N'][0]:.1f}"
-    steep = f"{np.rad2deg(column['steepest_slope_rad'][0]):.1f}"
-    assert f"largest pull    {best} (" in said and f"steepest slope  {steep} (" in said
-    assert "no load transfer" in said and "torque alone hardly reveals" in said
+    said = " ".join(said.split())
+    assert said.startswith("At 60 N the wheel pulls ") and "Traffic class there: " in said
+    assert "torque alone hardly reveals" in said
 
 
 def test_a_trained_file_may_say_what_the_soil_is(folder, small_model, capsys):

@@ -31,10 +31,9 @@ def files(model_file, tmp_path):
 def test_a_rover_is_answered_for_as_a_whole(files, tmp_path, capsys):
     out, picture = tmp_path / "rover.csv", tmp_path / "rover.png"
     outputs = ["--out", str(out), "--picture", str(picture)]
-    assert main(["pull", *files, "--slope", "0,8", "--gravity", "moon", *outputs]) == 0
+    assert main(["pull", *files, "--slope", "0,8", "--gravity", "moon", *outputs, "-v"]) == 0
     said = capsys.readouterr().out
-    assert "rover of 28 kg on 4 wheels, gravity 1.62 m/s^2" in said
-    assert "steepest slope" in said and "rear-left" in said
+    assert said.startswith("The rover climbs ") and "rear-left" in said
     rows = list(csv.DictReader(out.read_text().splitlines()))
     assert [round(float(row["slope_rad"]), 3) for row in rows] == [0.0, 0.14]
     assert float(rows[1]["slip"]) > float(rows[0]["slip"])
