@@ -33,8 +33,8 @@ from soilml.remarks import Remark
 from soilml.report.numbers import format_probability
 from soilml.traction.draws import DrawnErrors, SoilDraws
 
-#: Correlation lengths outside the range of the readings within which the drawn error fades. Of 1 and
-#: 2, 1 scored better under lighter loads and beyond the slips in two of three sets of seeds 1 and 2.
+#: Correlation lengths outside the range of the readings within which the drawn error fades. Of 1
+#: and 2, 1 scored better under lighter loads and beyond the slips, seeds 1 and 2.
 FADING_LENGTH = 1.0
 #: Fewest draws of one of several explanations, before they are weighted.
 FEWEST = 60
