@@ -212,7 +212,7 @@ def _write_results(
 
     import numpy as np
 
-    from soilml.cli.output import show_rows, write_with_report
+    from soilml.cli.output import show_result, show_rows, write_with_report
     from soilml.cli.tables import tell_failures
     from soilml.io.text_tables import csv_text
     from soilml.report.report import by_group
@@ -240,5 +240,8 @@ def _write_results(
         args.picture: report.pictures[0].save,
     }
     write_with_report(args, files, lambda: (report, content))
-    show_rows(report, columns, content, args.out is not None or args.report is not None)
+    if args.out is None and args.report is None:
+        show_rows(report, columns, content)
+    else:
+        show_result(report, content)
     tell_failures(args.by, failed)
