@@ -80,8 +80,12 @@ SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
     "Papers": {
         "paper climb": (_OWN + "climb", "steepest slope of a rover with force-sensor wheels"),
         "paper sensor-wheel": (_OWN + "sensor_wheel", "pull of a wheel from the stress on its rim"),
-        "paper wheel-leg": (_OWN + "wheel_leg", "soil or slip from the strides of a wheel-leg"),
+        "paper wheel-leg": (
+            _OWN + "wheel_leg",
+            "soil and traffic class from strides of a wheel-leg",
+        ),
         "paper walk": (_OWN + "walk", "simulated walks of wheel-legs"),
+        "paper track": (_OWN + "track", "soil and belt of a tracked robot from a log of pulls"),
         "paper numbers": (_OWN + "papers", "printed numbers beside the computed ones"),
     },
 }

@@ -20,35 +20,49 @@ from soilml.io.cell_text import escaped
 from soilml.io.spreadsheet import split_sheet
 from soilml.io.text_tables import csv_blocks
 from soilml.report.aligned_text import wrapped
-from soilml.report.figure_style import save_png
 from soilml.report.page import Content, Provenance, json_text, report_texts
-from soilml.report.report import Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 
 if TYPE_CHECKING:
-    from soilml.report.column_panels import ColumnPanels
-    from soilml.report.parameter_figure import ParameterIntervals
+    from soilml.report.report import Picture
 
 
 def write_columns(
     columns: Mapping[str, Any],
     out: str | None,
     picture: str | None = None,
-    panels: ColumnPanels | ParameterIntervals | None = None,
+    drawn: Picture | None = None,
     others: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write the columns to the CSV file `out`; without one, print them.
 
-    picture: PNG file of `panels`; None where the option was not given.
+    picture: PNG file of `drawn`; None where the option was not given.
     others: Columns of further CSV files.
     """
     files: dict[Path, Content] = {}
     if out is not None:
         files[Path(out)] = partial(save_columns, columns)
     files |= {Path(name): partial(save_columns, table) for name, table in (others or {}).items()}
-    if picture is not None and panels is not None:
-        files[Path(picture)] = partial(save_png, panels.plot, *panels.shape, panels.size)
+    if picture is not None and drawn is not None:
+        files[Path(picture)] = drawn.save
     write_files(files)
     tell_columns(columns, out)
+
+
+def write_rows(
+    report: Report,
+    columns: Mapping[str, Any],
+    out: str | None,
+    picture: str | None,
+) -> None:
+    """Write the columns to the CSV file `out` and the report's picture to a PNG file; say the rest.
+
+    None as a path is an option that was not given; without `out`, the columns go into a pipe.
+    """
+    write_set({out: partial(save_columns, columns), picture: report.pictures[0].save})
+    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    show_rows(report, columns, content, written=out is not None)
 
 
 def write_set(contents: Mapping[str | None, Content]) -> None:
@@ -74,7 +88,7 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
             write_stdout(text)
         return
     content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    table = Table.of("rows", columns).text
+    table = ReportTable.of("rows", columns).text
     write_stdout(f"{table()}\n" if form == "table" else json_text(content))
 
 

@@ -8,12 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from soilml.config.explanations import (
-    CaseExplanation,
-    one_of,
-    take_explanations,
-    without_effects,
-)
+from soilml.config.explanations import CaseExplanation, one_of, take_explanations
 from soilml.config.measurement_noise import (
     Discrepancy,
     Noise,
@@ -398,8 +393,4 @@ def take_case(
         simulator=simulator,
         drive=take_drive(settings.table("drive")) if "drive" in settings else DriveErrors(),
     )
-    if names := (*suspected, *of_gears):  # as earlier versions wrote what was not named
-        only = (CaseExplanation.of(1.0, case),)
-        return replace(without_effects(case, names), explanations=only)
-    each = take_explanations(settings.tables("explanation"), effects, case)
-    return replace(case, explanations=each)
+    return take_explanations(settings, effects, case, (*suspected, *of_gears))

@@ -11,8 +11,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from soilml.config.model_settings import Effects, take_effects, take_prior, take_quantity
+from soilml.config.model_settings import Effects, take_effects, take_prior
 from soilml.errors import InputError
+from soilml.io.declared_settings import take_quantity
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import check, declared, with_values
@@ -60,19 +61,26 @@ class CaseExplanation:
 
 
 def take_explanations(
-    entries: Sequence[Settings], effects: Effects, base: Case
-) -> tuple[CaseExplanation, ...]:
-    """Read the tables [[explanation]] of a case.
+    settings: Settings, effects: Effects, base: Case, suspected: Sequence[str]
+) -> Case:
+    """A case with what its tables [[explanation]] say.
+
+    suspected: Effects that earlier versions of `gap` wrote and did not name: with them, the case is
+        the only explanation.
 
     Raises `InputError` for a weight outside 0 to 1, weights that add up to more than one, and what
     [soil], [soil.prior] and [[effect]] refuse.
     """
+    if suspected:
+        only = (CaseExplanation.of(1.0, base),)
+        return replace(without_effects(base, suspected), explanations=only)
+    entries = settings.tables("explanation")
     if len(entries) > MOST_EXPLANATIONS:
         entries[0].fail(f"{len(entries)} explanations; at most {MOST_EXPLANATIONS} are possible")
     found = tuple(_take(entry, effects, base) for entry in entries)
     if entries and sum(one.weight for one in found) > MOST_WEIGHT:
         entries[0].fail("the weights of all [[explanation]] add up to more than 1")
-    return found
+    return replace(base, explanations=found)
 
 
 def _take(entry: Settings, effects: Effects, base: Case) -> CaseExplanation:

@@ -15,7 +15,8 @@ from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import NEXT_ROW, Remark
 from soilml.report.numbers import parameter_name, share_left
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 
 #: Differences of remaining fractions that are not reported: the sampling error of one call.
 NEGLIGIBLE = 0.02
@@ -179,7 +180,7 @@ def report_of_advice(
     return Report(
         kind="plan",
         verdict=advice_verdict(advice),
-        tables=[Table("Rows to measure next", columns, "Width that is left of each prior.")],
+        tables=[ReportTable("Rows to measure next", columns, "Width that is left of each prior.")],
         pictures=[
             Picture(
                 "Next rows", partial(_draw_maps, advice, measured), 1, count, (3.8 * count, 3.6),

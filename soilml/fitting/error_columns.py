@@ -39,6 +39,12 @@ def error_columns(case: Case, readings: Readings, errors: Mapping[str, float]) -
     at = linearise(changed, coordinates, np.zeros(len(coordinates)), readings)
     found = dict(zip(solved, np.nan_to_num(at.jacobian).T, strict=True))
     size, slip, load = np.nan_to_num(at.prediction), np.abs(readings.slip), readings.load
+    if "strength" in errors:
+        by_strength, by_modulus = _laws(case, readings)
+        found["strength"] = errors["strength"] * by_strength
+        growth = np.log(load / np.median(load))
+        found["strength_by_load"] = errors["strength_by_load"] * growth * by_strength
+        found["law_of_shear"] = errors["law_of_shear"] * by_modulus
     factors: dict[str, tuple[str, Floats]] = {
         "torque_gain": ("torque", size),
         "torque_bias": ("torque", np.ones_like(size)),
@@ -55,6 +61,26 @@ def error_columns(case: Case, readings: Readings, errors: Mapping[str, float]) -
             own = readings.channel == readings.channels.index(channel)
             found[name] = np.where(own, errors[name] * factor, 0.0)
     return found
+
+
+def _laws(case: Case, readings: Readings) -> tuple[Floats, Floats]:
+    """Changes (m,) with the logarithms of strength, c and tan phi, and of shear modulus."""
+    tangent = float(np.tan(case.soil.friction_angle))
+    units = {
+        "cohesion": float(case.soil.cohesion),
+        "friction_angle": tangent / (1.0 + tangent**2),
+        "shear_modulus": float(case.soil.shear_modulus),
+    }
+    coordinates = [
+        Coordinate(name, "", Prior(value, value + unit), lower=-0.1)
+        for name, unit in units.items()
+        if unit > 0.0 and (value := float(getattr(case.soil, name))) >= 0.0
+    ]
+    jacobian = linearise(case, coordinates, np.zeros(len(coordinates)), readings).jacobian
+    of = dict(zip((c.path for c in coordinates), np.nan_to_num(jacobian).T, strict=True))
+    none = np.zeros(len(readings))
+    strength = of.get("cohesion", none) + of.get("friction_angle", none)
+    return np.asarray(strength), np.asarray(of.get("shear_modulus", none))
 
 
 def stacked(columns: Mapping[str, Floats], count: int) -> Floats:

@@ -187,8 +187,6 @@ def forces(case: Case, at: Operating) -> Force:
     """Forces (n,) of a case, with its remainder, at points (n,) that several gears may drive."""
     if not case.gears:
         return forces_of_one_gear(case, at)
-    if case.explanations:
-        return mixed_forces(case, lambda one: forces(one, at))
     count = np.broadcast(at.slip, at.load).size
     joined: dict[str, Any] = {
         f.name: np.zeros(count, np.int64 if f.name == "status" else np.float64)
@@ -202,10 +200,7 @@ def forces(case: Case, at: Operating) -> Force:
 
 
 def forces_of_one_gear(case: Case, at: Operating) -> Force:
-    """Forces of a case of one gear, with the mean of its remainder.
-
-    Of several explanations, their mean by weight, without faults of sensors and rig.
-    """
+    """Forces of a case of one gear with its remainder; of several explanations, their mean."""
     if case.explanations:
         return mixed_forces(case, lambda one: forces_of_one_gear(one, at))
     force = case.model(case.soil, at)

@@ -51,6 +51,13 @@ USUAL_MODEL_ERRORS = {
     "drawbar_pull_by_slip": 0.1,
 }
 
+#: Usual standard deviations of errors of the laws of the soil, which act as another soil does: of
+#: the logarithms of strength (cohesion and tan phi together), of its growth with log load, and of
+#: the shear modulus. A law of another form is best fitted by a shear modulus 15 to 20 % off and a
+#: friction angle 3 to 9 % off (`shear-softening`, stress falling to half beyond its peak), and
+#: every third model has one: these are about half of that.
+USUAL_LAW_ERRORS = {"strength": 0.02, "strength_by_load": 0.0175, "law_of_shear": 0.08}
+
 
 def declared_errors(case: Case) -> dict[str, float]:
     """Errors of the sensors that the case declares in [bias], standard deviations by name."""

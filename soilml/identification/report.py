@@ -14,7 +14,8 @@ from soilml.remarks import about
 from soilml.report.corner_figure import corner_picture
 from soilml.report.numbers import channel_name, format_quantity
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.report import Column, Report, Table, by_group
+from soilml.report.report import Report, by_group
+from soilml.report.tables import Column, ReportTable
 
 if TYPE_CHECKING:
     from soilml.config.case import Case
@@ -50,7 +51,7 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
     return Report(
         kind="identify",
         verdict=fit.verdict,
-        figures=Table.of_parameters(
+        figures=ReportTable.of_parameters(
             "Soil",
             fit.frame_columns(),
             left_of_prior=Column(

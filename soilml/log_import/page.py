@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from soilml.log_import.figures import draw_run, plot_rows, rows_of_panels, run_panels
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 
 if TYPE_CHECKING:
     from soilml.log_import.result import ImportedLog
@@ -64,18 +65,20 @@ def report_of_import(found: ImportedLog) -> Report:
     )
 
 
-def _tables(found: ImportedLog) -> Iterator[Table]:
+def _tables(found: ImportedLog) -> Iterator[ReportTable]:
     table = found.table
     names = [n for n in _SHOWN if n in table]
     columns = {n: table[n] for own in names for n in (own, f"{own}_std") if n in table}
-    yield Table.of("Rows", columns, "Means of the steady windows; +- knows the autocorrelation.")
+    yield ReportTable.of(
+        "Rows", columns, "Means of the steady windows; +- knows the autocorrelation."
+    )
     seconds: dict[tuple[str, Remark | None], list[tuple[float, float]]] = {}
     for run, s in found.left_out():
         seconds.setdefault((run, s.why), []).append((s.start, s.stop))
     if seconds:
         entries = sorted(seconds.items(), key=lambda e: -sum(b - a for a, b in e[1]))
         spans = [", ".join(f"{a:.1f} to {b:.1f}" for a, b in own[:4]) for _, own in entries]
-        yield Table(
+        yield ReportTable(
             "Left out",
             [
                 Column("run", [run for (run, _), _ in entries]),
@@ -86,7 +89,7 @@ def _tables(found: ImportedLog) -> Iterator[Table]:
         )
     if found.shared:
         shared = sorted(found.shared, key=lambda p: (p.quantity, -p.rms))
-        yield Table(
+        yield ReportTable(
             "Errors that all rows share",
             [
                 Column("uncertain", [_constant(part.constant) for part in shared]),

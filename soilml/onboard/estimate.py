@@ -348,7 +348,8 @@ class Estimate(Result):
     def report(self) -> Report:
         """The verdict, each quantity of a single estimate, and intervals beside the prior."""
         from soilml.report.parameter_figure import ParameterIntervals
-        from soilml.report.report import Report, Table
+        from soilml.report.report import Report
+        from soilml.report.tables import ReportTable
 
         q, columns = len(self.names), self.frame_columns()
         mean, low, high = (v.reshape(-1, q) for v in (self.mean, self.low, self.high))
@@ -361,8 +362,8 @@ class Estimate(Result):
         return Report(
             kind="estimate",
             verdict=self.verdict,
-            figures=Table.of_parameters("Soil", columns) if one else None,
-            tables=[] if one else [Table.of("Estimates", columns)],
+            figures=ReportTable.of_parameters("Soil", columns) if one else None,
+            tables=[] if one else [ReportTable.of("Estimates", columns)],
             pictures=[drawn.picture()],
             title="Estimate",
         )

@@ -17,7 +17,8 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
 from soilml.report.numbers import shown_unit, significant
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.report import Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 
 MOST_ESTIMATES = 20_000  # Most estimates of a page, whose JSON file has every one
 #: What the fault detector says of a run.
@@ -215,7 +216,7 @@ def estimate_report(
     return Report(
         kind="estimate",
         verdict=verdict(columns, by, remarks),
-        tables=[Table.of("Estimates", columns)],
+        tables=[ReportTable.of("Estimates", columns)],
         pictures=[drawn.picture()],
         remarks=[remark for remark in remarks if remark.code != NEXT_ROW],
         next_steps=[remark.text for remark in remarks if remark.code == NEXT_ROW],

@@ -11,7 +11,8 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.report.numbers import format_band, format_quantity, significant
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.rover_design.figures import SIZE, plot_designs
 from soilml.rover_design.search import QUANTILES, RESULTS
 from soilml.rover_design.study import DIMENSIONS
@@ -90,7 +91,7 @@ def _named(found: DesignReport) -> list[str]:
     return found.study.varied or ["radius", "width", "lug_height"]
 
 
-def _designs(found: DesignReport) -> Table:
+def _designs(found: DesignReport) -> ReportTable:
     """The best design, and some of the front, each with its dimensions and results.
 
     What is to be least stands behind the probability. The margin at a risk of 5 % is the lower end
@@ -125,14 +126,14 @@ def _designs(found: DesignReport) -> Table:
         if key == "margin_N":
             ends = (values("margin_N_p05").tolist(), values("margin_N_p95").tolist())
         shown.append(Column(heading, cells.tolist(), unit, ends=ends, digits=3))
-    return Table("Designs", shown)
+    return ReportTable("Designs", shown)
 
 
-def _tables(found: DesignReport) -> Iterator[Table]:
+def _tables(found: DesignReport) -> Iterator[ReportTable]:
     if found.by_soil:
         margins = [one.margin for one in found.by_soil]
         ends = ([m[0] for m in margins], [m[2] for m in margins])
-        yield Table(
+        yield ReportTable(
             "The best design on each soil",
             [
                 Column("soil", [one.name for one in found.by_soil]),
@@ -144,10 +145,10 @@ def _tables(found: DesignReport) -> Iterator[Table]:
         shares = [one.share for one in found.shares]
         texts = [one.text for one in found.shares]
         columns = [Column("input", texts), Column("share", shares, "share", digits=2)]
-        yield Table("What the margin depends on", columns)
+        yield ReportTable("What the margin depends on", columns)
     if found.tests:
         tests = found.tests
-        yield Table(
+        yield ReportTable(
             "Tests that would reduce the spread",
             [
                 Column("test", [one.text for one in tests]),

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES
-from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
+from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_band
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Report
+from soilml.report.tables import Column, ReportTable
 from soilml.slip_filter.drive import DriveSlip
 
-SIZE = (9.0, 7.5)  # Width and height of the figure, inches
 ENDS = ("_p05", "", "_p95")
 
 
@@ -58,12 +56,14 @@ def report_of_drive(found: DriveSlip, title: str = "Slip of a drive") -> Report:
         kind="slip",
         verdict=verdict,
         lines=lines,
-        tables=[Table("Flags", columns)] if names else [],
+        tables=[ReportTable("Flags", columns)] if names else [],
         pictures=[
-            Picture(
-                "The drive", partial(plot_drive, found), 3, 1, SIZE,
-                "largest slip, speed and pitch against time",
-                "Bands: 90 %. Orange: speed of the rims, and times of a hard floor.",
+            column_picture(
+                drive_columns(found) | {"pitch_rad": found.rows.slope},
+                "time_s",
+                [[f"slip_{name}" for name in found.rows.wheels], ["speed_m_s"], ["pitch_rad"]],
+                title="The drive",
+                caption="Lines: medians. Bands: 90 %.",
             )
         ],
         remarks=list(found.remarks()),
@@ -78,27 +78,3 @@ def drive_json(found: DriveSlip) -> dict[str, Any]:
     """Columns and remarks."""
     columns = {name: np.asarray(values).tolist() for name, values in drive_columns(found).items()}
     return {"columns": columns, "remarks": [remark.as_json() for remark in found.remarks()]}
-
-
-def plot_drive(found: DriveSlip, ax: Any = None) -> NDArray[Any]:
-    """Draw largest slip, body speed, pitch and the probability of a hard floor; see `take_axes`."""
-    panels = take_axes(ax, 3, 1, SIZE)
-    top, middle, last = panels.ravel()
-    time = found.rows.time
-    slip = found.slip.max(axis=2)
-    for panel, values, label in ((top, slip, "largest slip"), (middle, found.speed, "speed, m/s")):
-        panel.fill_between(time, values[:, 0], values[:, 2], color=AFTER, alpha=0.25, lw=0)
-        panel.plot(time, values[:, 1], color=AFTER, lw=1.5)
-        panel.set_ylabel(label)
-    middle.plot(time, found.rows.rim_speed.mean(axis=1), color=BEFORE, lw=1.0, label="rims")
-    middle.legend(frameon=False)
-    last.plot(time, np.rad2deg(found.rows.slope), color=UNCHANGED, lw=1.0)
-    last.set_ylabel("pitch, degrees")
-    last.set_xlabel("time, s")
-    hard = found.no_soil > 0.5
-    for panel in (top, middle, last):
-        panel.set_xlim(time[0], max(time[-1], time[0] + 1e-9))
-        panel.fill_between(
-            time, 0, 1, where=hard, transform=panel.get_xaxis_transform(), color=BEFORE, alpha=0.2
-        )
-    return panels

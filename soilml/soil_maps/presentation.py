@@ -15,7 +15,8 @@ from soilml.quantities import QUANTITIES
 from soilml.report.figure_style import take_axes
 from soilml.report.numbers import format_log_density, pretty, shown_column
 from soilml.report.page import json_text
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.soil_maps.raster import geotiff, nav2_files
 from soilml.soil_maps.workflow import SoilMap, parameter_moments
 
@@ -64,7 +65,7 @@ def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
     )  # fmt: skip
 
 
-def _patches(found: SoilMap) -> Table:
+def _patches(found: SoilMap) -> ReportTable:
     """The soil of each patch."""
     soils, ends, moments = found.soils, [], []
     for patch in np.unique(soils.patch):
@@ -77,10 +78,10 @@ def _patches(found: SoilMap) -> Table:
         values, errors = ([float(own[k][i]) for own in moments] for k in (0, 1))
         name = coordinate.path.replace("_", " ")
         columns.append(Column(name, values, QUANTITIES[coordinate.path].unit, errors))
-    return Table("Soil of each patch", columns)
+    return ReportTable("Soil of each patch", columns)
 
 
-def _slopes(found: SoilMap) -> Table:
+def _slopes(found: SoilMap) -> ReportTable:
     """A row for each slope: cells by the probability of climbing, mean slip and energy."""
     ability = found.ability
     assert ability is not None
@@ -90,7 +91,7 @@ def _slopes(found: SoilMap) -> Table:
         total = np.where(known, values, 0.0).sum(axis=0)
         means.append((total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)).tolist())
     likely = [np.mean(ability.climbed > p, axis=0).tolist() for p in (0.5, 0.9)]
-    return Table(
+    return ReportTable(
         "Probability of climbing",
         [
             Column("slope", ability.slope.tolist(), "rad", digits=3),

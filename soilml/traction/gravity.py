@@ -13,7 +13,7 @@ from soilml.errors import InputError
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import CHANGED, SCHOOLS, GravityChange
 from soilml.remarks import Remark
-from soilml.report.report import Column, Table
+from soilml.report.tables import Column, ReportTable
 from soilml.traction.draws import SoilDraws
 
 
@@ -51,13 +51,13 @@ class LawComparison:
 
     by_law: Mapping[str, Answers]
 
-    def table(self) -> Table:
+    def table(self) -> ReportTable:
         """A row for each law: median and 90 % band of each answer."""
         columns = [Column("law of gravity", list(self.by_law))]
         for name in next(iter(self.by_law.values())):
             bands = [quantile_band(answers[name]) for answers in self.by_law.values()]
             columns.append(Column.of_bands(name.replace("_", " "), bands))
-        return Table("By law of gravity", columns)
+        return ReportTable("By law of gravity", columns)
 
     def remark(self) -> Remark:
         """How much of the width of the first answer's band is due to the doubt of the law."""

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from soilml.numerics.quantiles import quantile_band
-from soilml.physics.pull_efficiency import THRESHOLDS, traffic_class
+from soilml.physics.pull_efficiency import traffic_class
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
-from soilml.report.figure_style import AFTER, BEFORE, PRIOR, UNCHANGED
+from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_band, format_quantity, format_range, significant
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.traction.by_load import SAME_LOAD, LoadPrediction
 from soilml.traction.pull_and_slope import Traction
 from soilml.traction.report import PullReport
@@ -91,7 +91,7 @@ def report_of_pull(found: PullReport, title: str = "Drawbar pull and slope") -> 
         wanted = [
             n for n in columns if n in of or n.removesuffix("_p05").removesuffix("_p95") in of
         ]
-        tables.append(Table.of(head, {n: np.asarray(columns[n])[shown] for n in wanted}))
+        tables.append(ReportTable.of(head, {n: np.asarray(columns[n])[shown] for n in wanted}))
     tables += [one.laws.table() for one in loads if one.laws is not None]
     vague = [share > NOT_IDENTIFIED_ABOVE for one in loads for share in one.remaining_fraction]
     sentences = [_sentence(one) for one in loads]
@@ -125,15 +125,13 @@ def _every_second(found: PullReport) -> Any:
 def _sentence(one: LoadPrediction) -> str:
     """Largest pull and steepest slope under a load, with 90 % bands where the rows tell them."""
     known = one.posterior
+    unknown = {"N": "an unknown force", "rad": "an unknown slope"}
     said = [
-        "an unknown slope" if unit == "rad" else "an unknown force"
-        if share > NOT_IDENTIFIED_ABOVE
-        else format_band(*_ends(draws), unit)
+        unknown[unit] if share > NOT_IDENTIFIED_ABOVE else format_band(*_ends(draws), unit)
         for draws, unit, share in zip(
-            (known.largest_pull, known.steepest_slope), ("N", "rad"), one.remaining_fraction,
-            strict=True,
+            (known.largest_pull, known.steepest_slope), unknown, one.remaining_fraction, strict=True
         )
-    ]  # fmt: skip
+    ]
     return f"At {significant(known.load)} N the wheel pulls {said[0]} at most and climbs {said[1]}."
 
 
@@ -158,10 +156,10 @@ def _efficiency(known: Traction) -> Iterator[str]:
     yield f"Traffic class there: {found['traffic_class'][i]}, on {share} of the soils."
 
 
-def _by_load(found: PullReport) -> Table:
+def _by_load(found: PullReport) -> ReportTable:
     known = [one.posterior for one in found.by_load]
     pulls = [quantile_band(one.prior.largest_pull) for one in found.by_load]
-    return Table(
+    return ReportTable(
         "By load",
         [
             Column("load", [one.load for one in known], "N"),
@@ -176,58 +174,22 @@ def _by_load(found: PullReport) -> Table:
 
 
 def _picture(found: PullReport) -> Picture:
-    count = len(found.by_load)
-    return Picture(
-        "Pull, slope and efficiency over slip",
-        partial(_draw, found),
-        3,
-        count,
-        (4.4 * count, 9.0),
-        " ".join(_sentence(one) for one in found.by_load),
-        "Lines: medians. Bands: 90 % of the soils that the rows allow (blue) and of those of the "
-        "prior (grey). Points: measured pull. Orange bar: measured slips. Dashed: pull efficiency, "
-        "with the ends of its classes (dotted).",
+    slip, load, pull = found.measured_pull
+    columns = pull_columns(found)
+    if len(found.by_load) == 1:
+        near = np.abs(load / found.by_load[0].posterior.load - 1.0) < SAME_LOAD
+        slip, pull = slip[near], pull[near]
+    else:
+        columns = {name: values for name, values in columns.items() if "_prior" not in name}
+    panels = [("drawbar_pull_N",), ("slope_rad",), ("tractive_efficiency", "pull_efficiency")]
+    slips = format_range(*found.measured_range.slip, digits=2)
+    return column_picture(
+        columns,
+        "slip",
+        panels,
+        ("load_N",) if len(found.by_load) > 1 else (),
+        title="Pull, slope and efficiency over slip",
+        caption="Lines: medians. Bands: 90 % of the soils that the rows allow; grey: of the prior. "
+        f"Points: measured pull. Slips {slips} were measured.",
+        measured={"slip": slip, "drawbar_pull_N": pull},
     )
-
-
-def _draw(found: PullReport, panels: Any) -> None:
-    slips, loads, pulls = found.measured_pull
-    for i, prediction in enumerate(found.by_load):
-        posterior, prior = prediction.posterior, prediction.prior
-        top, low, last = panels[:, i]
-        near = np.abs(loads / posterior.load - 1.0) < SAME_LOAD
-        _bands(top, posterior.slip, prior.pull, posterior.pull)
-        top.plot(slips[near], pulls[near], "o", color=BEFORE, ms=5)
-        top.set_title(f"{posterior.load:.3g} N on the wheel")
-        top.set_ylabel("drawbar pull, N")
-        _bands(low, posterior.slip, np.rad2deg(prior.slope), np.rad2deg(posterior.slope))
-        low.set_ylabel("slope climbed, degrees")
-        if posterior.most_efficient is None:
-            last.text(0.5, 0.5, "no efficiency", ha="center", transform=last.transAxes)
-        else:
-            _bands(last, posterior.slip, prior.tractive_efficiency, posterior.tractive_efficiency)
-            pull = quantile_band(posterior.pull_efficiency).middle
-            last.plot(posterior.slip, pull, "--", color=AFTER, lw=1.2)
-            for end in THRESHOLDS:
-                last.axhline(end, color=UNCHANGED, lw=0.6, ls=":")
-            last.set_ylim(-0.25, 1.0)
-        last.set_ylabel("efficiency")
-        last.set_xlabel("slip")
-        for axes in panels[:, i]:
-            axes.plot(
-                found.measured_range.slip, [0.0, 0.0], color=BEFORE, lw=5, alpha=0.6,
-                transform=axes.get_xaxis_transform(), solid_capstyle="butt",
-            )  # fmt: skip
-    for row in panels[:2]:
-        ends = [end for axes in row for end in axes.get_ylim()]
-        for axes in row:
-            axes.set_ylim(min(ends), max(ends))
-
-
-def _bands(axes: Any, slip: Any, prior: Any, posterior: Any) -> None:
-    before, after = quantile_band(prior), quantile_band(posterior)
-    axes.fill_between(slip, before.lower, before.upper, color=PRIOR, lw=0)
-    axes.fill_between(slip, after.lower, after.upper, color=AFTER, alpha=0.45, lw=0)
-    axes.plot(slip, after.middle, color=AFTER, lw=1.4)
-    axes.axhline(0.0, color="black", lw=0.6)
-    axes.set_xlim(0.0, 1.03 * float(slip[-1]))

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.numerics.quantiles import quantile_band
-from soilml.report.figure_style import AFTER, PRIOR, UNCHANGED
+from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_band, format_quantity, format_range
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.traction.presentation import band_columns
 from soilml.traction.rover_report import RoverReport
 
@@ -48,7 +47,7 @@ def report_of_rover(found: RoverReport, title: str = "Rover on slopes") -> Repor
         verdict=_verdict(found, still),
         lines=list(_lines(found, still)),
         tables=[_slopes(found), *_wheels(found), *([found.laws.table()] if found.laws else [])],
-        pictures=[_picture(found, still)],
+        pictures=[_picture(found)],
         remarks=found.warnings,
         next_steps=["stay below the lower end of the band, or measure rows that narrow it"],
         status="does not move" if still > FEWEST else "moves",
@@ -88,7 +87,7 @@ def _lines(found: RoverReport, still: float) -> Iterator[str]:
         yield f"{share} of the soils do not let the rover move."
 
 
-def _slopes(found: RoverReport) -> Table:
+def _slopes(found: RoverReport) -> ReportTable:
     own, enough = found.performance, found.performance.climbed >= FEWEST
     slip, margin, work = (quantile_band(v) for v in (own.slip, own.margin, own.energy))
     blank = np.where(enough, 0.0, np.nan)
@@ -103,10 +102,10 @@ def _slopes(found: RoverReport) -> Table:
     ):
         ends = ((band.lower + hidden).tolist(), (band.upper + hidden).tolist())
         columns.append(Column(head, (band.middle + hidden).tolist(), unit, ends=ends))
-    return Table("Slopes", columns)
+    return ReportTable("Slopes", columns)
 
 
-def _wheels(found: RoverReport) -> Iterator[Table]:
+def _wheels(found: RoverReport) -> Iterator[ReportTable]:
     """Loads, torques and sinkages on the steepest of the slopes that most draws climb."""
     own = found.performance
     climbed = np.flatnonzero(own.climbed >= FEWEST)
@@ -115,7 +114,7 @@ def _wheels(found: RoverReport) -> Iterator[Table]:
     at = int(climbed[-1])
     torque = [quantile_band(own.torque[name][:, at]) for name in own.loads]
     sinkage = [quantile_band(own.sinkage[name][:, at]) for name in own.loads]
-    yield Table(
+    yield ReportTable(
         f"Wheels on {format_quantity(float(own.slope[at]), 'rad')}",
         [
             Column("wheel", list(own.loads)),
@@ -127,38 +126,14 @@ def _wheels(found: RoverReport) -> Iterator[Table]:
     )
 
 
-def _picture(found: RoverReport, still: float) -> Picture:
-    caption = "Lines: medians. Bands: 90 % of the soils that the rows allow."
-    draw = partial(_draw, found)
-    return Picture("The rover on slopes", draw, 2, 2, (10.0, 6.4), _verdict(found, still), caption)
-
-
-def _draw(found: RoverReport, panels: Any) -> None:
-    own, degrees = found.performance, np.rad2deg(found.performance.slope)
-    _draw_band(panels[0, 0], degrees, own.slip, "slip needed")
-    _draw_band(panels[0, 1], degrees, own.margin, "margin of pull, N")
-    panels[0, 1].axhline(0.0, color=UNCHANGED, lw=0.8)
-    _draw_band(panels[1, 0], degrees, own.energy, "work of the wheels, J/m")
-    for panel in panels.flat[:3]:
-        panel.set_xlabel("slope, degrees")
-    last = panels[1, 1]
-    known = [np.rad2deg(v[np.isfinite(v)]) for v in (found.prior_steepest, own.steepest_slope)]
-    bins = np.histogram_bin_edges(np.concatenate(known), 40) if any(map(len, known)) else 10
-    for values, color, label in zip(
-        known, (PRIOR, AFTER), ("before the rows", "after"), strict=True
-    ):
-        if len(values):
-            last.hist(values, bins, density=True, color=color, alpha=0.8, label=label)
-    last.set_xlabel("steepest slope, degrees")
-    last.set_yticks([])
-    last.legend()
-
-
-def _draw_band(panel: Any, x: Floats, draws: Floats, label: str) -> None:
-    """Median and 90 % band; slopes that fewer than half of the draws climb have no value."""
-    enough = np.mean(np.isfinite(draws), axis=0) >= FEWEST
-    band = quantile_band(draws[:, enough])
-    panel.fill_between(x[enough], band.lower, band.upper, color=AFTER, alpha=0.25, lw=0)
-    panel.plot(x[enough], band.middle, "o-", color=AFTER, ms=4)
-    panel.set_xlim(x[0], max(x[-1], x[0] + 1e-9))
-    panel.set_ylabel(label)
+def _picture(found: RoverReport) -> Picture:
+    enough = found.performance.climbed >= FEWEST
+    columns = {n: np.where(enough | n.startswith(("slope", "prob", "margin")), values, np.nan)
+               for n, values in rover_columns(found).items()}  # fmt: skip
+    return column_picture(
+        columns,
+        "slope_rad",
+        [("slip",), ("margin_N",), ("energy_J_per_m",), ("probability_climbed",)],
+        title="The rover on slopes",
+        caption="Lines: medians. Bands: 90 % of the soils that the rows allow.",
+    )

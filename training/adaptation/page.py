@@ -21,7 +21,8 @@ from soilml.report.numbers import (
     significant,
     with_unit,
 )
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from training.adaptation.judgement import JudgedRun, Judgement
 from training.adaptation.result import AdaptReport
 
@@ -80,11 +81,11 @@ def next_steps(report: AdaptReport) -> list[str]:
     return ["see gap/report.html, and measure the runs of gap/next_runs.csv"]
 
 
-def _tables(found: AdaptReport, judged: Judgement) -> list[Table]:
+def _tables(found: AdaptReport, judged: Judgement) -> list[ReportTable]:
     """Errors and log scores by channel and number of first rows; errors of a known soil."""
     own = found.frame_columns()
     tables = [
-        Table(
+        ReportTable(
             "Later rows, predicted from the first",
             [
                 Column("predicted", [channel_name(key) for key in own["predicted"]]),
@@ -104,7 +105,7 @@ def _tables(found: AdaptReport, judged: Judgement) -> list[Table]:
             Column("error before", before, units, digits=3),
             Column("after", after, units, digits=3, sizes=before),
         ]
-        tables.append(Table("Estimates against the known soil", columns))
+        tables.append(ReportTable("Estimates against the known soil", columns))
     return tables
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from soilml.quantities import QUANTITIES, SHEAR
 from soilml.remarks import Remark
 from soilml.report.figure_style import PRIOR, take_axes
-from soilml.report.report import MOST_LINES, Column, Picture, Report, Table
+from soilml.report.report import MOST_LINES, Picture, Report
+from soilml.report.tables import Column, ReportTable
 from training.benchmark.acceptance import (
     COHESION_RANGE,
     COVERAGE_RANGE,
@@ -141,7 +142,7 @@ def _csv_row(r: PairedResult, k: int) -> dict[str, Any]:
     }
 
 
-def benchmark_tables(results: Sequence[PairedResult]) -> Iterator[Table]:
+def benchmark_tables(results: Sequence[PairedResult]) -> Iterator[ReportTable]:
     """A table for each design, then those with an effect that no method models."""
     for same in _by_design([r for r in results if not r.effect]):
         yield _table(f"{same[0].design.description} ({same[0].sets} sets)", same)
@@ -159,9 +160,9 @@ def benchmark_tables(results: Sequence[PairedResult]) -> Iterator[Table]:
         yield _table(f"{title}models ({same[0].sets} sets)", same)
 
 
-def goals_table(found: Sequence[Goal]) -> Table:
+def goals_table(found: Sequence[Goal]) -> ReportTable:
     """The acceptance goals, each with the figure that was measured."""
-    return Table(
+    return ReportTable(
         "Acceptance goals",
         [
             Column("result", ["met" if goal.met else "MISSED" for goal in found]),
@@ -181,7 +182,7 @@ def _by_design(results: Sequence[PairedResult]) -> list[list[PairedResult]]:
     return list(groups.values())
 
 
-def _table(title: str, same: Sequence[PairedResult]) -> Table:
+def _table(title: str, same: Sequence[PairedResult]) -> ReportTable:
     """A row for each method; with an unmodelled effect the posterior is no limit."""
     columns = [Column("method", [r.method for r in same])]
     for k, (symbol, name) in enumerate(zip(SHEAR_SYMBOLS, SHEAR, strict=True)):
@@ -203,7 +204,7 @@ def _table(title: str, same: Sequence[PairedResult]) -> Table:
         Column("flagged", [r.flagged_fraction for r in same], "share", digits=2),
         Column("ms", [1e3 * r.estimates.seconds for r in same], digits=2),
     ]
-    return Table(title, columns)
+    return ReportTable(title, columns)
 
 
 #: Columns of the tables, explained.

@@ -13,7 +13,8 @@ from soilml.quantities import QUANTITIES
 from soilml.remarks import Remark
 from soilml.report.figure_style import UNCHANGED, short_label, take_axes
 from soilml.report.numbers import format_quantity
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from training.benchmark.acceptance import COVERAGE_RANGE
 from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import MethodResult
@@ -41,7 +42,7 @@ def csv_columns(scores: Sequence[MethodResult], names: Sequence[str]) -> dict[st
     )
 
 
-def _table(scores: Sequence[MethodResult], names: Sequence[str], size: int) -> Table:
+def _table(scores: Sequence[MethodResult], names: Sequence[str], size: int) -> ReportTable:
     """A row for each method, from sets of this size."""
     own = [score for score in scores if score.rows == size]
     columns = [Column("method", [s.method for s in own]), Column("inputs", [s.inputs for s in own])]
@@ -54,7 +55,7 @@ def _table(scores: Sequence[MethodResult], names: Sequence[str], size: int) -> T
         ]
     columns.append(Column("failed", [f"{s.failed}/{s.sets}" for s in own]))
     columns.append(Column("ms", [1e3 * s.estimates.seconds for s in own], digits=2))
-    return Table("single readings" if size == 1 else f"{size} readings of one soil", columns)
+    return ReportTable("single readings" if size == 1 else f"{size} readings of one soil", columns)
 
 
 def plot_comparison(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
@@ -14,9 +13,6 @@ from soilml.cli.options import (
     slip_limit,
 )
 from soilml.io.atomic_files import write_files
-
-if TYPE_CHECKING:
-    from soilml.systems.climbing.report import ClimbingReport
 
 #: Files of the folder of --out.
 FILES = ("report.html", "climb.json", "curve.csv", "climbs.csv")
@@ -86,10 +82,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
     from soilml.report.page import report_texts
-    from soilml.systems.climbing.presentation import report_of_climbs
-    from soilml.systems.climbing.report import climbing_report
-    from soilml.systems.climbing.rover_file import read_rover
-    from soilml.systems.climbing.tables import read_climb_data
+    from soilml.systems.rim_stress.report import climbing_report
+    from soilml.systems.rim_stress.rover_file import read_rover
+    from soilml.systems.rim_stress.tables import read_climb_data
 
     if args.out is not None:
         for library in ("jinja2", "matplotlib"):
@@ -97,47 +92,15 @@ def run(args: argparse.Namespace) -> int:
     file = read_rover(args.rover)
     data = read_climb_data(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
     with working(f"identifying from {len(data.climbs)} climbs"):
-        report = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
-    content = report.as_json()
-    page = report_of_climbs(
-        report, f"Slopes that {Path(args.rover).name} climbs, from {Path(args.runs).name}"
-    )
+        found = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
+    content = found.as_json()
+    page = found.report(f"Slopes that {Path(args.rover).name} climbs, from {Path(args.runs).name}")
     if args.out is not None:
         html, result, curve, climbs = FILES
         target = Path(args.out)
         contents = report_texts(page, origin_of(args), content, (html, result), target)
-        contents |= {target / curve: csv_text(_curve(report))}
-        contents |= {target / climbs: csv_text(_runs(report))}
+        contents |= {target / curve: csv_text(found.curve)}
+        contents |= {target / climbs: csv_text(found.climbs)}
         write_files(contents, folders=[args.out])
     show_result(page, content)
     return 0
-
-
-def _curve(report: ClimbingReport) -> dict[str, Any]:
-    pull, slope = report.pull, report.slope
-    return {
-        "slip": report.ability.slip,
-        "drawbar_pull_N": pull.middle,
-        "drawbar_pull_N_p05": pull.lower,
-        "drawbar_pull_N_p95": pull.upper,
-        "slope_rad": slope.middle,
-        "slope_rad_p05": slope.lower,
-        "slope_rad_p95": slope.upper,
-    }
-
-
-def _runs(report: ClimbingReport) -> dict[str, Any]:
-    from soilml.systems.climbing.report import SPEED_ERROR
-
-    climbs = report.data.climbs
-    return {
-        "run": [c.name for c in climbs],
-        "slope_rad": [c.slope for c in climbs],
-        "slip_front": [c.front.slip for c in climbs],
-        "slip_rear": [c.rear.slip for c in climbs],
-        "off_N": report.ground.residual,
-        "off_N_std": report.ground.residual_std,
-        "shear_modulus_m_if_speed_low": report.modulus_per_climb[-SPEED_ERROR],
-        "shear_modulus_m": report.modulus_per_climb[0.0],
-        "shear_modulus_m_if_speed_high": report.modulus_per_climb[SPEED_ERROR],
-    }

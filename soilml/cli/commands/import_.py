@@ -186,8 +186,8 @@ def _print_table(found: ImportedLog) -> None:
     if not is_terminal():
         write_stdout(csv_text(table.columns))
         return
-    from soilml.report.report import Table as ShownTable
+    from soilml.report.tables import ReportTable
 
     columns = {name: table[name][:_MOST_SHOWN] for name in _SHOWN if name in table}
     more = f"and {len(table) - _MOST_SHOWN} more\n" if len(table) > _MOST_SHOWN else ""
-    write_stdout(f"{ShownTable.of('rows', columns).text()}\n{more}")
+    write_stdout(f"{ReportTable.of('rows', columns).text()}\n{more}")

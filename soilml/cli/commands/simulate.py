@@ -17,7 +17,7 @@ from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.report import Picture
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
@@ -165,7 +165,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.balance:
         rows = balanced_rows(case, rows, settling)
-    write_columns(rows.columns, args.out, args.picture, _panels(rows, loads.size))
+    write_columns(rows.columns, args.out, args.picture, _picture(rows, loads.size))
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
     if failed:
@@ -176,12 +176,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _panels(rows: Table, loads: int) -> ColumnPanels:
+def _picture(rows: Table, loads: int) -> Picture:
     """Forces, sinkage, and what was asked for beside them, against slip, a line for each load."""
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.column_figure import column_picture
 
     panels: list[tuple[str, ...]] = [("torque_Nm",), ("drawbar_pull_N",), ("sinkage_m",)]
     panels += [(name,) for name in ("tractive_efficiency", "pull_efficiency") if name in rows]
     if "trim_rad" in rows:
         panels += [("front_share", "belt_share", "rear_share"), ("trim_rad",), ("rear_sinkage_m",)]
-    return ColumnPanels(rows.columns, "slip", panels, ("load_N",) if loads > 1 else ())
+    return column_picture(rows.columns, "slip", panels, ("load_N",) if loads > 1 else ())

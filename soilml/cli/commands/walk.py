@@ -70,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.options import parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
-    from soilml.systems.wheel_legs.walk_tables import walk_tables
+    from soilml.systems.wheel_legs.gaits import walk_tables
 
     feet = parse_names(args.foot) or []
     counts = parse_numbers("--legs", args.legs)
@@ -86,9 +86,9 @@ def run(args: argparse.Namespace) -> int:
     changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):
         found = walk_tables(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)
-    panels = None if args.picture is None else found.panels
+    drawn = None if args.picture is None else found.picture
     more = {} if args.over_time is None else {args.over_time: found.motion}
-    write_columns(found.columns, args.out, args.picture, panels, more)
+    write_columns(found.columns, args.out, args.picture, drawn, more)
     status = np.asarray(found.columns["status"])
     for reason in dict.fromkeys(status[status != "ok"].tolist()):
         tell(f"{np.sum(status == reason)} of {status.size} walks: {reason}")

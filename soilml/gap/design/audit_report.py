@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from soilml.report.figure_style import AFTER, UNCHANGED
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 
 if TYPE_CHECKING:
     from soilml.gap.design.identifiability import Audit
@@ -30,7 +31,7 @@ def audit_report(found: Audit, nameable_from: float) -> Report:
     if gaining:
         shown = gaining[:_MOST_RUNS]
         tables.append(
-            Table(
+            ReportTable(
                 "Runs to add",
                 [
                     Column("kind", [run.kind for run in shown]),
@@ -44,7 +45,7 @@ def audit_report(found: Audit, nameable_from: float) -> Report:
         units = [e.unit for e in effects]
         rivals = [", ".join(f"{n} {c:.2f}" for n, c in e.rivals[:1]) for e in effects]
         tables.append(
-            Table(
+            ReportTable(
                 "Effects",
                 [
                     Column("effect", [e.name for e in effects]),

@@ -9,13 +9,14 @@ import numpy as np
 
 from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.report.listed_explanations import needed_sizes
-from soilml.gap.report.pictures import bars_picture, map_picture
+from soilml.gap.report.pictures import bars_picture, map_picture, remainder_picture
 from soilml.gap.report.results import STATUSES, GapReport
 from soilml.io.text_tables import csv_text
 from soilml.remarks import texts
 from soilml.report.numbers import channel_name
 from soilml.report.page import Provenance, json_text, page, report_entry
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 
 if TYPE_CHECKING:
     pass
@@ -118,7 +119,7 @@ def shown_model(found: GapReport) -> str:
     return f"with {' + '.join(found.best_unclaimed) or 'the best candidate'}, which is not claimed"
 
 
-def _parameters(found: GapReport) -> Table | None:
+def _parameters(found: GapReport) -> ReportTable | None:
     """Soil and added effects, with the soil alone beside them where that differs."""
     columns = found.frame_columns()
     if not columns["parameter"]:
@@ -137,17 +138,17 @@ def _parameters(found: GapReport) -> Table | None:
         note = f"The soil {shown_model(found)}; 'soil alone' is biased where an effect is missing."
         if not found.effects and not found.best_unclaimed:
             note = "The soil beside a smooth discrepancy of unknown cause, and alone."
-    return Table.of_parameters("Soil and effects", columns, note, **more)
+    return ReportTable.of_parameters("Soil and effects", columns, note, **more)
 
 
-def _tables(found: GapReport) -> Iterator[Table]:
+def _tables(found: GapReport) -> Iterator[ReportTable]:
     changed = any(part.shrinks for part in found.gap.values())
     if found.status in _WITH_SUSPECTS and found.suspects:
         yield _suspects(found)
     if found.gap:
         yield _sizes(found, changed)
     if found.effects:
-        yield Table(
+        yield ReportTable(
             "Added effects",
             [
                 Column("effect", [e.name for e in found.effects]),
@@ -165,7 +166,7 @@ def _tables(found: GapReport) -> Iterator[Table]:
         yield _next_runs(found)
     if found.soil_tests:
         tests, units = found.soil_tests, [test.unit for test in found.soil_tests]
-        yield Table(
+        yield ReportTable(
             "Tests of the soil",
             [
                 Column("test", [t.label for t in tests]),
@@ -177,7 +178,7 @@ def _tables(found: GapReport) -> Iterator[Table]:
         )
     if found.candidates:
         shown = found.candidates[:_CANDIDATES]
-        yield Table(
+        yield ReportTable(
             "Candidates",
             [
                 Column("effects", [" + ".join(c.effects) for c in shown]),
@@ -191,7 +192,7 @@ def _tables(found: GapReport) -> Iterator[Table]:
         yield _components(found)
 
 
-def _suspects(found: GapReport) -> Table:
+def _suspects(found: GapReport) -> ReportTable:
     shown = found.suspects[:_LISTED]
     given = ", and if ".join(texts(found.conditions))
     columns = [
@@ -208,10 +209,10 @@ def _suspects(found: GapReport) -> Table:
     if any(s.times_usual for s in shown):
         columns.append(Column("needs", [needed_sizes(s) for s in shown]))
     note = f"Probabilities are valid if {given}." if given else ""
-    return Table("Suspects", columns, note)
+    return ReportTable("Suspects", columns, note)
 
 
-def _sizes(found: GapReport, changed: bool) -> Table:
+def _sizes(found: GapReport, changed: bool) -> ReportTable:
     """Mean squared residuals by part of the rows and channel, before and after."""
     rows = [
         (PARTS.get(key, key.replace("_", " ")), name, before, after, part)
@@ -232,16 +233,16 @@ def _sizes(found: GapReport, changed: bool) -> Table:
     columns.append(Column("readings", [row[4].readings for row in rows]))
     columns.append(Column("what", [row[4].description for row in rows]))
     note = "Mean squared residual in sigma; noise alone gives 1. Blank: not smaller after."
-    return Table("Size of the gap", columns, note)
+    return ReportTable("Size of the gap", columns, note)
 
 
-def _discrepancy(found: GapReport) -> Table:
+def _discrepancy(found: GapReport) -> ReportTable:
     left = found.discrepancy
     cause = ""
     if found.remainder_cause is not None:
         chance = found.remainder_cause.probability
         cause = f" {found.remainder_cause.remark().text} Probability of this stage: {chance:.2f}."
-    return Table(
+    return ReportTable(
         "Remaining disagreement",
         [
             Column("channel", [channel_name(name) for name in left]),
@@ -255,7 +256,7 @@ def _discrepancy(found: GapReport) -> Table:
     )  # fmt: skip
 
 
-def _next_runs(found: GapReport) -> Table:
+def _next_runs(found: GapReport) -> ReportTable:
     runs = found.next_runs
     sigma = [min(run.discrimination, _MOST_SIGMA) for run in runs]
     columns = [Column("kind", [run.kind for run in runs]), Column("sigma", sigma, digits=3)]
@@ -265,10 +266,10 @@ def _next_runs(found: GapReport) -> Table:
     first, *others = [" + ".join(names) or "the soil alone" for names in runs[0].compared or [()]]
     apart = f" of {first} from {', '.join(others)}" if others else ""
     note = f"Expected discrimination{apart}, at most 10 stated; above 3 sigma a run decides."
-    return Table("Next runs", columns, note)
+    return ReportTable("Next runs", columns, note)
 
 
-def _components(found: GapReport) -> Table:
+def _components(found: GapReport) -> ReportTable:
     names, values, units = [], [], []
     for key, value in found.variance_components.items():
         scale = key.removeprefix("noise_scale_")
@@ -277,7 +278,9 @@ def _components(found: GapReport) -> Table:
         values.append(value)
         units.append(unit)
     columns = [Column("quantity", names), Column("size", values, units, digits=2)]
-    return Table("Estimated variation", columns, "It is part of the noise throughout this report.")
+    return ReportTable(
+        "Estimated variation", columns, "It is part of the noise throughout this report."
+    )
 
 
 def _pictures(found: GapReport) -> Iterator[Picture]:
@@ -287,6 +290,8 @@ def _pictures(found: GapReport) -> Iterator[Picture]:
         yield map_picture(found)
     if found.gap:
         yield bars_picture(found, PARTS)
+    if found.model.remainder is not None:
+        yield remainder_picture(found.model.remainder)
 
 
 def gap_files(
@@ -303,9 +308,8 @@ def gap_files(
     report = gap_report(found, f"Gap report: {model_name} against {runs_name}")
     comments = [found.sentence]
     if count := len(found.model.explanations):
-        comments += [
-            f"{count} explanations with their weights follow; every prediction mixes them."
-        ]
+        which = "One explanation follows" if count == 1 else f"{count} explanations follow"
+        comments += [f"{which}, with weights; every prediction mixes them."]
     return {
         "report.html": page(report, origin),
         "gap.json": json_text(found.as_json() | {"report": report_entry(report, origin)}),

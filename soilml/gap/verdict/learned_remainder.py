@@ -60,7 +60,7 @@ def learned_remainder(
     columns = np.concatenate([own for _, own in blanks], axis=1)
     whiten = terms.whiten(terms.without_discrepancy(at), node.outliers)
     white = np.asarray(whiten @ columns)
-    mean_residual = sum(w * one.linear.residual for w, one in parts) / total
+    mean_residual = np.sum([w * one.linear.residual for w, one in parts], axis=0) / total
     residual = np.asarray(whiten @ mean_residual)
     information = white.T @ white
     spread = np.linalg.inv(np.eye(len(information)) + information)
@@ -70,12 +70,12 @@ def learned_remainder(
     of_tests = fit.soil_tests.rates(fit.x)
     root = np.linalg.inv(np.linalg.cholesky(normal + of_tests.T @ of_tests)).T
     moved = spread @ (white.T @ (whiten @ fit.derivatives)) @ root
-    parts, first = [], 0
+    written, first = [], 0
     for blank, own in blanks:
         these = slice(first, first + own.shape[1])
         first = these.stop
         known = _factor(np.eye(own.shape[1]) - spread[these, these])
-        parts.append(
+        written.append(
             replace(
                 blank,
                 mean=tuple(mean[these].round(DECIMALS).tolist()),
@@ -84,7 +84,7 @@ def learned_remainder(
             )
         )
     earlier = () if case.remainder is None else case.remainder.parts
-    return Remainder((*earlier, *parts))
+    return Remainder((*earlier, *written))
 
 
 def _blank_parts(

@@ -16,7 +16,8 @@ from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import SoilTest
 from soilml.remarks import Remark
 from soilml.report.figure_style import short_label
-from soilml.report.report import Column, Picture, Report, Table
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
 
 LISTED = 6  # Tests that a legend lists
@@ -77,7 +78,7 @@ class BevameterResult(Result):
             kind="bevameter",
             verdict=verdict,
             lines=["The shear modulus was not measured."] if open_ else [],
-            tables=[Table("Soil by tests", columns, "Elsewhere: at another place of the soil.")],
+            tables=[ReportTable("Soil by tests", columns, "Elsewhere: another place.")],
             pictures=[
                 Picture(
                     "Tests", partial(_draw, self), 1, _panels(self), size, verdict,

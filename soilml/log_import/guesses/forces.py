@@ -148,9 +148,11 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
     for role, address, others in (("drawbar_pull", pair[0], forces), ("torque", pair[1], moments)):
         if address and role not in named and any(c.address == address for c in others):
             given[role] = address
-            reasons[role] = "of its kind it varies most as the wheel drives"
-            if pair[2] >= _TOGETHER_FROM:
-                reasons[role] = "pull and torque vary together"
+            reasons[role] = "pull and torque vary together"
+            if pair[2] < _TOGETHER_FROM:
+                reasons[role] = Marked(
+                    "CHANGE: of its kind it varies most as the wheel drives, which says little"
+                )
     known = [c.address for c in moments]
     if len(known) == 1 and given.get("torque") == known[0] and pair[2] < _TOGETHER_FROM:
         given.pop("torque"), reasons.pop("torque")

@@ -11,16 +11,17 @@ import numpy as np
 from soilml.quantities import COLUMNS
 from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
 from soilml.report.numbers import channel_name, channel_unit, pretty, with_unit
-from soilml.report.report import Column, Picture, Table
+from soilml.report.report import Picture
+from soilml.report.tables import Column, ReportTable
 from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
 SIDE = 4.2  # Width and height of a panel, inches
 
 
-def regression_table(found: Mapping[str, ChannelRegression], source: str) -> Table:
+def regression_table(found: Mapping[str, ChannelRegression], source: str) -> ReportTable:
     """A row for each channel: the line of measured on predicted values."""
     lines = [one.line for one in found.values()]
-    return Table(
+    return ReportTable(
         f"Measured on predicted, rows of {source}",
         [
             Column("channel", [channel_name(key) for key in found]),

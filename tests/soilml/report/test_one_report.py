@@ -11,7 +11,8 @@ import pytest
 from soilml.remarks import Remark
 from soilml.report.numbers import format_quantity, pretty
 from soilml.report.page import Provenance, json_text, page, report_entry
-from soilml.report.report import Column, Picture, Report, Table, by_group
+from soilml.report.report import Picture, Report, by_group
+from soilml.report.tables import Column, ReportTable
 
 EVIL = '<script>alert("x")</script>&\'$\\frac{'
 VOID = {"meta", "link", "br", "img", "hr", "input"}
@@ -24,7 +25,7 @@ def draw(axes):
 
 
 def report(**changes):
-    soil = Table(
+    soil = ReportTable(
         "Soil",
         [
             Column("parameter", ["cohesion c", "frictional modulus of sinkage k_phi"]),
@@ -37,7 +38,7 @@ def report(**changes):
             ),
         ],
     )
-    curve = Table.of("Curve", {"slip": [0.1, 0.3], "sinkage_m": [0.0123, 0.0234]})
+    curve = ReportTable.of("Curve", {"slip": [0.1, 0.3], "sinkage_m": [0.0123, 0.0234]})
     whole = Report(
         kind="identify",
         verdict="The model fits these rows; 2 rows determine the soil.",
@@ -113,7 +114,7 @@ def test_a_terminal_shows_what_matters_and_the_rest_with_details():
     assert "12.3" in whole and "sinkage, mm" in whole and "- one" in whole and "! a note" in whole
     many = [Remark(f"{i}", f"warning {i}") for i in range(9)]
     assert report(remarks=many).text().count("! warning") == 5
-    wide = Table.of("wide", {f"column_{i}_N": [123.0] for i in range(20)})
+    wide = ReportTable.of("wide", {f"column_{i}_N": [123.0] for i in range(20)})
     lines = wide.text().splitlines()
     assert max(map(len, lines)) <= 80 and lines[3].startswith("not shown here: ")
 
@@ -127,7 +128,7 @@ def test_a_page_is_self_contained_follows_dark_mode_and_escapes_all_text():
         remarks=[Remark("x", EVIL)],
         details=[(EVIL, [EVIL])],
         next_steps=[EVIL],
-        tables=[Table(EVIL, [Column(EVIL, [EVIL])], EVIL)],
+        tables=[ReportTable(EVIL, [Column(EVIL, [EVIL])], EVIL)],
         notation=[(EVIL, EVIL)],
     )
     html = page(evil, ORIGIN)
@@ -151,5 +152,5 @@ def test_groups_of_rows_are_one_report():
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 0.0, -1e-12, 1e12])
 def test_odd_numbers_are_shown(value):
-    table = Table("odd", [Column("x", [value], "Pa", [value], ([value], [value]))])
+    table = ReportTable("odd", [Column("x", [value], "Pa", [value], ([value], [value]))])
     assert table.text() and isinstance(format_quantity(value, "rad", value), str)

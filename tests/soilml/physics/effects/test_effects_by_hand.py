@@ -504,9 +504,8 @@ def test_stresses_are_those_of_the_true_sinkage_whatever_the_sensor_says():
 
 
 def test_a_soft_crust_takes_a_constant_pressure_where_the_ground_bears_much():
-    before, scene = sheared_by(np.asarray([0.001, 0.01]))
-    pressure = np.asarray(before.normal)
+    before, scene = pressed([100.0, 2e3, 1e6])
     found = EFFECTS["soft-crust"](deficit=2000.0).on_stress(before, scene)
-    np.testing.assert_allclose(found.normal, pressure - 2000.0 * -np.expm1(-pressure / 2000.0))
-    hardly = EFFECTS["soft-crust"](deficit=50.0).on_stress(before, scene)
-    np.testing.assert_allclose(hardly.normal, pressure - 50.0, rtol=1e-6)
+    lost = 2000.0 * np.asarray([1 - np.exp(-0.05), 1 - np.exp(-1.0), 1.0])
+    np.testing.assert_allclose(found.normal, [100.0, 2e3, 1e6] - lost, rtol=1e-12)
+    np.testing.assert_allclose(found.shear, strength(found), rtol=1e-12)
