@@ -12,6 +12,7 @@ sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "tests")]
 MODULES = (
     "forward_model",
     "training_bench",
+    "peers",
     "sets",
     "faults_on_board",
     "model_errors",

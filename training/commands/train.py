@@ -11,8 +11,8 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 
 DESCRIPTION = """\
-Train the regressors of SPEC.toml on DATA.parquet, calibrate their uncertainty
-on held-out rows, and export the result as one ONNX file.
+Train the regressors of SPEC.toml on all rows of DATA.parquet, calibrate their
+uncertainty by fits without each row's run, and export one ONNX file.
 
   soilml train spec.toml data.parquet wheel.onnx
   soilml train fused data.parquet wheel.onnx
@@ -32,7 +32,7 @@ contains
   type = "fixed-size-lssvm"          # centres; gamma, width (tuned if absent)
   centres = 150                      # features = [...]: a subset of the spec's
   [[regressor]]
-  type = "mlp"                       # hidden = [64, 64], epochs, batch, ...
+  type = "mlp"                       # hidden = [32, 32], epochs, steps, ...
   [[regressor]]
   type = "linear"
   [[regressor]]
@@ -144,9 +144,7 @@ def _from_data(args: argparse.Namespace) -> int:
     ]
     labels = [QUANTITIES[name].symbol if name in QUANTITIES else name for name in spec.targets]
     head = ("", *[f"RMSE {n}" for n in labels], *[f"cover {n}" for n in labels])
-    kind = "held-out rows"
-    if trained.left_out is not None:
-        kind = "rows, each left out, on which the intervals are calibrated too"
+    kind = "rows, each by a fit without its run, on which the intervals are calibrated too"
     tell(
         f"On {trained.scores['estimator'].rows} {kind}: RMSE over the prior's standard "
         "deviation, and coverage of 90 % intervals\n"
