@@ -93,7 +93,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    from soilml.cli.options import available_effects, parse_costs, parse_names
+    from soilml.cli.option_values import parse_costs, parse_names
+    from soilml.cli.options import available_effects
     from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows

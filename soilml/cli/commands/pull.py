@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from soilml.cli.option_values import slip_limit
 from soilml.cli.options import (
     InputFile,
     add_by_option,
@@ -18,7 +19,6 @@ from soilml.cli.options import (
     add_report_option,
     add_row_options,
     gravity_change,
-    slip_limit,
 )
 from soilml.errors import InputError
 
@@ -107,7 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Predict and write the results."""
-    from soilml.cli.options import available_effects, parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
+    from soilml.cli.options import available_effects
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
@@ -159,7 +160,7 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
     """The same for a whole rover."""
     import numpy as np
 
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.cli.tables import result_by_group
     from soilml.traction.rover_report import rover_report
 
