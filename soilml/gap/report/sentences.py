@@ -151,7 +151,7 @@ def _no_gap(report: GapReport) -> str:
             f"Model and measurements agree within the noise{declared}: mean squared residual "
             f"{residual}, {p}"
         )
-    return f"No gap beyond noise{beside}, granting the soil {_scatter(report.misfit)}: {p}"
+    return f"No gap beyond noise{beside}, with {_scatter(report.misfit)}: {p}"
 
 
 def _scatter(found: NoiseAgreement) -> str:

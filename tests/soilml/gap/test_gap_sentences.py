@@ -64,7 +64,7 @@ def test_agreement_is_within_the_noise_and_what_was_declared():
 def test_granted_scatter_is_named_with_its_size():
     granted = "a scatter of 0.60 deg and 6 % from run to run"
     assert said("no-gap", misfit=SCATTER) == (
-        f"No gap beyond noise, granting the soil {granted}: probability of a gap 0.12."
+        f"No gap beyond noise, with {granted}: probability of a gap 0.12."
     )
     assert lines("no-gap", misfit=SCATTER)["tried"] == (
         f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
