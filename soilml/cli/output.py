@@ -62,7 +62,7 @@ def write_rows(
     """
     write_set({out: partial(save_columns, columns), picture: report.pictures[0].save})
     content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, written=out is not None)
+    show_rows(report, columns, content, out)
 
 
 def write_set(contents: Mapping[str | None, Content]) -> None:
@@ -103,17 +103,19 @@ def show_result(report: Report, content: Mapping[str, Any]) -> None:
     show((replace(report, remarks=()) if SCREEN.quiet else report).text(SCREEN.verbose))
 
 
-def show_rows(report: Report, columns: Mapping[str, Any], content: Any, written: bool) -> None:
+def show_rows(
+    report: Report, columns: Mapping[str, Any], content: Any, out: str | None = None
+) -> None:
     """Print CSV into a pipe, with remarks on standard error; else as `show_result`.
 
-    written: Whether the columns are in a file already.
+    out: File that has the columns already, which is then all that is said beside the remarks.
     """
-    if written or SCREEN.form_of_rows() != "csv":
+    if out is None and SCREEN.form_of_rows() != "csv":
         show_result(report, content)
         return
-    tell_columns(columns, None)
-    for remark in report.remarks:
-        tell(f"! {remark}")
+    tell_columns(columns, out)
+    for text in [*(f"! {remark}" for remark in report.remarks), *report.next_steps]:
+        tell(text)
 
 
 def show(text: str) -> None:

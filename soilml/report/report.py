@@ -43,12 +43,15 @@ class Picture:
     whole: bool = False
 
     def plot(self, ax: Any = None) -> Any:
-        """Draw it into axes (rows, columns) of matplotlib, by default into a new figure."""
+        """Draw it into axes of matplotlib, by default those of a new figure; returns the axes.
+
+        They are (rows, columns), or (panels,) where there is one row or one column.
+        """
         from soilml.report.figure_style import take_axes
 
         axes = take_axes(ax, self.rows, self.columns, self.size)
         self.draw(axes)
-        return axes
+        return axes.ravel() if 1 in axes.shape else axes
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write it as a PNG file."""

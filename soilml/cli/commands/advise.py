@@ -195,7 +195,7 @@ def run(args: argparse.Namespace) -> int:
     columns = advice_columns(advice, rows)
     write_set({args.out: partial(save_columns, columns), args.picture: report.pictures[0].save})
     content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, args.out is not None)
+    show_rows(report, columns, content, args.out)
     return 0
 
 

@@ -207,7 +207,7 @@ def run(args: argparse.Namespace) -> int:
         lambda: (report, {"columns": content, "notes": notes}),
         [str(e.path) for e in estimators],
     )
-    show_rows(report, columns, content, args.out is not None)
+    show_rows(report, columns, content, args.out)
     return 0
 
 

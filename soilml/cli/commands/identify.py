@@ -60,10 +60,10 @@ predicted values:
 
   soilml identify MODEL.toml RUNS.csv --by run --mean --fresh MORE.csv
 
-The result is JSON in SI units, in the file of --out or in a pipe; a terminal
-shows a table. --report writes a page to read and print. `posterior/prior`
-(remaining_fraction in the file) is the width of the estimate divided by that of the
-prior. std is the expected error. Read the warnings.
+The verdict comes first; -v shows all of it, and --out FILE.json has the result
+in SI units. --report writes a page to read and print. `left of prior`
+(remaining_fraction in the file) is the width of the estimate divided by that of
+the prior; +- is the expected error. Read the warnings.
 """
 
 

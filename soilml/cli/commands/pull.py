@@ -41,16 +41,17 @@ with 90 % bands.
   soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
 
 RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm and, where
-measured, drawbar_pull_N and sinkage_m. Samples of the soil are drawn from the
-posterior given the rows (--free names its parameters), or from the estimate of
-a trained model (--from), and the model computes the pull of each. All rows are
-assumed to come from one soil, unless --by run asks for a result for each run.
+measured, drawbar_pull_N and sinkage_m. The soil (--free names its parameters),
+effects that the model may lack, and its smooth error are drawn together from
+one posterior given the rows, or the soil from the estimate of a trained model
+(--from). All rows are assumed to come from one soil, unless --by run asks for a
+result for each run. A MODEL.toml of gap with several [[explanation]] predicts
+by their mixture.
 
 Loads are those of the rows, unless --load names others. Slips reach 0.6, the
 highest measured slip, or --slip-limit. On a slope, a wheel carries the
 component of its load normal to the slope and pulls the component along it. The
-bands include errors of the model where [discrepancy] states that of the pull,
-but neither load transfer nor side slopes.
+bands include errors of the model, but neither load transfer nor side slopes.
 
 A model file with [rover] answers for the whole rover, unless --load or --gear
 names one wheel: the slip that slopes need, the margin of pull, the work of the
@@ -211,7 +212,7 @@ def _write_results(
 
     import numpy as np
 
-    from soilml.cli.output import show_rows, write_with_report
+    from soilml.cli.output import show_result, show_rows, write_with_report
     from soilml.cli.tables import tell_failures
     from soilml.io.text_tables import csv_text
     from soilml.report.report import by_group
@@ -239,5 +240,8 @@ def _write_results(
         args.picture: report.pictures[0].save,
     }
     write_with_report(args, files, lambda: (report, content))
-    show_rows(report, columns, content, args.out is not None or args.report is not None)
+    if args.out is None and args.report is None:
+        show_rows(report, columns, content)
+    else:
+        show_result(report, content)
     tell_failures(args.by, failed)

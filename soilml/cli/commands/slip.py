@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
     from soilml.cli.options import available_effects, is_json
-    from soilml.cli.output import show_rows, write_set
+    from soilml.cli.output import show_result, show_rows, write_set
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
@@ -72,5 +72,8 @@ def run(args: argparse.Namespace) -> int:
     whole = args.out is not None and is_json(args)
     table = json_text(content) if whole else csv_text(columns)
     write_set({args.out: table, args.picture: report.pictures[0].save})
-    show_rows(report, columns, content, args.out is not None)
+    if args.out is None:
+        show_rows(report, columns, content)
+    else:
+        show_result(report, content)
     return 0

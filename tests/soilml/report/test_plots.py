@@ -92,14 +92,14 @@ def of_plates_and_shear(case):
 @pytest.mark.parametrize(
     ("make", "shape", "said"),
     [
-        (fit, (2, 1), "residual, sigma"),
-        (estimate, (3, 1), "friction angle φ, °"),
-        (gap, (1, 1), "fitted rows"),
-        (pull, (1, 3), "drawbar pull, N"),
+        (fit, (2,), "residual, sigma"),
+        (estimate, (3,), "friction angle φ, °"),
+        (gap, (1,), "fitted rows"),
+        (pull, (3,), "drawbar pull, N"),
         (rover, (2, 2), "margin, N"),
-        (imported, (1, 1), "torque / (load × radius)"),
-        (audited, (1, 1), "that separates it from its nearest rival"),
-        (of_plates_and_shear, (1, 3), "shear strength, kPa"),
+        (imported, (1,), "torque / (load × radius)"),
+        (audited, (1,), "that separates it from its nearest rival"),
+        (of_plates_and_shear, (3,), "shear strength, kPa"),
     ],
 )
 def test_results_draw_themselves(make, shape, said, case):
