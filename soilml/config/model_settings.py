@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import MISSING, fields, replace
-from typing import Any
+from dataclasses import replace
 
 from soilml.errors import InputError, did_you_mean
-from soilml.io.declared_settings import in_si, take_quantity
+from soilml.io.declared_settings import in_si, take_declared, take_quantity
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared, with_values
@@ -38,8 +37,7 @@ def take_gear(settings: Settings) -> Gear:
         settings.fail(
             f"type is {gear_type!r}; {did_you_mean(gear_type, GEARS)}there are: {', '.join(GEARS)}"
         )
-    gear: Gear = take_instance(GEARS[gear_type], settings)
-    settings.finish()
+    gear: Gear = take_declared(GEARS[gear_type], settings)
     return gear
 
 
@@ -60,11 +58,7 @@ def take_gears(
             named.fail(f"{name!r} is no name of a gear; needed are letters, digits, - and _")
         if name in tables:
             named.fail(f"{name!r} is the name of the gear in [gear]; take another one")
-        tables[name] = Settings(
-            named.take(name, dict, f"a table [gears.{name}]"),
-            f"{settings.where} [gears.{name}]",
-            settings.files,
-        )
+        tables[name] = named.table(name)
     gears, priors, suspected = {}, {}, []
     for name, own in tables.items():
         entries = own.tables("effect")
@@ -93,33 +87,11 @@ def take_effects(
         if entry.take(SUSPECTED, bool, "true or false", False):
             suspected.append(name)
         try:
-            model = model + take_instance(effects[name], entry)
+            model = model + take_declared(effects[name], entry)
         except InputError as error:
             entry.fail(str(error).removeprefix(f"{entry.where}: "))
-        entry.finish()
         prior |= {f"{name}.{k}": v for k, v in take_priors(priors, effects[name]).items()}
     return model, prior, tuple(suspected)
-
-
-def take_instance(cls: type, settings: Settings) -> Any:
-    """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
-    parameters = declared(cls)
-    values = {
-        f.name: settings.text(f.name)
-        if isinstance(f.default, str)
-        else take_quantity(settings, f.name, parameters[f.name].unit)
-        if f.name in parameters
-        else settings.number(f.name)
-        for f in fields(cls)
-        if f.name in settings or f.default is MISSING
-    }
-    settings.permit(f.name for f in fields(cls))
-    try:
-        made = cls(**values)
-    except InputError as error:
-        settings.fail(str(error))
-    check(made, f"{settings.where}: ")
-    return made
 
 
 def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTest, ...]]:
@@ -141,7 +113,7 @@ def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTes
         made = with_values(base, values)
         check(made, f"{settings.where}: ")
     else:
-        made = take_instance(Soil, settings)
+        made = take_declared(Soil, settings)
     settings.finish()
     return made, take_priors(priors, Soil), tests
 
@@ -153,9 +125,7 @@ def _take_test(settings: Settings) -> SoilTest:
             "needed is pressure (Pa), with plate_width and sinkage, or strength (Pa), with "
             "normal_stress; and scatter, such as '15 %'"
         )
-    made: SoilTest = take_instance(kinds[0], settings)
-    settings.finish()
-    return made
+    return take_declared(kinds[0], settings)
 
 
 def take_prior(settings: Settings, key: str, *, unit: str = "1", about_zero: bool = False) -> Prior:

@@ -38,7 +38,6 @@ from soilml.gap.verdict.agreement import (
 )
 from soilml.gap.verdict.cause_of_remainder import described_cause
 from soilml.gap.verdict.decision import (
-    NO_GAP,
     decide,
     ranked_sets,
     reasons,
@@ -80,6 +79,7 @@ from soilml.gap.verdict.remainder import (
     discrepancy_map,
     remaining_discrepancy,
 )
+from soilml.inference import constants
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
 from soilml.io.read_table import Rows, as_table
@@ -274,7 +274,7 @@ def _build_report(
 ) -> GapReport:
     """Decide the status, then compute the entries of the report."""
     gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
-    quiet = posterior.no_gap > NO_GAP
+    quiet = posterior.no_gap > constants.NO_GAP
     alone, _ = plain_fits(posterior, None)
     opened = opened_priors(posterior)
     obstacles = (*opened, *checks.naming_obstacles)

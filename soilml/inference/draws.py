@@ -15,7 +15,7 @@ from soilml.quantities import Z_90
 
 #: Draws of a posterior, hyperparameters that are drawn of a component at most, draws of each at
 #: least, and proposals of each draw.
-DRAWS, HYPER_DRAWS, FEWEST, PROPOSALS = 600, 6, 8, 2
+DRAWS, HYPER_DRAWS, FEWEST, PROPOSALS = 600, 24, 8, 2
 #: Factor on the standard deviations of proposals, which are of Student's t with so many degrees.
 PROPOSAL_WIDTH, PROPOSAL_DEGREES = 1.15, 5.0
 #: Rounds in which proposals outside of the bounds are drawn again, before they are clipped.

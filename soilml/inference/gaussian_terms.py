@@ -5,7 +5,8 @@ r"""All that is no effect, as one Gaussian: discrepancy, scatter from run to run
     e_c \sim N(0, s_c^2 D_c R_\rho D_c)
 
 The columns U are eigenfunctions of a smooth discrepancy in slip and log load, of each channel; and
-the change of each reading of each run with a unit of friction angle and of the bearing moduli.
+the change of each reading of each run with a unit of friction angle and of the bearing moduli. For
+the soil, errors that all rows share are further columns (`shared_columns`).
 D has the declared standard deviations, R the correlation of neighbouring samples of a run.
 """
 
@@ -307,6 +308,7 @@ def gaussian_terms(
 
     scatter (m, 2): Change of each reading by one unit of scatter; see `scatter_columns`.
     fixed (m, k): Further columns of unit variance: errors that all rows share.
+    inner: Columns (m, q) of further discrepancies, each with an amplitude of its own.
     """
     process = discrepancy_process(readings, case.discrepancy, least_eigenvalue=LEAST_EIGENVALUE)
     channels = len(readings.channels)

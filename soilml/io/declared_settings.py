@@ -219,6 +219,8 @@ def _taken(settings: Settings, key: str, hint: Any, marks: tuple[Any, ...], kind
         return named_tables(settings, key, inner[1], kind)
     if hint is bool:
         return settings.take(key, bool, "true or false")
+    if hint is float:
+        return settings.number(key)
     return settings.count(key) if hint is int else settings.text(key)
 
 

@@ -195,14 +195,18 @@ class ReportTable:
                     own,
                     values=_chained(c.values for c in every),
                     unit=own.unit if isinstance(own.unit, str) else _chained(units),
-                    std=None if own.std is None else _chained(c.std or () for c in every),
+                    std=None
+                    if own.std is None
+                    else _chained(list(c.std) for c in every if c.std is not None),
                     ends=None
                     if own.ends is None
                     else (
                         _chained(c.ends[0] for c in every if c.ends),
                         _chained(c.ends[1] for c in every if c.ends),
                     ),
-                    sizes=None if own.sizes is None else _chained(c.sizes or () for c in every),
+                    sizes=None
+                    if own.sizes is None
+                    else _chained(list(c.sizes) for c in every if c.sizes is not None),
                 )
             )
         return replace(first, columns=columns)

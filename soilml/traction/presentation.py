@@ -15,7 +15,7 @@ from soilml.report.column_figure import column_picture
 from soilml.report.numbers import format_band, format_quantity, format_range, significant
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
-from soilml.traction.by_load import LoadPrediction
+from soilml.traction.by_load import SAME_LOAD, LoadPrediction
 from soilml.traction.pull_and_slope import Traction
 from soilml.traction.report import PullReport
 
@@ -125,15 +125,13 @@ def _every_second(found: PullReport) -> Any:
 def _sentence(one: LoadPrediction) -> str:
     """Largest pull and steepest slope under a load, with 90 % bands where the rows tell them."""
     known = one.posterior
+    unknown = {"N": "an unknown force", "rad": "an unknown slope"}
     said = [
-        "an unknown slope" if unit == "rad" else "an unknown force"
-        if share > NOT_IDENTIFIED_ABOVE
-        else format_band(*_ends(draws), unit)
+        unknown[unit] if share > NOT_IDENTIFIED_ABOVE else format_band(*_ends(draws), unit)
         for draws, unit, share in zip(
-            (known.largest_pull, known.steepest_slope), ("N", "rad"), one.remaining_fraction,
-            strict=True,
+            (known.largest_pull, known.steepest_slope), unknown, one.remaining_fraction, strict=True
         )
-    ]  # fmt: skip
+    ]
     return f"At {significant(known.load)} N the wheel pulls {said[0]} at most and climbs {said[1]}."
 
 
@@ -176,9 +174,12 @@ def _by_load(found: PullReport) -> ReportTable:
 
 
 def _picture(found: PullReport) -> Picture:
-    slip, _, pull = found.measured_pull
+    slip, load, pull = found.measured_pull
     columns = pull_columns(found)
-    if len(found.by_load) > 1:
+    if len(found.by_load) == 1:
+        near = np.abs(load / found.by_load[0].posterior.load - 1.0) < SAME_LOAD
+        slip, pull = slip[near], pull[near]
+    else:
         columns = {name: values for name, values in columns.items() if "_prior" not in name}
     panels = [("drawbar_pull_N",), ("slope_rad",), ("tractive_efficiency", "pull_efficiency")]
     slips = format_range(*found.measured_range.slip, digits=2)

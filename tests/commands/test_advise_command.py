@@ -58,43 +58,6 @@ def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
     assert float(by["row 2 of 2"]["all_left"]) < float(by["row 1 of 2"]["all_left"])
 
 
-@pytest.mark.parametrize(
-    ("command", "said"),
-    [
-        (["model.toml"], "give --load 30,60,120"),
-        (
-            ["model.toml", "runs.csv", "--count", "9"],
-            "--count: '9' given; needed is a whole number",
-        ),
-        (["model.toml", "runs.csv", "--slip", "x"], "--slip is 'x'; needed is start:stop:count"),
-        (["model.toml", "runs.csv", "--slip", "1.5"], "slip 1.5 cannot be driven"),
-        (["model.toml", "--load", "0"], "load 0 N cannot be driven"),
-        (["model.toml", "--load", "1:100:2000"], "too many to try; at most 1000"),
-        (["model.toml", "--load", "1e6"], "try smaller loads"),
-        (["model.toml", "--load", "60", "--free", "phi"], "'phi': no such parameter"),
-        (["model.toml", "--load", "60", "--where", "run=a"], "--where selects rows of RUNS.csv"),
-        (["model.toml", "none.csv"], "none.csv: there is no such file"),
-        (["silent.toml", "--load", "60"], "declare it in [noise]"),
-        (["silent.toml", "runs.csv"], "declare it in [noise]"),
-        (["model.toml", "runs.csv", "--picture", "o.svg"], "must end in .png"),
-        (["model.toml", "runs.csv", "--out", "runs.csv"], "would be overwritten"),
-        (["speed.toml", "--load", "60"], "speed"),
-    ],
-)
-def test_bad_input_is_one_line_and_nothing_is_written(folder, capsys, command, said):
-    (folder / "silent.toml").write_text(MODEL.split("[noise]")[0])
-    rate = '[[effect]]\nname = "rate"\n'
-    (folder / "speed.toml").write_text(MODEL + rate)
-    before = {p: p.read_bytes() for p in folder.iterdir()}
-    outs = [] if {"--out", "--picture"} & {*command} else ["--out", "o.csv", "--picture", "o.png"]
-    code = main(["advise", *command, *outs])
-    captured = capsys.readouterr()
-    assert (
-        code == 2 and captured.out == "" and captured.err.count("\n") == 1 and said in captured.err
-    )
-    assert {p: p.read_bytes() for p in folder.iterdir()} == before
-
-
 def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, capsys):
     command = ["identify", "model.toml", "runs.csv", "--method", "posterior"]
     assert main([*command, "--format", "json"]) == 0

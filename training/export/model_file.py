@@ -52,7 +52,7 @@ def build_graph(trained: TrainedModel) -> Any:
     if posterior is None:
         _add_single_rows(trained, graph, "")
         return graph.model(inputs, outputs)
-    rows, sets = Graph("rows_"), Graph("sets_")
+    rows, sets = graph.branch("rows_"), graph.branch("sets_")
     _add_single_rows(trained, rows, "rows_")
     posterior.add_to(sets, "sets_")
     outputs = {

@@ -16,7 +16,7 @@ from soilml.onboard.set_contract import (
     SET_PREFIX,
     SET_SWITCH,
 )
-from training.onnx_graph.builder import SHORTCUT, needed_nodes
+from training.onnx_graph.builder import OPSET, needed_nodes
 
 ZERO, COLUMN_AXIS = "step_zero", "step_column_axis"  # Names of constants of the graph
 
@@ -36,7 +36,9 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
     rows and state.
     """
     import onnx
+    import onnx.inliner
 
+    model = onnx.inliner.inline_local_functions(model)
     graph = model.graph
     given = {value.name for value in graph.input}
     if not {*MEMORY_INPUTS} <= given:
@@ -66,7 +68,7 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
     ]
     found = onnx.helper.make_graph(nodes, graph.name, inputs, outputs, initializers)
     fixed = onnx.helper.make_model(
-        found, opset_imports=model.opset_import, ir_version=model.ir_version
+        found, opset_imports=[onnx.helper.make_opsetid("", OPSET)], ir_version=model.ir_version
     )
     fixed = onnx.shape_inference.infer_shapes(_pruned(fixed), strict_mode=True, data_prop=True)
     open_ended = [value.name for value in fixed.graph.output if not _is_static(value)]
@@ -79,7 +81,7 @@ def one_step_graph(model: Any, name: str, rows: int) -> Any:
 def _without_branches(nodes: Iterable[Any]) -> tuple[list[Any], list[Any], dict[str, str]]:
     """Nodes with each If replaced by one branch, constants of these, and names of their results.
 
-    That is the general way of a shortcut, and the set posterior of a file that has another branch.
+    That is the set posterior of a file that has another branch.
     """
     found: list[Any] = []
     constants: list[Any] = []
@@ -88,8 +90,7 @@ def _without_branches(nodes: Iterable[Any]) -> tuple[list[Any], list[Any], dict[
         if node.op_type != "If":
             found.append(node)
             continue
-        wanted = "else_branch" if node.doc_string == SHORTCUT else "then_branch"
-        branch = next(a.g for a in node.attribute if a.name == wanted)
+        branch = next(a.g for a in node.attribute if a.name == "then_branch")
         inside, of_branch, names = _without_branches(branch.node)
         found += inside
         constants += [*branch.initializer, *of_branch]

@@ -7,7 +7,7 @@ For files whose response stays as it is while the rest of the graph of a set pos
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -103,7 +103,7 @@ def _branch(model: Any, name: str) -> Any:
 
 def _beside_single_rows(model: Any, sets: Graph, posterior: SetPosteriorGraph) -> Any:
     """The model with another branch for sets."""
-    from onnx import checker, numpy_helper
+    from onnx import checker, helper, numpy_helper
 
     kinds = {o.name: (o.type.tensor_type.elem_type, o) for o in model.graph.output}
     outputs: dict[str, Output] = {
@@ -118,6 +118,9 @@ def _beside_single_rows(model: Any, sets: Graph, posterior: SetPosteriorGraph) -
         if attribute.name == "then_branch":
             attribute.g.CopyFrom(sets.as_branch(outputs))
     defaults = posterior.defaults()
+    del changed.functions[:], changed.opset_import[1:]
+    changed.functions.extend(sets.functions.values())
+    changed.opset_import.extend(helper.make_opsetid(*one) for one in sets.opsets[1:])
     del changed.graph.initializer[:]
     for name, value in (defaults | {SET_SWITCH: np.zeros(1, bool)}).items():
         changed.graph.initializer.append(numpy_helper.from_array(np.asarray(value), name))
@@ -138,90 +141,42 @@ def _resize(entry: Any, shape: list[Any]) -> None:
 def read_response(
     graph: Any, family: WheelFamily, error: Mapping[str, float], terms: Terms
 ) -> Response:
-    """The response surface in the graph of a set posterior, as `Response.add_to` wrote it.
+    """The response surface in the graph of a set posterior, by the names of its constants.
 
-    Raises `ModelFileError` for a graph of another structure.
+    Raises `ModelFileError` for a graph of an earlier version, which lacks these names.
     """
-    constants = _constants(graph)
-    ends = _box(graph, constants)
-    layers, mean = _layers(graph.node, constants)
-    if len(layers) != 3:
-        raise ModelFileError("the graph has no response surface of two hidden layers")
-    (first, bias), (second, second_bias), (last, last_bias) = layers
-    # the last columns of the last layer subtract the readings
-    whole = (first.T, bias, second.T, second_bias, last[:, : len(second)].T, last_bias)
-    scaling = Standardisation(mean, np.ones_like(mean))
-    errors = np.asarray([error[name] for name in RESPONSE_CHANNELS])
-    response = Response(terms, scaling, whole, *ends, errors)
-    if not family.model_errors()["contact"]:
-        return response
-    return replace(response, contact=_read_contact(graph, response))
-
-
-def _read_contact(graph: Any, response: Response) -> Response:
-    """The surface of the changes by another contact, in the branch of a model with errors."""
-    for branch in _branches(graph):
-        constants = _constants(branch)
-        layers, mean = _layers(branch.node, constants)
-        if len(layers) == 2:
-            break
-    else:
-        raise ModelFileError("the graph has no response surface of another contact")
-    (first, bias), (second, second_bias) = layers
-    units, terms = len(second) + 1, len(response.terms)
-    shape = (units * CHANNELS, terms)
-    last = next(
-        constants[name]
-        for node in branch.node
-        for name in node.input
-        if node.op_type == "MatMul" and name in constants and constants[name].shape == shape
-    )
-    flat = last.reshape(CHANNELS, units, terms).transpose(1, 2, 0).reshape(units, -1)
-    whole = (first.T, bias, second.T, second_bias, flat[:-1], flat[-1])
-    scaling = Standardisation(mean, np.ones_like(mean))
-    return replace(response, scaling=scaling, layers=whole, error=np.zeros(CHANNELS))
-
-
-def _branches(graph: Any) -> Iterator[Any]:
-    """All branches of a graph, and the branches of these."""
-    for branch in (a.g for node in graph.node if node.op_type == "If" for a in node.attribute):
-        yield branch
-        yield from _branches(branch)
-
-
-def _constants(graph: Any) -> dict[str, Floats]:
     from onnx import numpy_helper
 
-    return {c.name: numpy_helper.to_array(c).astype(np.float64) for c in graph.initializer}
+    found = {
+        c.name.removeprefix("sets_"): numpy_helper.to_array(c).astype(np.float64)
+        for c in graph.initializer
+    }
+    if "response_last" not in found:
+        raise ModelFileError("the file is of an earlier version: train it again")
+    whole = found["response_last"]  # its last columns subtract the readings
+    inner = _layers(found, "response")
+    last = (whole[:, : len(inner[-2].T)].T, found["response_last_bias"][:, 0])
+    middle = found["range_middle"][:, 0]
+    width = found["range_half"][:, 0] / (1.0 + 2.0 * BOX_TOLERANCE)
+    mean = found["response_mean"][:, 0]
+    scaling = Standardisation(mean, np.ones_like(mean))
+    errors = np.asarray([error[name] for name in RESPONSE_CHANNELS])
+    response = Response(terms, scaling, (*inner, *last), middle - width, middle + width, errors)
+    if not family.model_errors()["contact"]:
+        return response
+    by_channel = found["contact_last"].reshape(CHANNELS, -1, len(terms)).transpose(1, 2, 0)
+    flat = by_channel.reshape(len(by_channel), -1)
+    mean = found["contact_mean"][:, 0]
+    layers = (*_layers(found, "contact"), flat[:-1], flat[-1])
+    scaling = Standardisation(mean, np.ones_like(mean))
+    contact = replace(response, scaling=scaling, layers=layers, error=np.zeros(CHANNELS))
+    return replace(response, contact=contact)
 
 
-def _layers(
-    nodes: Iterable[Any], constants: Mapping[str, Floats]
-) -> tuple[list[tuple[Floats, Floats]], Floats]:
-    """Weights and biases (units,) of layers, and what is subtracted from their first inputs."""
-    layers: list[tuple[Floats, Floats]] = []
-    mean, before = np.zeros(0), {}
-    for node in nodes:
-        before[node.output[0]] = node
-        is_layer = node.op_type == "Gemm" and not node.attribute and len(node.input) == 3
-        if not is_layer or not {node.input[0], node.input[2]} <= constants.keys():
-            continue
-        weights, bias = constants[node.input[0]], constants[node.input[2]]
-        if bias.shape != (len(weights), 1):
-            continue
-        if not layers:
-            mean = constants[before[node.input[1]].input[1]].reshape(-1)
-        layers.append((weights, bias[:, 0]))
-    return layers, mean
-
-
-def _box(graph: Any, constants: Mapping[str, Floats]) -> tuple[Floats, Floats]:
-    """Least and largest features (f,), from the test of their distance from the middle."""
-    before = {node.output[0]: node for node in graph.node}
-    for node in graph.node:
-        half = constants.get(node.input[1]) if node.op_type == "LessOrEqual" else None
-        if half is not None and half.ndim == 2:
-            middle = constants[before[before[node.input[0]].input[0]].input[1]]
-            width = half / (1.0 + 2.0 * BOX_TOLERANCE)
-            return (middle - width).reshape(-1), (middle + width).reshape(-1)
-    raise ModelFileError("the graph does not test the range of its features")
+def _layers(found: Mapping[str, Floats], name: str) -> tuple[Floats, ...]:
+    """Weights (inputs, units) and biases (units,) of the two hidden layers."""
+    return tuple(
+        layer
+        for k in range(2)
+        for layer in (found[f"{name}_weights_{k}"].T, found[f"{name}_bias_{k}"][:, 0])
+    )

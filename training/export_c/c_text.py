@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from training.export_c.tensor import Expression, Shape, Size, Tensor, strides
+from training.export_c.tensor import LARGEST_INT, Shape, Tensor, strides
 
 WIDTH = 100  # Width of the lines that hold the numbers of an array
-LEAST_BLOCK = 4  # Elements of a row that is copied as a block of memory
-LONG = 16  # Elements of a loop that stays one of a fixed length
-LARGEST_INT = 2**31 - 1  # The largest whole number that every C compiler's int holds (32 bits)
+INDENT = "    "
 
 
 def number(value: Any, kind: str) -> str:
@@ -52,87 +50,64 @@ def array(name: str, values: NDArray[Any], kind: str) -> str:
     return f"static const {kind} {name}[{values.size}] = {{\n{inside}\n}};"
 
 
-INDENT = "    "
+def wrapped(text: str, indent: int) -> list[str]:
+    """Lines of C, those after the first indented by four more."""
+    first, later = " " * indent, " " * (indent + 4)
+    return textwrap.wrap(text, WIDTH, initial_indent=first, subsequent_indent=later)
 
 
-def offset(steps: Sequence[Size], indices: Sequence[str]) -> str:
+def offset(steps: Sequence[int], indices: Sequence[str]) -> str:
     """The place of an element in memory, from its indices and the steps along the axes."""
     terms = [
-        index if step == Size(1) else f"{index} * {step.c}"
+        index if step == 1 else f"{index} * {step}"
         for step, index in zip(steps, indices, strict=True)
-        if step != Size(0) and index != "0"
+        if step and index != "0"
     ]
     return " + ".join(terms) or "0"
 
 
-def nest(sizes: Sequence[Size], indices: Sequence[str], body: str) -> str:
-    """Loops, one in another, around a statement; sizes of 1 need none."""
+def nest(sizes: Sequence[int], body: str) -> str:
+    """Loops over i0, i1, ..., one in another, around a statement; sizes of 1 need none."""
     lines, depth = [], 1
-    for size, index in zip(sizes, indices, strict=True):
-        if size != Size(1):
-            lines.append(f"{INDENT * depth}for (int {index} = 0; {index} < {size.c}; ++{index})")
+    for index, size in zip(indices_of(sizes), sizes, strict=True):
+        if size != 1:
+            lines.append(f"{INDENT * depth}for (int {index} = 0; {index} < {size}; ++{index})")
             depth += 1
     lines += [INDENT * depth + line for line in body.splitlines()]
     return "\n".join(lines)
 
 
-def copied_rows(
-    out: Tensor, to: tuple[str, Size], x: Tensor, source: tuple[str, Size], sizes: Sequence[Size]
-) -> str:
-    """Copies of rows, so many of so many elements; of each tensor where they begin, and the step.
-
-    Rows of a fixed length are copied as a block of memory, which compilers do side by side.
-    """
-    i, j = indices_of(sizes)
-    block = sizes[1].fixed and sizes[1].constant >= LEAST_BLOCK
-    one, other = (
-        offset([Size(1), step, Size(1)], [start, i, "0" if block else j])
-        for start, step in (to, source)
-    )
-    if not block:
-        return nest(sizes, [i, j], f"{out.name}[{one}] = {x.name}[{other}];")
-    into, of = (
-        tensor.name + (f" + {place}" if place != "0" else "")
-        for tensor, place in ((out, one), (x, other))
-    )
-    copy = f"memcpy({into}, {of}, {sizes[1].constant} * sizeof({out.kind}));"
-    return nest(sizes[:1], [i], copy)
-
-
-def indices_of(sizes: Sequence[Size], first: int = 0) -> list[str]:
+def indices_of(sizes: Sequence[int]) -> list[str]:
     """Names of loop variables; `0` for sizes of 1, which have no loop."""
-    return ["0" if size == Size(1) else f"i{first + k}" for k, size in enumerate(sizes)]
+    return ["0" if size == 1 else f"i{k}" for k, size in enumerate(sizes)]
 
 
-def element_loops(out: str, shape: Shape, expression: Expression) -> str:
+def at(tensor: Tensor, place: str) -> str:
+    """A pointer to a place in a tensor."""
+    return tensor.name if place == "0" else f"{tensor.name} + {place}"
+
+
+def element_loops(out: Tensor, tensor: Tensor) -> str:
     """Loops that compute every element of a tensor, with axes merged where memory allows."""
-    leaves = leaves_of(expression)
-    steps = [_broadcast_steps(leaf.shape, shape) for leaf in leaves]
-    sizes, merged = _merge(list(shape), [*steps, strides(shape)])
+    leaves = leaves_of(tensor)
+    shape = out.shape
+    steps = [*(_broadcast_steps(leaf.shape, shape) for leaf in leaves), strides(shape)]
+    sizes, merged = _merge(list(shape), steps)
     indices = indices_of(sizes)
     places = {
         leaf: f"{leaf.name}[{offset(own, indices)}]"
         for leaf, own in zip(leaves, merged, strict=False)
     }
-    target = f"{out}[{offset(merged[-1], indices)}]"
-    return nest(sizes, indices, f"{target} = {_text(expression, places)};")
+    target = f"{out.name}[{offset(merged[-1], indices)}]"
+    return nest(sizes, f"{target} = {_text(tensor, places)};")
 
 
-def element(shape: Shape, expression: Expression, indices: Sequence[str]) -> str:
-    """The element of an expression of this shape at some indices."""
-    places = {
-        leaf: f"{leaf.name}[{offset(_broadcast_steps(leaf.shape, shape), indices)}]"
-        for leaf in leaves_of(expression)
-    }
-    return _text(expression, places)
-
-
-def leaves_of(expression: Expression) -> list[Tensor]:
+def leaves_of(tensor: Tensor) -> list[Tensor]:
     """The tensors in memory that an expression reads, each once; single constants are literals."""
     found: dict[Tensor, None] = {}
-    for operand in expression.operands:
-        if operand.expression is not None:
-            found |= dict.fromkeys(leaves_of(operand.expression))
+    for operand in tensor.operands:
+        if operand.text:
+            found |= dict.fromkeys(leaves_of(operand))
         elif not is_literal(operand):
             found[operand] = None
     return list(found)
@@ -143,45 +118,33 @@ def is_literal(tensor: Tensor) -> bool:
     return tensor.value is not None and tensor.value.size == 1
 
 
-def _text(expression: Expression, places: dict[Tensor, str]) -> str:
+def _text(tensor: Tensor, places: dict[Tensor, str]) -> str:
     parts = []
-    for operand in expression.operands:
-        if operand.expression is not None:
-            parts.append(f"({_text(operand.expression, places)})")
+    for operand in tensor.operands:
+        if operand.text:
+            parts.append(f"({_text(operand, places)})")
         elif is_literal(operand):
             assert operand.value is not None
             parts.append(number(operand.value.reshape(-1)[0], operand.kind))
         else:
             parts.append(places[operand])
-    return expression.text.format(*parts)
+    return tensor.text.format(*parts)
 
 
-def _broadcast_steps(own: Shape, shape: Shape) -> list[Size]:
+def _broadcast_steps(own: Shape, shape: Shape) -> list[int]:
     """Steps of a tensor along the axes of the shape that it is broadcast to."""
-    padded = (Size(1),) * (len(shape) - len(own)) + own
-    return [
-        Size(0) if size == Size(1) else step
-        for size, step in zip(padded, strides(padded), strict=True)
-    ]
+    padded = (1,) * (len(shape) - len(own)) + own
+    return [0 if size == 1 else step for size, step in zip(padded, strides(padded), strict=True)]
 
 
-def _merge(sizes: list[Size], steps: list[list[Size]]) -> tuple[list[Size], list[list[Size]]]:
+def _merge(sizes: list[int], steps: list[list[int]]) -> tuple[list[int], list[list[int]]]:
     """Sizes and steps with neighbouring axes as one where every tensor is contiguous in them."""
-    kept = [axis for axis, size in enumerate(sizes) if size != Size(1)]
+    kept = [axis for axis, size in enumerate(sizes) if size != 1]
     sizes = [sizes[axis] for axis in kept]
     steps = [[own[axis] for axis in kept] for own in steps]
     for axis in range(len(sizes) - 1, 0, -1):
-        both_variable = not sizes[axis].fixed and not sizes[axis - 1].fixed
-        # loops of a fixed number of elements are computed side by side by compilers
-        long = sizes[axis].fixed and sizes[axis].constant >= LONG and not sizes[axis - 1].fixed
-        if (
-            not both_variable
-            and not long
-            and all(own[axis - 1] == own[axis] * sizes[axis] for own in steps)
-        ):
-            sizes[axis - 1] = sizes[axis - 1] * sizes[axis]
-            del sizes[axis]
+        if all(own[axis - 1] == own[axis] * sizes[axis] for own in steps):
+            sizes[axis - 1] *= sizes.pop(axis)
             for own in steps:
-                own[axis - 1] = own[axis]
-                del own[axis]
+                own[axis - 1] = own.pop(axis)
     return sizes, steps

@@ -71,6 +71,10 @@ class Interface:
         """C type of the numbers of a memory."""
         return "float" if self.small else "double"
 
+    def row_number(self, name: str) -> int:
+        """The place of an input of one row."""
+        return [field.name for field in self.rows].index(name)
+
     @property
     def optional_context(self) -> bool:
         """Whether no value of a whole set must be given."""

@@ -3,7 +3,9 @@
 `training.onnx_graph.value` adds operators to it. Bytes of a file depend on the order of nodes and
 constants, which are numbered as they are added.
 
-A constant or a node that is there already is not added again: its name is returned.
+A constant or a node that is there already is not added again: its name is returned. A method of
+several nodes becomes a local function of the model, a *composite*: onnxruntime replaces it by its
+nodes when it loads the file, and C code has a template for it.
 
 The operator set and file version are readable by every onnxruntime since 1.14; the defaults of the
 onnx package are newer than that. Every node has a name of its own: up to release 1.21, onnxruntime
@@ -13,7 +15,7 @@ same one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -26,7 +28,7 @@ Output = tuple[int, list[Any]]  # Element type and shape of a graph's output
 #: ONNX's numbers of the element types of inputs and outputs (onnx.TensorProto.DataType).
 FLOAT, BOOL = 1, 9
 
-SHORTCUT = "shortcut"  # Mark of If nodes whose else branch is right for every condition
+DOMAIN = "soilml"  # Of the local functions
 
 OPSET = 18
 IR_VERSION = 9
@@ -37,21 +39,25 @@ class Graph:
 
     prefix: Prefix of the names of all its nodes and constants; branches of one graph need different
         ones.
+    functions: Local functions of the model by name, which its branches share.
     """
 
-    def __init__(self, prefix: str = "") -> None:
+    def __init__(self, prefix: str = "", functions: dict[str, Any] | None = None) -> None:
         self._prefix = prefix
         self._nodes: list[Any] = []
         self._constants: list[Any] = []
         self._names_of_constants: dict[tuple[Any, ...], str] = {}
         self._names_of_nodes: dict[tuple[Any, ...], list[str]] = {}
-        self._parts: dict[tuple[tuple[str, ...], int], str] = {}
-        self._branches = 0
+        self.functions: dict[str, Any] = {} if functions is None else functions
 
-    def constant(self, value: Any, exact: bool = False) -> str:
+    def branch(self, prefix: str) -> Graph:
+        """A graph for one branch of this one."""
+        return Graph(prefix, self.functions)
+
+    def constant(self, value: Any, exact: bool = False, name: str = "") -> str:
         """The name of a constant array; floating-point numbers become float64 unless `exact`.
 
-        A floating-point number is one of an array of one element.
+        A floating-point number is one of an array of one element. A name that is given is kept.
         """
         from onnx import numpy_helper
 
@@ -60,7 +66,7 @@ class Graph:
             array = array.astype(np.float64)
         key = (array.dtype.str, array.shape, array.tobytes())
         if key not in self._names_of_constants:
-            name = f"{self._prefix}c{len(self._constants)}"
+            name = f"{self._prefix}{name or f'c{len(self._constants)}'}"
             if array.ndim or array.dtype.kind == "f":
                 array = np.ascontiguousarray(array)
             self._constants.append(numpy_helper.from_array(array, name))
@@ -94,13 +100,44 @@ class Graph:
         self._nodes.append(helper.make_node(kind, list(inputs), names, name=own, **attributes))
         if unnamed:
             self._names_of_nodes[key] = names
-        if kind == "Split":
-            self._parts[tuple(names), attributes["axis"]] = inputs[0]
         return names
 
-    def whole_of(self, names: Sequence[str], axis: int) -> str | None:
-        """The value of which these are all the parts along an axis, if there is one."""
-        return self._parts.get((tuple(names), axis))
+    def composite(
+        self,
+        name: str,
+        inputs: Mapping[str, str],
+        outputs: Sequence[str],
+        body: Callable[[Graph], Sequence[str]],
+    ) -> list[str]:
+        """Add a call of a local function, and return the names of its results.
+
+        inputs: Names of values by the names that they have in the function, where values that it
+            does not read stand for the C code alone.
+        outputs: Names of the results in the function.
+        body: Adds the nodes of the function to a graph, and returns the names of the results.
+
+        Raises `ValueError` where a function of that name is another one.
+        """
+        from onnx import helper
+
+        inner = Graph("", self.functions)
+        made = body(inner)
+        for one, wanted in zip(made, outputs, strict=True):
+            inner.op("Identity", one, out=wanted)
+        nodes, constants = inner.needed(outputs)
+        given = [
+            helper.make_node("Constant", [], [c.name], name=c.name, value=c) for c in constants
+        ]
+        opsets = [helper.make_opsetid("", OPSET), helper.make_opsetid(DOMAIN, 1)]
+        found = helper.make_function(
+            DOMAIN, name, list(inputs), list(outputs), given + nodes, opsets
+        )
+        known = self.functions.setdefault(name, found)
+        if known.SerializeToString(deterministic=True) != found.SerializeToString(
+            deterministic=True
+        ):
+            raise ValueError(f"there is another function {name}")
+        return self.ops(name, len(outputs), *inputs.values(), domain=DOMAIN)
 
     def rename_last(self, name: str, new: str) -> None:
         """Rename an output of the node that was added last, which nothing reads yet.
@@ -175,41 +212,6 @@ class Graph:
             outs=list(outputs),
         )
 
-    def branch(self) -> Graph:
-        """A graph for one branch of this one, with names of its own; it may read values of this."""
-        self._branches += 1
-        return Graph(f"{self._prefix}b{self._branches}_")
-
-    def shortcut(
-        self,
-        condition: str,
-        quick: tuple[Graph, Sequence[str]],
-        general: tuple[Graph, Sequence[str]],
-    ) -> list[str]:
-        """Add an If node that takes a quicker way to the same float32 values where it exists.
-
-        Each way is a branch and the names of its results. The general way is right whether the
-        condition is true or not: a caller that cannot branch takes it always.
-        """
-        then, otherwise = (graph._results(names) for graph, names in (quick, general))
-        attributes = {"then_branch": then, "else_branch": otherwise, "doc_string": SHORTCUT}
-        return self.ops("If", len(quick[1]), condition, **attributes)
-
-    def _results(self, names: Sequence[str]) -> Any:
-        """This graph as a branch with float32 outputs, which may be values that it captures.
-
-        Raises `ValueError` for one value as two outputs: onnxruntime would overwrite it.
-        """
-        from onnx import helper
-
-        made = {name for node in self._nodes for name in node.output}
-        own = [name if name in made else self.op("Identity", name) for name in names]
-        if len(set(own)) < len(own):
-            raise ValueError("a branch has the same value as two of its outputs")
-        nodes, constants = self._needed(own)
-        infos = [helper.make_tensor_value_info(name, FLOAT, None) for name in own]
-        return helper.make_graph(nodes, f"{self._prefix}branch", [], infos, constants)
-
     def as_branch(self, outputs: Mapping[str, Output]) -> Any:
         """This graph as a branch whose outputs are named `<prefix><output>`; others are empty."""
         from onnx import helper
@@ -222,13 +224,18 @@ class Graph:
                 empty = np.zeros([0] * len(shape), helper.tensor_dtype_to_np_dtype(kind))
                 self.op("Identity", self.constant(empty, exact=True), out=own)
             infos.append(helper.make_tensor_value_info(own, kind, [None] * len(shape)))
-        nodes, constants = self._needed([info.name for info in infos])
+        nodes, constants = self.needed([info.name for info in infos])
         return helper.make_graph(nodes, f"{self._prefix}branch", [], infos, constants)
 
-    def _needed(self, outputs: Iterable[str]) -> tuple[list[Any], list[Any]]:
+    def needed(self, outputs: Iterable[str]) -> tuple[list[Any], list[Any]]:
         """The nodes and constants on which outputs depend; values of branches are included."""
         nodes, wanted = needed_nodes(self._nodes, outputs)
         return nodes, [one for one in self._constants if one.name in wanted]
+
+    @property
+    def opsets(self) -> list[tuple[str, int]]:
+        """Operator sets of the model."""
+        return [("", OPSET), *([(DOMAIN, 1)] if self.functions else [])]
 
     def model(
         self, inputs: Sequence[str] | Mapping[str, list[Any]], outputs: Mapping[str, Output]
@@ -242,7 +249,7 @@ class Graph:
 
         if not isinstance(inputs, Mapping):
             inputs = {name: ["rows"] for name in inputs}
-        nodes, constants = self._needed([*outputs, *inputs])
+        nodes, constants = self.needed([*outputs, *inputs])
         graph = helper.make_graph(
             nodes,
             "soilml",
@@ -254,7 +261,10 @@ class Graph:
             constants,
         )
         model = helper.make_model(
-            graph, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="soilml"
+            graph,
+            opset_imports=[helper.make_opsetid(*one) for one in self.opsets],
+            functions=list(self.functions.values()),
+            producer_name="soilml",
         )
         model.ir_version = IR_VERSION
         checker.check_model(model, full_check=True)

@@ -9,7 +9,8 @@ evaluation fixes the bytes of the file.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -104,7 +105,7 @@ class Value:
         """A value as it is; a number or an array as a constant of this value's type."""
         return other if isinstance(other, Value) else constant(self.graph, other, self.dtype)
 
-    def indices(self, numbers: Sequence[int]) -> Value:
+    def indices(self, numbers: Sequence[Any] | NDArray[Any]) -> Value:
         """A constant of whole numbers (int64), as ONNX takes indices, axes and shapes."""
         return self._output(self.graph.constant(np.asarray(numbers, dtype=np.int64)))
 
@@ -135,6 +136,14 @@ class Value:
             names = self.graph.ops("Split", len(parts), self.name, sizes.name, axis=axis)
         return [self._output(name) for name in names]
 
+    def last_columns(self, *sizes: int) -> list[Value]:
+        """The last columns of a matrix, in parts of these sizes, after all columns before them."""
+        starts = [sum(sizes[k:]) for k in range(len(sizes))]
+        ends = [self.indices([-start]) for start in starts]
+        ends = [self.indices([0]), *ends, self.indices([np.iinfo(np.int64).max])]
+        axis = self.indices([-1])
+        return [self.node("Slice", first, last, axis) for first, last in pairwise(ends)]
+
     def largest(self, count: int, axis: int) -> Value:
         """The largest entries along an axis, in descending order."""
         values, _ = self.graph.ops("TopK", 2, self.name, self.indices([count]).name, axis=axis)
@@ -160,6 +169,12 @@ class Value:
         axes = [] if axis is None else [self.indices([axis])]
         return self.node(kind, *axes, **({} if keepdims is None else {"keepdims": int(keepdims)}))
 
+    def derived(self, matrix: NDArray[Any]) -> Value:
+        """`matrix @ self` for a matrix with one number in each row at most."""
+        columns = np.abs(matrix).argmax(axis=1)
+        factors = np.take_along_axis(matrix, columns[:, None], 1)
+        return self.take(columns.tolist(), axis=0) * factors
+
     def named(self, name: str) -> Value:
         """The value under the name of a graph output; only for the output of the last node."""
         self.graph.rename_last(self.name, name)
@@ -178,9 +193,10 @@ class Value:
 Operand = Value | float | NDArray[Any]  # What stands on either side of an operator
 
 
-def constant(graph: Graph, value: Any, dtype: type = np.float32) -> Value:
-    """A constant number or array of a floating-point type."""
-    return Value(graph, graph.constant(np.asarray(value, dtype=dtype), exact=True), dtype)
+def constant(graph: Graph, value: Any, dtype: type = np.float32, name: str = "") -> Value:
+    """A constant number or array of a floating-point type; a name that is given is kept."""
+    array: NDArray[Any] = np.asarray(value, dtype=dtype)
+    return Value(graph, graph.constant(array, exact=True, name=name), dtype)
 
 
 def _function(kind: str) -> Callable[[Value], Value]:
@@ -222,11 +238,21 @@ def concat(values: Sequence[Value], axis: int) -> Value:
     return Value(first.graph, name, first.dtype)
 
 
-def stack_rows(values: Sequence[Value]) -> Value:
-    """Values (1, n) as the rows of a matrix; parts of a matrix become that matrix again."""
-    first = values[0]
-    whole = first.graph.whole_of([value.name for value in values], 0)
-    return concat(values, axis=0) if whole is None else Value(first.graph, whole, first.dtype)
+def composite(
+    name: str,
+    outputs: Sequence[str],
+    body: Callable[..., Sequence[Value]],
+    **given: Value,
+) -> list[Value]:
+    """Results of a local function of the model (`Graph.composite`), whose body takes the values."""
+    graph = next(iter(given.values())).graph
+
+    def add_to(inner: Graph) -> Sequence[str]:
+        made = body(**{key: Value(inner, key, value.dtype) for key, value in given.items()})
+        return [value.name for value in made]
+
+    names = {key: value.name for key, value in given.items()}
+    return [Value(graph, one) for one in graph.composite(name, names, outputs, add_to)]
 
 
 def gemm(
@@ -247,51 +273,6 @@ def gemm(
     if transpose_b:
         attributes["transB"] = 1
     return a.node("Gemm", *([b] if c is None else [b, c]), **attributes)
-
-
-def within(given: Any, branch: Graph) -> Any:
-    """What a branch of a graph reads: values, and collections and dataclasses that have some."""
-    if isinstance(given, Value):
-        return Value(branch, given.name, given.dtype)
-    if isinstance(given, dict):
-        return {name: within(value, branch) for name, value in given.items()}
-    if isinstance(given, tuple | list):
-        return type(given)(within(value, branch) for value in given)
-    if not is_dataclass(given) or isinstance(given, type):
-        return given
-    inside = {field.name: getattr(given, field.name) for field in fields(given)}
-    read = within(inside, branch)
-    changed = {name: value for name, value in read.items() if value is not inside[name]}
-    return replace(given, **changed) if changed else given
-
-
-def shortcuts(
-    condition: Value,
-    quick: Callable[..., Sequence[Value]],
-    general: Callable[..., Sequence[Value]],
-    *given: Any,
-) -> list[Value]:
-    """Values of a general function, or where a condition (1,) is true, those of a quicker one.
-
-    Only one of both is run. Both must give the same float32 values where the condition is true.
-    """
-    ways = []
-    for way in (quick, general):
-        branch = condition.graph.branch()
-        ways.append((branch, [value.name for value in way(*within(given, branch))]))
-    names = condition.graph.shortcut(condition.name, *ways)
-    return [Value(condition.graph, name) for name in names]
-
-
-def shortcut(
-    condition: Value, quick: Callable[..., Value], general: Callable[..., Value], *given: Any
-) -> Value:
-    """The one value of two functions, as `shortcuts`."""
-
-    def alone(way: Callable[..., Value]) -> Callable[..., Sequence[Value]]:
-        return lambda *read: [way(*read)]
-
-    return shortcuts(condition, alone(quick), alone(general), *given)[0]
 
 
 def cholesky_columns(matrix: Value, count: int) -> Value:

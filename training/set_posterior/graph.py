@@ -24,17 +24,21 @@ from soilml.onboard.set_contract import (
 )
 from training.onnx_graph.builder import BOOL, FLOAT, Graph, Output
 from training.onnx_graph.value import Value
+from training.set_posterior.draws import (
+    SIZES_SMALL,
+    adapted_draws,
+    prior_draws,
+    sample_sizes,
+)
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.wheel_family import WheelFamily
-from training.set_posterior.importance_sampler import add_importance_sampler
-from training.set_posterior.likelihood import Likelihood, SetReadings
+from training.set_posterior.likelihood import Likelihood, Linear, Standardised
 from training.set_posterior.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
 from training.set_posterior.response_surface import Response
 from training.set_posterior.row_inputs import FileNoise, complete_inputs, default_values
-from training.set_posterior.sampling_rounds import SIZES_SMALL, sample_sizes
-from training.set_posterior.small_likelihood import SmallLikelihood
+from training.set_posterior.sampler import Polynomials
 
 #: Inputs of the graph with a value for each row.
 ROW_INPUTS = (*READING_INPUTS, *STD_INPUTS, *OPERATING_STD_INPUTS)
@@ -129,20 +133,33 @@ class SetPosteriorGraph:
         inputs = {name: Value(graph, name) for name in names}
         positive = [name for name, (least, _) in self.family.limits().items() if least > 0.0]
         inputs = complete_inputs(inputs, of_set, self.noise, positive)
-        context, rows = add_residual_rows(self.family, self.response, inputs, self.small)
+        context, rows = add_residual_rows(self.family, self.response, inputs)
         state, counts = (inputs[name] for name in MEMORY_INPUTS)
         outputs = [prefix + name for name in MEMORY_OUTPUTS]
         counts = (counts + rows.counts).named(outputs[1])
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
+        family, terms, std = self.family, self.response.terms, context.axis_std
+        nearly: Linear | Standardised | None = None
+        if std is not None and self.small:
+            nearly = Linear.of(terms, family.free, std)
+            terms, family = nearly.sampled, family.with_axes(family.free)
+        elif std is not None:
+            nearly = Standardised.of(terms, family.free, std)
         usual = self.family.model_errors()
-        present = tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS)
-        readings = SetReadings(rows, state, inputs[MODEL_ERROR_INPUT], self.scales, present)
-        kind = SmallLikelihood if self.small else Likelihood
-        likelihood = kind.of(self.family, self.response, context, readings)
+        polynomials = Polynomials.of(family, terms)
+        likelihood = Likelihood(
+            polynomials, rows, state, inputs[MODEL_ERROR_INPUT], self.scales,
+            tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS), nearly,
+        )  # fmt: skip
         consistency = add_consistency(counts, self.limits)
-        sizes = SIZES_SMALL if self.small else sample_sizes(len(self.family.axes))
-        sample = add_importance_sampler(likelihood, consistency, sizes, outputs[0])
+        sizes = SIZES_SMALL if self.small else sample_sizes(len(family.axes))
+        *sample, grown = likelihood.sampled(
+            sizes, prior_draws(graph, family, polynomials.order, sizes.prior),
+            adapted_draws(graph, polynomials.unknowns, sizes.adapted), consistency.limit,
+            family.targets,
+        )  # fmt: skip
+        grown.node("Identity").named(outputs[0])
         add_posterior_outputs(
-            likelihood.family, context, sample, consistency, prefix, few_points=self.small
+            family, polynomials.order, context, sample, consistency, prefix, self.small
         )

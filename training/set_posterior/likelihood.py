@@ -1,108 +1,311 @@
-"""The likelihood of a set as the sampler of its posterior takes it, as nodes of a graph."""
+r"""The likelihood of a set, from the rows of its linear system, as composites of a graph.
+
+A row of the system is (w a, w g, w e): a reading's monomials, and its changes with errors of the
+sensors and of the model that all readings share. Errors of the sensors are integrated out, those of
+the model for each of their scales.
+
+Nearly known unknowns z have a normal prior. They are sampled in standardised coordinates
+:math:`z = x / (c \sigma)`, c the truncation in standard deviations: the coefficient of a monomial
+is multiplied by :math:`(c \sigma)^k` for its power k of z, and the prior is the residual
+:math:`c z`. In a file of few points they are instead errors, in which residuals are linear:
+
+.. math:: r(x, z) \approx A \, b(x, \bar z)
+    + \sum_a (z_a - \bar z_a) \, A \frac{\partial b}{\partial z_a}(\bar x, \bar z),
+    \qquad z_a \sim N(0, \sigma_a^2)
+
+A point in three dimensions tells more than one in five.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
+from operator import add, mul
 
 import numpy as np
 
-from soilml.onboard.set_contract import (
-    COMMON_ERROR_INPUTS,
-    MODEL_ERROR_COLUMNS,
-    SENSOR_ERROR_COLUMNS,
-)
-from training.onnx_graph.value import Value, concat
+from soilml.arrays import Floats
+from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
+from training.onnx_graph.value import Value, composite, concat, constant, exp, gemm, log
+from training.set_posterior.draws import ProposalDraws, SampleSizes
 from training.set_posterior.error_scales import ErrorScales
-from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
+from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
+from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.residual_system import ResidualRows
-from training.set_posterior.response_surface import Response
-from training.set_posterior.scale_mixture import ScaleMixture, add_scale_mixture
-from training.set_posterior.sensor_errors import integrate_out_sensor_errors
+from training.set_posterior.sampler import Polynomials, adapted_rounds, first_round
+from training.set_posterior.scale_mixture import (
+    Scaled,
+    integrate_out,
+    judged_first,
+    scale_mixture,
+)
 
 #: Columns of errors in the residual system: of the sensors, and of the model.
 OF_SENSORS, OF_MODEL = len(SENSOR_ERROR_COLUMNS), len(MODEL_ERROR_COLUMNS)
+#: Sweeps over the linear unknowns, one solved after another, to their likeliest values at a soil.
+SWEEPS = 2
 
 
 @dataclass(frozen=True)
-class SetReadings:
-    """Readings of a set: those of earlier calls, and new ones."""
+class Standardised:
+    """Nearly known unknowns that are sampled in standardised coordinates."""
 
-    rows: ResidualRows
-    state: Value  # residual system (kept, terms + errors) of earlier readings
-    size: Value  # size of the errors of the model, (1,)
-    scales: ErrorScales  # their sizes where that is inferred
-    present: tuple[bool, ...]  # which of `MODEL_ERROR_COLUMNS` the model can have
+    factors: Value  # (1, terms)
+    prior: Floats  # (nearly known unknowns, terms) residuals
 
-    def mixture_of(self, system: Value, terms: int) -> ScaleMixture:
-        """The likelihood of a system (m, terms + errors) with the model's errors integrated out."""
-        return add_scale_mixture(system, self.size, terms, self.scales, self.present)
+    @staticmethod
+    def of(terms: Terms, free: int, std: Value) -> Standardised:
+        """Of unknowns after the first `free`, with standard deviations (unknowns, 1)."""
+        unknowns = range(1, max(map(max, terms)) + 1)
+        powers = np.asarray([[t.count(k) if k > free else 0 for t in terms] for k in unknowns])
+        padding = (ONE,) * (len(terms[0]) - 1)
+        linear = [terms.index((*padding, axis)) for axis in unknowns if axis > free]
+        log_std = log(std * NORMAL_TRUNCATION)
+        return Standardised(
+            exp(gemm(log_std, powers, transpose_a=True)),
+            NORMAL_TRUNCATION * np.eye(len(terms))[linear],
+        )
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Nearly known unknowns z as errors that all readings share."""
+
+    terms: Terms
+    sampled: Terms  # without z
+    parts: Floats  # (sampled terms, terms): which terms have which factor without z
+    axes: tuple[int, ...]  # numbers of the linear unknowns, counted from 1
+    std: Value  # (z, 1) standard deviations of their coordinates
+
+    @staticmethod
+    def of(terms: Terms, free: int, std: Value) -> Linear:
+        """Of unknowns after the first `free`, with standard deviations (unknowns, 1)."""
+        sampled: Terms = tuple(term for term in terms if max(term) <= free)
+        parts = np.zeros((len(sampled), len(terms)))
+        for column, term in enumerate(terms):
+            own = tuple(sorted(factor if factor <= free else ONE for factor in term))
+            parts[sampled.index(own), column] = 1.0
+        axes = tuple(sorted({factor for term in terms for factor in term if factor > free}))
+        return Linear(terms, sampled, parts, axes, std.take([a - 1 for a in axes], axis=0))
+
+    def in_the_middle(self) -> Value:
+        """The columns (terms, sampled + z) of x and z, linear in the middle of the prior."""
+        select = np.eye(len(self.terms))[:, [self.terms.index(term) for term in self.sampled]]
+        middle = constant(self.std.graph, np.eye(len(self.terms), 1))
+        return concat([constant(middle.graph, select), *self._changes(middle)], axis=1)
+
+    def at(self, soil: Value, system: dict[str, Value]) -> tuple[Value, Value]:
+        """Monomials (terms, 1) of x and the likeliest z, and the columns, linear there.
+
+        soil: Monomials (sampled terms, 1) of x.
+        system: State, columns and use of the readings.
+        """
+        whole, columns = composite(
+            "LikeliestSoil", ["whole", "unknowns"], self._likeliest, **system, soil=soil,
+            std=self.std, part=soil.indices(self.parts.T.argmax(axis=1)),
+            powers=soil.indices([[term.count(axis) for term in self.terms] for axis in self.axes]),
+            derivatives=soil.indices(
+                [derivative(self.terms, axis).argmax(axis=1) for axis in self.axes]
+            ),
+        )  # fmt: skip
+        return whole, columns
+
+    def _likeliest(
+        self, state: Value, columns: Value, used: Value, soil: Value, std: Value, part: Value,
+        powers: Value, derivatives: Value,
+    ) -> list[Value]:  # fmt: skip
+        """The likeliest values of z, one after another, each from its residuals' change."""
+        system, _ = _joined(state, columns, used, [OF_SENSORS])
+        of_x, count = soil.node("Gather", part, axis=0), len(self.axes)
+        powers = powers.astype(np.float32)
+        stds, rows = std.split(count, axis=0), powers.split(count, axis=0)
+        places = derivatives.split(count, axis=0)
+        units = [constant(soil.graph, [[0.0]]) for _ in self.axes]
+
+        def at_units() -> tuple[Value, Value, list[Value]]:
+            factors = [
+                (unit * one).node("Pow", row).reshape(-1, 1)
+                for unit, one, row in zip(units, stds, rows, strict=True)
+            ]
+            of_z = reduce(mul, factors)
+            whole = of_x * of_z
+            changes = [
+                whole.node("Gather", place.reshape(-1), axis=0) * row.reshape(-1, 1) * one
+                for place, row, one in zip(places, rows, stds, strict=True)
+            ]
+            return of_z, whole, changes
+
+        for _ in range(SWEEPS):
+            for place in range(count):
+                _, whole, changes = at_units()
+                own = system @ changes[place]
+                residual = system @ whole - own * units[place]
+                against = gemm(own, residual, transpose_a=True)
+                units[place] = -against / (own.sum_of_squares(keepdims=True) + 1.0)
+        of_z, whole, changes = at_units()
+        first = np.eye(1, len(self.sampled))
+        offset = reduce(add, (c * u for c, u in zip(changes, units, strict=True)))
+        in_x = self.parts.T * of_z - offset * first
+        return [whole, concat([in_x, *changes], axis=1)]
+
+    def _changes(self, whole: Value) -> list[Value]:
+        """Changes (terms, 1) of monomials (terms, 1) with one standard deviation of each z."""
+        stds = self.std.split(len(self.axes), axis=0)
+        derivatives = (derivative(self.terms, axis) for axis in self.axes)
+        return [whole.derived(d) * std for d, std in zip(derivatives, stds, strict=True)]
+
+
+def _joined(state: Value, columns: Value, used: Value, errors: list[int]) -> list[Value]:
+    """Columns of monomials, and of kinds of errors, of earlier and of new readings, each (m, k).
+
+    state: System (kept, terms + errors) of earlier readings.
+    columns: Of new readings as rows (terms + errors, readings).
+    used: Whether each of them takes part.
+    errors: Numbers of columns of each kind, which may be fewer than those of the state.
+    """
+    new = columns.node("Transpose").node("Compress", used, axis=0)
+    if lacking := OF_SENSORS + OF_MODEL - sum(errors):
+        state, _ = state.last_columns(lacking)
+    return concat([state, new], axis=0).last_columns(*errors)
 
 
 @dataclass(frozen=True)
 class Likelihood:
-    """What the sampler needs of the readings of a set, in the unknowns that it samples."""
+    """What is sampled of a set's readings.
 
-    family: WheelFamily
-    response: Response
-    context: ContextValues
-    readings: SetReadings
-    #: columns of earlier readings: of monomials, errors of sensors and of the model
-    earlier: tuple[Value, ...]
+    Attributes
+    ----------
+    polynomials
+        Monomials of the sampled unknowns.
+    rows, state
+        New readings, and the residual system (kept, terms + errors) of earlier ones.
+    size
+        Of the errors of the model, (1,).
+    scales, present
+        Their sizes where that is inferred, and which of `MODEL_ERROR_COLUMNS` the model can have.
+    nearly_known
+        How nearly known unknowns are treated; None where there are none.
+    """
 
-    @staticmethod
-    def of(
-        family: WheelFamily, response: Response, context: ContextValues, readings: SetReadings
-    ) -> Likelihood:
-        """With all unknowns of a family of wheels, and all terms of its response."""
-        parts = [len(response.terms), OF_SENSORS, OF_MODEL]
-        earlier = readings.state.split(parts, axis=1)
-        return Likelihood(family, response, context, readings, tuple(earlier))
+    polynomials: Polynomials
+    rows: ResidualRows
+    state: Value
+    size: Value
+    scales: ErrorScales
+    present: tuple[bool, ...]
+    nearly_known: Standardised | Linear | None
+
+    def sampled(
+        self, sizes: SampleSizes, prior: ProposalDraws, adapted: ProposalDraws, limit: Value,
+        targets: int,
+    ) -> list[Value]:  # fmt: skip
+        """Points (1 + p, n), weights (1, n), least misfit (1,), and the state with the new rows."""
+        system = {
+            "state": self.state, "columns": self.rows.columns_at(None), "used": self.rows.used,
+        }  # fmt: skip
+        nearly = self.nearly_known
+        linear = nearly if isinstance(nearly, Linear) else None
+        given = {} if nearly is None else {"unknowns": _of_unknowns(nearly)}
+        graph, polynomials = self.size.graph, self.polynomials
+        # what follows is for C, which has these methods as templates
+        of_c = {
+            "terms": self.size.indices(polynomials.rows),
+            "tilts": constant(graph, polynomials.tilts, name="tilts"),
+        }
+        if isinstance(nearly, Standardised):
+            of_c["prior_rows"] = constant(graph, nearly.prior, name="prior_rows")
+        of_columns, probabilities = judged_first(self.scales)
+        present = np.flatnonzero(self.present)
+        of_scales = {
+            "present": self.size.indices(present),
+            "scales": constant(graph, of_columns[:, present], name="scales"),
+            "log_probabilities": constant(graph, np.log(probabilities), name="log_probabilities"),
+            "rounds": self.size.indices([sizes.rounds]), "targets": self.size.indices([targets]),
+        }  # fmt: skip
+        soil, *first = composite(
+            "FirstRound", ["soil", "solved", "free", "outside"], self._first_body(),
+            **system, **given, **dict(zip(("draws", "t", "log_prior"), prior, strict=True)), **of_c,
+        )  # fmt: skip
+        if linear is not None:
+            soil, given["unknowns"] = linear.at(soil, system)
+        system["columns"] = self.rows.columns_at(soil)
+        return composite(
+            "Posterior", ["points", "weights", "misfit", "grown"],
+            self._posterior_body(sizes, targets), **system, **given, size=self.size, limit=limit,
+            prior=prior.normal, **dict(zip(("solved", "free", "outside"), first, strict=True)),
+            **adapted._asdict(), **of_scales,
+        )  # fmt: skip
+
+    def _first_body(self) -> Callable[..., list[Value]]:
+        """From readings to the first round, with errors linear in the middle of the prior."""
+
+        def body(
+            state: Value, columns: Value, used: Value, draws: Value, t: Value, log_prior: Value,
+            unknowns: Value | None = None, **_: Value,
+        ) -> list[Value]:  # fmt: skip
+            whole, sensors = _joined(state, columns, used, [OF_SENSORS])
+            whole, taken = self._in_unknowns(whole, sensors, unknowns)
+            system = self._with_prior(integrate_out(concat([whole, taken], axis=1), self._taken))
+            soil, *rest = first_round(self.polynomials, system, draws, t, log_prior)
+            if isinstance(self.nearly_known, Standardised) and unknowns is not None:
+                soil = soil * unknowns.node("Transpose")
+            return [soil, *rest]
+
+        return body
+
+    def _posterior_body(self, sizes: SampleSizes, targets: int) -> Callable[..., list[Value]]:
+        """From readings, with errors linear at a soil, to the sample of the posterior."""
+
+        def body(
+            state: Value, columns: Value, used: Value, size: Value, limit: Value, prior: Value,
+            solved: Value, free: Value, outside: Value, normal: Value, t: Value,
+            log_density: Value, unknowns: Value | None = None, **_: Value,
+        ) -> list[Value]:  # fmt: skip
+            whole, sensors, model = _joined(state, columns, used, [OF_SENSORS, OF_MODEL])
+            grown = concat([whole, sensors, model], axis=1)
+            present = np.flatnonzero(self.present).tolist()
+            whole, taken = self._in_unknowns(whole, sensors, unknowns)
+            model = model.take(present, axis=1)
+            system = integrate_out(concat([whole, model, taken], axis=1), self._taken)
+            system, model = system.last_columns(len(present))
+            mixture = scale_mixture(system, model, size, self.scales, self.present)
+            systems = self._with_prior(mixture.systems, len(self.scales.scales))
+            mixture = Scaled(systems, mixture.log_weight)
+            first = (prior, solved, free, outside)
+            draws = ProposalDraws(normal, t, log_density)
+            found = adapted_rounds(self.polynomials, mixture, limit, targets, sizes, first, draws)
+            return [*found, grown]
+
+        return body
 
     @property
-    def noise_alone(self) -> Value:
-        """Whether the readings, those of earlier calls as well, have noise alone, (1, 1).
+    def _taken(self) -> int:
+        """Number of columns that are integrated out as errors of sensors are."""
+        linear = self.nearly_known
+        return OF_SENSORS + (len(linear.axes) if isinstance(linear, Linear) else 0)
 
-        Errors of the model, of slip and load, and those that readings share change with the soil.
-        """
-        errors = self.readings.rows.sensor_errors
-        shared = concat([errors.readings[name] for name in COMMON_ERROR_INPUTS], axis=0)
-        others = (errors.operating.stds, self.earlier[1], shared)
-        squares = [value.sum_of_squares(keepdims=True) for value in others]
-        of_torque = errors.readings["torque_bias"].sum_of_squares(keepdims=True)
-        return of_torque.node("Sum", *squares) <= 0.0
+    def _in_unknowns(
+        self, whole: Value, sensors: Value, unknowns: Value | None
+    ) -> tuple[Value, Value]:
+        """Columns of the sampled monomials, and those that are integrated out."""
+        if isinstance(self.nearly_known, Standardised) and unknowns is not None:
+            return whole * unknowns, sensors
+        if isinstance(self.nearly_known, Linear) and unknowns is not None:
+            both = whole @ unknowns
+            whole, of_z = both.last_columns(len(self.nearly_known.axes))
+            sensors = concat([of_z, sensors], axis=1)
+        return whole, sensors
 
-    def rows_of_noise_alone(self) -> Value:
-        """Rows (m, terms) of new readings that have noise alone."""
-        return self.readings.rows.of_noise_alone()
+    def _with_prior(self, systems: Value, copies: int = 0) -> Value:
+        """A system (m, terms), or copies of it, with the prior of standardised unknowns below."""
+        if not isinstance(self.nearly_known, Standardised):
+            return systems
+        prior = self.nearly_known.prior
+        if copies:
+            prior = np.broadcast_to(prior, (copies, *prior.shape))
+        return concat([systems, constant(systems.graph, prior)], axis=1 if copies else 0)
 
-    def with_noise_alone(self, rows: Value) -> Value:
-        """Residuals (m, terms) of readings that have noise alone, with these new rows."""
-        return concat([self.earlier[0], rows], axis=0)
 
-    def grown(self, rows: Value) -> Value:
-        """The state with these rows, which have no errors."""
-        errors = rows.take([0], axis=1) * np.zeros((1, OF_SENSORS + OF_MODEL))
-        return concat([self.readings.state, concat([rows, errors], axis=1)], axis=0)
-
-    def start(self) -> Value:
-        """Residuals (m, terms) of a model without errors, those of sensors integrated out.
-
-        Errors of new readings are linear in the middle of the prior's range.
-        """
-        terms = len(self.response.terms)
-        earlier, _ = self.readings.state.split([terms + OF_SENSORS, OF_MODEL], axis=1)
-        whole = concat([earlier, self.readings.rows.system_at(None)], axis=0)
-        return integrate_out_sensor_errors(whole, terms)
-
-    def mixture_at(self, basis: Value) -> tuple[ScaleMixture, Value]:
-        """The likelihood with errors linear at a soil, and the state with the new rows.
-
-        basis: Monomials (terms, 1) of the soil.
-        """
-        terms = len(self.response.terms)
-        new = self.readings.rows.system_at(basis)
-        grown = concat([self.readings.state, new], axis=0)
-        whole, sensors, model = grown.split([terms, OF_SENSORS, OF_MODEL], axis=1)
-        system = concat([whole, model, sensors], axis=1)
-        system = integrate_out_sensor_errors(system, terms + OF_MODEL)
-        return self.readings.mixture_of(system, terms), grown
+def _of_unknowns(nearly: Standardised | Linear) -> Value:
+    return nearly.factors if isinstance(nearly, Standardised) else nearly.in_the_middle()

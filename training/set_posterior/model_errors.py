@@ -13,7 +13,7 @@ from soilml.onboard.set_contract import (
     MODEL_ERROR_INPUT,
     RESPONSE_CHANNELS,
 )
-from training.onnx_graph.value import Value, concat, exp, gemm, log, maximum, shortcut, stack_rows
+from training.onnx_graph.value import Value, concat, exp, gemm, log, maximum
 from training.set_posterior.error_scales import OF_CHANNELS
 from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import SMALLEST, ContextValues, WheelFamily
@@ -48,45 +48,24 @@ class ModelErrors:
             - \frac{\partial f}{\partial \ln W} - \frac{\partial f}{\partial \ln c}
 
         A scale of torque without load changes with the logarithm of torque itself in addition.
-        The strength is cohesion and the tangent of the friction angle. They are of usual size, zero
-        where the model is right, and then not computed.
+        The strength is cohesion and the tangent of the friction angle. They are of usual size,
+        and zero where the model is right.
 
         slopes: Derivatives of the channels by log slip and log load, at the same soil, (2,
             channels, rows).
         coefficients: Coefficients of the channels (terms, readings).
         basis: Monomials (terms, 1) of the soil.
         """
-        size, errors = self.readings[MODEL_ERROR_INPUT], len(MODEL_ERROR_COLUMNS)
-        row = coefficients.split([1, len(self.response.terms) - 1], axis=0)[0]
-        return shortcut(
-            size * size <= 0.0,
-            lambda first, *others: first * np.zeros((errors, 1)),
-            self._columns,
-            row,
-            *(slopes, coefficients, basis, self.slope, self.context.features),
-            *(self.readings[name] for name in ("slip", "load", "torque")),
-        )
-
-    def _columns(
-        self,
-        _: Value,
-        slopes: Value,
-        coefficients: Value,
-        basis: Value,
-        slope: Value,
-        features: Value,
-        *readings: Value,
-    ) -> Value:
-        """The columns of a model that has errors."""
         stds, channels = self.family.model_errors(), len(RESPONSE_CHANNELS)
-        slip, load, torque = readings
+        slip, load, torque = (self.readings[name] for name in ("slip", "load", "torque"))
+        slope = self.slope
         log_load = log(maximum(load, SMALLEST)) - self.context.reference_log_load
         bearing = [
             slip * 0.0 + stds["bearing"],
             slip * stds["bearing_by_slip"],
             log_load * stds["bearing_by_load"],
         ]
-        profile = stack_rows(bearing).reshape(3, 1, -1)
+        profile = concat(bearing, axis=0).reshape(3, 1, -1)
         first = np.zeros((channels, 1))
         first[0] = 1.0
         of_torque = first * (1.0 - self.context.torque_by_load)
@@ -96,7 +75,7 @@ class ModelErrors:
         change = change - self._by_logarithms(STRENGTH[:1], coefficients, basis)
         contact = change * 0.0
         if self.response.contact is not None:
-            at_soil = self.response.contact.add_at_soil(features).at(basis)
+            at_soil = self.response.contact.add_at_soil(self.context.features, basis)
             contact = at_soil.reshape(1, channels, -1) * stds["contact"]
         own = (slope * torque * first + (1.0 - first)) * self._own_errors(slip)
         laws = [
@@ -105,7 +84,9 @@ class ModelErrors:
             of_modulus * stds["shear_modulus"],
         ]
         columns = concat([change * profile, contact, own, *laws], axis=0)
-        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1)
+        size = self.readings[MODEL_ERROR_INPUT]
+        some = (size * size > 0.0).astype(np.float32)
+        return columns.reshape(len(MODEL_ERROR_COLUMNS), -1) * some
 
     def _by_logarithms(self, names: Sequence[str], coefficients: Value, basis: Value) -> Value:
         """Sum (1, channels, rows) of the changes with the logarithms of these unknowns.
@@ -145,4 +126,4 @@ def _by_log_value(basis: Value, terms: Terms, number: int, axis: PriorAxis) -> V
     by_x = growth * axis.rate + axis.slope
     if axis.name == FRICTION:
         value = value.node("Sin") * value.node("Cos")
-    return (derivative(terms, number) @ basis) * (value / by_x)
+    return basis.derived(derivative(terms, number)) * (value / by_x)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from soilml.arrays import Floats
@@ -11,6 +13,7 @@ from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from training.onnx_graph.value import (
     Value,
     absolute,
+    composite,
     concat,
     constant,
     exp,
@@ -21,7 +24,6 @@ from training.onnx_graph.value import (
     where,
 )
 from training.set_posterior.families.wheel_family import ContextValues, WheelFamily
-from training.set_posterior.importance_sampler import WeightedSample
 from training.set_posterior.misfit_test import Consistency
 
 INTERVAL = (0.05, 0.95)  # Probabilities of the ends of the interval
@@ -36,7 +38,7 @@ LARGEST_SHARE = 0.95
 LEAST_SHARE = 1e-6  # Least share of the sample between two grid points that is divided by
 
 
-def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> Value:
+def add_quantiles(deviations: Value, std: Value, weights: Value) -> Value:
     r"""The quantiles (2, q) at `INTERVAL` of q deviations from a mean.
 
     The weighted distribution function F is evaluated at multiples :math:`g_i` of the spacing h, and
@@ -59,18 +61,25 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
     deviations: Deviations from the mean, (q, n).
     std: Their standard deviations, (q,).
     weights: Weights (1, n) with sum 1.
-    count: n.
     """
-    segments = len(DISTANCES) - 1
-    grid = np.concatenate([-DISTANCES[::-1], DISTANCES]) / SPACING
-    spacing = std * SPACING
+    given = {"deviations": deviations, "std": std, "weights": weights}
+    for name, numbers in (("grid", GRID), ("spacing", [SPACING]), ("probabilities", INTERVAL)):
+        given[name] = constant(std.graph, numbers, name=name)  # for C, which has a template
+    return composite("Quantiles", ["ends"], _quantiles, **given)[0]
+
+
+#: Multiples of the spacing, around the mean.
+GRID = np.concatenate([-DISTANCES[::-1], DISTANCES]) / SPACING
+
+
+def _quantiles(deviations: Value, std: Value, weights: Value, **_: Value) -> list[Value]:
+    segments, spacing = len(DISTANCES) - 1, std * SPACING
     relative = (deviations / spacing.reshape(-1, 1)).reshape(0, 1, -1)
-    below = ((grid + 0.5)[:, None] - relative).clip(0.0, 1.0)
-    flat = below.reshape(-1, count)  # (q * grid points, n)
-    distribution = gemm(weights, flat, transpose_b=True).reshape(-1, len(grid))
+    below = ((GRID + 0.5)[:, None] - relative).clip(0.0, 1.0)
+    distribution = (below @ weights.reshape(-1, 1)).reshape(0, len(GRID))
     # columns of these matrices are the segments: of the lower half of the grid for the lower
     # quantile, then of the upper half for the upper quantile
-    minus_start, increment = np.zeros((2, len(grid), 2 * segments))
+    minus_start, increment = np.zeros((2, len(GRID), 2 * segments))
     of_end = np.zeros((2 * segments, 2))
     for end in range(2):
         for i in range(segments):
@@ -80,11 +89,11 @@ def add_quantiles(deviations: Value, std: Value, weights: Value, count: int) -> 
             of_end[segment, end] = 1.0
     remaining = gemm(distribution, minus_start, np.repeat(INTERVAL, segments))
     passed = remaining / maximum(distribution @ increment, LEAST_SHARE)
-    first_points = grid[[0, segments + 1]][:, None]
+    first_points = GRID[[0, segments + 1]][:, None]
     whole = gemm(
         constant(std.graph, of_end.T), passed.clip(0.0, 1.0), first_points, transpose_b=True
     )
-    return whole * spacing
+    return [whole * spacing]
 
 
 ZERO_FACTOR = 1e-30  # Stands for a factor of zero, of which the logarithm is taken
@@ -94,8 +103,9 @@ PRIOR_POINTS = 4096
 
 def add_posterior_outputs(
     family: WheelFamily,
+    order: tuple[int, ...],
     context: ContextValues,
-    sample: WeightedSample,
+    sample: Sequence[Value],
     consistency: Consistency,
     prefix: str,
     few_points: bool = False,
@@ -108,26 +118,28 @@ def add_posterior_outputs(
     A set without enough rows in range gets the prior. Of a set that no soil explains, the sample
     is that with the noise that explains it, and the flag is false.
 
+    order: Of the axes in the points.
+    sample: Points (1 + p, n), weights (1, n) with sum 1, and least misfit (1,).
     few_points: Whether the covariance also has the error of a mean of few points, see
         `variance_of_few_points`.
     """
-    q = family.targets
+    q, (points, weights, misfit) = family.targets, sample
     # onnxruntime takes half the time for one row times a matrix than for a matrix times one column
-    value = _parameters(family, sample)
-    mean = gemm(sample.weights, value, transpose_b=True)  # (1, q)
+    value = _parameters(family, order, points)
+    mean = gemm(weights, value, transpose_b=True)  # (1, q)
     deviation = value - mean.reshape(q, 1)
     mean = mean.reshape(q)
-    covariance = gemm(deviation * sample.weights, deviation, transpose_b=True)
+    covariance = gemm(deviation * weights, deviation, transpose_b=True)
     variance = (covariance * np.eye(q)).sum(axis=0, keepdims=False)
     std = sqrt(variance)
-    interval = add_quantiles(deviation, std, sample.weights, sample.count)
+    interval = add_quantiles(deviation, std, weights)
     if few_points:
-        factor = variance_of_few_points(sample.weights)
+        factor = variance_of_few_points(weights)
         root = sqrt(factor)
         covariance, std, interval = covariance * factor, std * root, interval * root
     interval = mean + interval
     enough = consistency.enough
-    consistent = enough & (sample.misfit <= consistency.limit)
+    consistent = enough & (misfit <= consistency.limit)
     consistent = consistent.named(f"{prefix}{SET_PREFIX}in_range")
     prior, scale = prior_summary(family), context.target_scale
     names = ("mean", "std", "low", "high")
@@ -145,7 +157,7 @@ def add_posterior_outputs(
     _add_edge_flag(family, mean, std).named(f"{prefix}{SET_PREFIX}at_edge")
     vague = std > NOT_IDENTIFIED_ABOVE * prior["std"]
     (vague | ~consistent).named(f"{prefix}{SET_PREFIX}abstains")
-    sample.misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
+    misfit.node("Identity").named(f"{prefix}{SET_PREFIX}misfit")
 
 
 def variance_of_few_points(weights: Value) -> Value:
@@ -180,7 +192,7 @@ def prior_summary(family: WheelFamily) -> dict[str, Floats]:
     return {"mean": values.mean(axis=1), "std": values.std(axis=1), "low": low, "high": high}
 
 
-def _parameters(family: WheelFamily, sample: WeightedSample) -> Value:
+def _parameters(family: WheelFamily, order: tuple[int, ...], points: Value) -> Value:
     r"""Estimated parameters (q, n) of a sample without their scale.
 
     .. math:: \theta = \alpha + \delta x + e^{\log \beta + \gamma x}
@@ -189,9 +201,9 @@ def _parameters(family: WheelFamily, sample: WeightedSample) -> Value:
     """
     linear, exponent = np.zeros((2, family.targets, 1 + len(family.axes)))
     for k, axis in enumerate(family.axes[: family.targets]):
-        column = 1 + sample.order.index(k)
+        column = 1 + order.index(k)
         linear[k, [0, column]] = axis.shift, axis.slope
         exponent[k, [0, column]] = np.log(max(axis.factor, ZERO_FACTOR)), axis.rate
-    graph = sample.points.graph
-    exponential = exp(constant(graph, exponent) @ sample.points)
-    return constant(graph, linear) @ sample.points + exponential
+    graph = points.graph
+    exponential = exp(constant(graph, exponent) @ points)
+    return constant(graph, linear) @ points + exponential

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,8 +16,6 @@ from training.onnx_graph.value import (
     log,
     maximum,
     sqrt,
-    stack_rows,
-    where,
 )
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
@@ -59,18 +57,6 @@ class ResidualRows:
     in_range: Value  # (rows,) whether the features lie in the range of the response surface
     counts: Value  # (3,) float32: readings in the system, rows, rows in range within their noise
 
-    def system_at(self, basis: Value | None) -> Value:
-        """The system (readings, terms + errors) of the readings that take part."""
-        return self.compressed(self.columns_at(basis))
-
-    def of_noise_alone(self) -> Value:
-        """The system (readings, terms) with no errors but the noise of the channels."""
-        return self.compressed(self.values.coefficients * self.weight)
-
-    def compressed(self, columns: Value) -> Value:
-        """Columns as rows (columns, readings) as a system of the readings that take part."""
-        return columns.node("Transpose").node("Compress", self.used, axis=0)
-
     def columns_at(self, basis: Value | None) -> Value:
         r"""Columns (terms + errors, readings), with errors linear at one soil.
 
@@ -95,7 +81,7 @@ class ResidualRows:
 
 
 def add_residual_rows(
-    family: WheelFamily, response: Response, readings: dict[str, Value], small: bool = False
+    family: WheelFamily, response: Response, readings: dict[str, Value]
 ) -> tuple[ContextValues, ResidualRows]:
     r"""Residuals of the three channels of each row, as polynomials of the unknowns.
 
@@ -106,8 +92,6 @@ def add_residual_rows(
     Readings out of range, or with too much noise for a logarithm, are left out.
 
     readings: Readings and standard deviations (1, rows), and inputs of the whole set (1,), by name.
-    small: Whether they stay in the system, with a weight of zero: what is computed of rows out of
-        range, such as a pull over a load of zero, is then zero too, so that it stays finite.
     """
     context = family.add_context(readings)
     operating, outside = _operating(readings), _outside(response, context.features)
@@ -117,24 +101,18 @@ def add_residual_rows(
     sinkage = maximum(readings["sinkage"], SMALLEST)
     per_load = one / readings["load"]
     # derivatives of the three scales by torque, sinkage and drawbar pull
-    slope = stack_rows([context.torque_slope, one / sinkage, per_load])
-    if small:
-        slope = where(in_range, slope, 0.0)
-    noise = stack_rows([readings[f"{name}_std"] for name in RESPONSE_CHANNELS]) * slope
+    slope = concat([context.torque_slope, one / sinkage, per_load], axis=0)
+    noise = concat([readings[f"{name}_std"] for name in RESPONSE_CHANNELS], axis=0) * slope
     log_sinkage = log(sinkage / context.length)
-    y = stack_rows([context.torque, log_sinkage, readings["drawbar_pull"] * per_load])
-    if small:
-        y = where(in_range, y, 0.0)
-        context = replace(context, features=where(in_range, context.features, 0.0))
+    y = concat([context.torque, log_sinkage, readings["drawbar_pull"] * per_load], axis=0)
     most_noise = np.asarray([[context.most_torque_noise], [MOST_RELATIVE_NOISE], [MOST_PULL_NOISE]])
     used = (noise < most_noise).astype(np.float32) * within  # (channels, rows)
     weight = used / sqrt(noise * noise + response.error[:, None] ** 2)
     used = used.reshape(-1)
-    values = response.add_to(context.features, y, context.feature_slopes, once=small)
+    values = response.add_to(context.features, y, context.feature_slopes)
     # rows may be out of range by their noise: a slip at the end of the range is so half the time
     margin = -NOISE_MARGIN * np.abs(context.feature_slopes.T)
     outside_noise = gemm(constant(outside.graph, margin), operating.relative_noise, outside)
-    exact = operating.stds.reduce("ReduceSum") <= 0.0
     counts = [
         used.sum(),
         in_range.node("Shape").astype(np.float32),
@@ -144,7 +122,7 @@ def add_residual_rows(
         weight=weight.reshape(1, -1),
         used=used.astype(np.bool_),
         values=values,
-        sensor_errors=SensorErrors(context, readings, operating, y, slope, exact),
+        sensor_errors=SensorErrors(context, readings, operating, y, slope),
         model_errors=ModelErrors(family, response, context, readings, slope),
         in_range=in_range,
         counts=concat(counts, axis=0),
@@ -153,14 +131,15 @@ def add_residual_rows(
 
 def _operating(readings: dict[str, Value]) -> OperatingReadings:
     """Slip and load, and their noise."""
-    values = maximum(stack_rows([readings[name] for name in OPERATING_NOISE]), SMALLEST)
-    stds = stack_rows([readings[name] for name in OPERATING_STD_INPUTS])
+    values = maximum(concat([readings[name] for name in OPERATING_NOISE], axis=0), SMALLEST)
+    stds = concat([readings[name] for name in OPERATING_STD_INPUTS], axis=0)
     return OperatingReadings(values, stds, stds / values)
 
 
 def _outside(response: Response, features: Value) -> Value:
     """Distances (f, rows) of features from the middle of the designs of the response surface."""
-    return absolute(features - 0.5 * (response.upper + response.lower)[:, None])
+    middle = 0.5 * (response.upper + response.lower)[:, None]
+    return absolute(features - constant(features.graph, middle, name="range_middle"))
 
 
 def _all_below(response: Response, distance: Value) -> Value:
@@ -168,6 +147,8 @@ def _all_below(response: Response, distance: Value) -> Value:
 
     Distances that are not numbers, of a wheel without size, are not.
     """
-    half_width = (0.5 + BOX_TOLERANCE) * (response.upper - response.lower)
-    inside = (distance <= half_width[:, None]).astype(np.float32)
+    half_width = (0.5 + BOX_TOLERANCE) * (response.upper - response.lower)[:, None]
+    inside = (distance <= constant(distance.graph, half_width, name="range_half")).astype(
+        np.float32
+    )
     return inside.reduce("ReduceMin", axis=0, keepdims=False)

@@ -29,26 +29,6 @@ CHANNELS = len(RESPONSE_CHANNELS)
 
 
 @dataclass(frozen=True)
-class SoilValues:
-    """The last hidden layer (hidden, rows) of a network, and its last layer, bias included."""
-
-    hidden: Value
-    last_layer: Floats  # (channels * (hidden + 1), terms) its weights
-
-    @staticmethod
-    def of(hidden: Value, last: tuple[Floats, ...], terms: int) -> SoilValues:
-        """From the last hidden layer, and weights and bias of the last, of (terms * channels)."""
-        return SoilValues(hidden, _by_channel(np.concatenate([last[0], last[1][None]]), terms))
-
-    def at(self, basis: Value) -> Value:
-        """Channels (channels, rows) at the soil with the monomials `basis` (terms, 1)."""
-        by_channel = (constant(basis.graph, self.last_layer) @ basis).reshape(CHANNELS, -1)
-        units = len(self.last_layer) // CHANNELS - 1
-        weights, bias = by_channel.split([units, 1], axis=1)
-        return gemm(weights, self.hidden, bias)
-
-
-@dataclass(frozen=True)
 class ResponseValues:
     """Graph values of a response surface for rows of readings, float32.
 
@@ -56,12 +36,10 @@ class ResponseValues:
     """
 
     coefficients: Value  # (terms, readings), with the offset taken off the constant term
-    hidden: tuple[Value, ...]  # the hidden layers, (hidden, rows) each
-    directions: Floats  # (d, f) of the features, along which there are derivatives
-    layers: tuple[Floats, ...]  # weights (units, inputs) of the hidden layers
-    last_layer: Floats  # (channels * hidden, terms) weights of the last one
-    #: the whole last layer (terms, channels * (hidden + channels)), where it is kept once only
-    whole_layer: Floats | None = None
+    tangent: Value  # (d, hidden, rows) derivatives of the last hidden layer along d directions
+    #: last layer (terms * channels, hidden + channels), whose last columns take the offset off
+    layer: Value
+    middle: Floats  # (channels, hidden) the same at the middle of the prior's range
 
     def slopes_at(self, basis: Value | None) -> Value:
         """Derivatives (d, channels, rows) of the channels at one soil along the directions.
@@ -69,23 +47,12 @@ class ResponseValues:
         The soil is given by its monomials (terms, 1); None is the middle of the prior's range.
         They are exact: each layer carries the tangents of its values.
         """
-        tangent: Value | Floats = self.directions[:, :, None]
-        for weights, hidden in zip(self.layers, self.hidden, strict=True):
-            tangent = (weights @ tangent) * (1.0 - hidden * hidden)
-        assert isinstance(tangent, Value)
         if basis is None:
-            return self.last_layer[:, 0].reshape(CHANNELS, -1) @ tangent
-        if self.whole_layer is not None:
-            at_soil = gemm(basis, self.whole_layer, transpose_a=True).reshape(CHANNELS, -1)
-            units = len(self.last_layer) // CHANNELS
-            return at_soil.split([units, CHANNELS], axis=1)[0] @ tangent
-        last_layer = constant(basis.graph, self.last_layer)
-        return (last_layer @ basis).reshape(CHANNELS, -1) @ tangent
-
-
-def _by_channel(layer: Floats, terms: int) -> Floats:
-    """Weights (units, terms * channels) of a last layer as (channels * units, terms)."""
-    return layer.reshape(len(layer), terms, CHANNELS).transpose(2, 0, 1).reshape(-1, terms)
+            return self.middle @ self.tangent
+        units = self.middle.shape[1]
+        by_term = self.layer.reshape(-1, CHANNELS * (units + CHANNELS))
+        at_soil = gemm(basis, by_term, transpose_a=True).reshape(CHANNELS, -1)
+        return at_soil.split([units, CHANNELS], axis=1)[0] @ self.tangent
 
 
 #: Points of the unknowns at which each design is simulated, for each term of the polynomial.
@@ -162,48 +129,51 @@ class Response:
         """Channels (n, m, channels) at features (n, f) and coordinates (n, m, p) or (m, p)."""
         return np.asarray(monomials(x, self.terms) @ self.coefficients(features))
 
-    def add_at_soil(self, features: Value) -> SoilValues:
-        """Add the network to a graph, for the values of the channels at single soils."""
-        hidden = features - self.scaling.mean[:, None]
-        for weights, bias in self._inner_layers():
-            hidden = tanh(gemm(constant(hidden.graph, weights), hidden, bias))
-        return SoilValues.of(hidden, self.layers[-2:], len(self.terms))
+    def add_at_soil(self, features: Value, basis: Value) -> Value:
+        """Add the network to a graph, for channels (channels, rows) at the soil of monomials."""
+        hidden = self._add_hidden(features, "contact")[-1][1]
+        last, terms = np.concatenate([self.layers[-2], self.layers[-1][None]]), len(self.terms)
+        by_channel = last.reshape(len(last), terms, CHANNELS).transpose(2, 0, 1).reshape(-1, terms)
+        layer = constant(features.graph, by_channel, name="contact_last")
+        at_soil = (layer @ basis).reshape(CHANNELS, -1)
+        weights, bias = at_soil.split([len(last) - 1, 1], axis=1)
+        return gemm(weights, hidden, bias)
 
-    def add_to(
-        self, features: Value, offset: Value, directions: Floats, once: bool = False
-    ) -> ResponseValues:
+    def add_to(self, features: Value, offset: Value, directions: Floats) -> ResponseValues:
         """Add the network to a graph, which can then have derivatives along directions (d, f).
 
-        The offset (channels, rows) is subtracted from the channels. With `once`, slopes at a soil
-        read the same weights as the coefficients, in another order: the program is smaller.
+        The offset (channels, rows) is subtracted from the channels.
         """
-        layers, hidden = self._inner_layers(), [features - self.scaling.mean[:, None]]
-        for weights, bias in layers:
-            hidden.append(tanh(gemm(constant(features.graph, weights), hidden[-1], bias)))
-        last_weights, last_bias = self.layers[-2:]
-        terms = len(self.terms)
+        graph, tangent = features.graph, constant(features.graph, directions[:, :, None])
+        layers = self._add_hidden(features, "response")
+        for weights, hidden in layers:
+            tangent = (weights @ tangent) * (1.0 - hidden * hidden)
+        terms, last = len(self.terms), self.layers[-2].T
         # the constant term is the first of each channel
-        of_offset = -np.eye(terms * CHANNELS, CHANNELS)
-        layer = np.concatenate([last_weights.T, of_offset], axis=1)
-        whole = concat([hidden[-1], offset], axis=0)
-        output = gemm(constant(features.graph, layer), whole, last_bias[:, None])
-        return ResponseValues(
-            output.reshape(terms, -1),
-            tuple(hidden[1:]),
-            directions,
-            tuple(weights for weights, _ in layers),
-            _by_channel(last_weights, terms),
-            layer.reshape(terms, -1) if once else None,
-        )
+        whole = np.concatenate([last, -np.eye(terms * CHANNELS, CHANNELS)], axis=1)
+        layer = constant(graph, whole, name="response_last")
+        bias = constant(graph, self.layers[-1][:, None], name="response_last_bias")
+        output = gemm(layer, concat([layers[-1][1], offset], axis=0), bias)
+        return ResponseValues(output.reshape(terms, -1), tangent, layer, last[:CHANNELS])
 
-    def _inner_layers(self) -> list[tuple[Floats, Floats]]:
-        """Weights (units, inputs) and biases (units, 1) of all layers but the last.
+    def _add_hidden(self, features: Value, name: str) -> list[tuple[Value, Value]]:
+        """Weights (units, inputs) and values (units, rows) of all layers but the last.
 
-        The first takes features without their mean, and scales them.
+        The first takes features without their mean, and scales them. Names of the constants are
+        those by which `stored_response` reads a file.
         """
-        weights = [layer.T for layer in self.layers[0:-2:2]]
-        weights[0] = weights[0] / self.scaling.scale
-        return list(zip(weights, [bias[:, None] for bias in self.layers[1:-2:2]], strict=True))
+        graph, layers = features.graph, []
+        mean = constant(graph, self.scaling.mean[:, None], name=f"{name}_mean")
+        hidden = features - mean
+        for k, (weights, bias) in enumerate(
+            zip(self.layers[:-2:2], self.layers[1:-2:2], strict=True)
+        ):
+            scale = self.scaling.scale if k == 0 else 1.0
+            own = constant(graph, weights.T / scale, name=f"{name}_weights_{k}")
+            of_layer = constant(graph, bias[:, None], name=f"{name}_bias_{k}")
+            hidden = tanh(gemm(own, hidden, of_layer))
+            layers.append((own, hidden))
+        return layers
 
 
 def fit_response(family: WheelFamily, settings: ResponseSettings, progress: Progress) -> Response:

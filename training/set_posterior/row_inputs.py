@@ -18,6 +18,7 @@ from soilml.onboard.set_contract import (
     DAMAGED_COUNTS,
     LEAST_STD,
     MEMORY_INPUTS,
+    MEMORY_OUTPUTS,
     NOISE_OF_FILE,
     NOT_MEASURED,
     OPERATING_NOISE,
@@ -26,7 +27,7 @@ from soilml.onboard.set_contract import (
     READING_INPUTS,
     RESPONSE_CHANNELS,
 )
-from training.onnx_graph.value import Value, absolute, concat, constant, shortcut, sqrt, where
+from training.onnx_graph.value import Value, absolute, composite, concat, constant, sqrt, where
 
 #: Standard deviations of the noise of the channels, in their order.
 CHANNEL_STDS = tuple(f"{name}_std" for name in RESPONSE_CHANNELS)
@@ -103,30 +104,19 @@ def complete_inputs(
         complete |= zip(context, values.split(len(context), axis=0), strict=True)
         total = where(sensible, total, SENSELESS)
     finite = absolute(total) <= LARGEST_SUM
-    stacked = where(finite, _stacked(by_row, rows), constant(total.graph, HARMLESS))
+    whole = concat([value.node("Expand", rows) for value in by_row], axis=0).reshape(len(ROWS), -1)
+    stacked = where(finite, whole, constant(total.graph, HARMLESS))
     state, counts = (inputs[name] for name in MEMORY_INPUTS)
-    squares = state.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
-    intact = squares <= LARGEST_MEMORY
-    damaged = np.asarray(DAMAGED_COUNTS)
-    complete |= zip(
-        MEMORY_INPUTS, (where(intact, state, 0.0), where(intact, counts, damaged)), strict=True
-    )
+    sound = composite("SoundMemory", MEMORY_OUTPUTS, _sound, state=state, counts=counts)
+    complete |= zip(MEMORY_INPUTS, sound, strict=True)
     return complete | _without_markers(stacked, noise)
 
 
-def _stacked(by_row: Sequence[Value], rows: Value) -> Value:
-    """Inputs as the rows of a matrix, those of one element repeated; rows: the number of rows."""
-    flat = concat(by_row, axis=0)
-    none_repeated = flat.node("Shape").node("Equal", rows * flat.number(len(by_row)))
-
-    def repeated(_: Value, rows: Value, *by_row: Value) -> Value:
-        whole = concat([value.node("Expand", rows) for value in by_row], axis=0)
-        return whole.reshape(len(by_row), -1)
-
-    def as_they_are(flat: Value, *_: Value) -> Value:
-        return flat.reshape(len(by_row), -1)
-
-    return shortcut(none_repeated, as_they_are, repeated, flat, rows, *by_row)
+def _sound(state: Value, counts: Value) -> list[Value]:
+    """A state and counts that are finite."""
+    squares = state.sum_of_squares(keepdims=False) + counts.sum_of_squares(keepdims=False)
+    intact = squares <= LARGEST_MEMORY
+    return [where(intact, state, 0.0), where(intact, counts, np.asarray(DAMAGED_COUNTS))]
 
 
 def _without_markers(stacked: Value, noise: FileNoise) -> dict[str, Value]:

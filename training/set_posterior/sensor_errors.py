@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +9,8 @@ import numpy as np
 from soilml.onboard.set_contract import (
     OPERATING_STD_INPUTS,
     RESPONSE_CHANNELS,
-    SENSOR_ERROR_COLUMNS,
 )
-from training.onnx_graph.value import Value, concat, constant, gemm, shortcut, sqrt
+from training.onnx_graph.value import Value, concat, sqrt
 from training.set_posterior.families.wheel_family import ContextValues
 
 CHANNELS = len(RESPONSE_CHANNELS)
@@ -36,7 +34,6 @@ class SensorErrors:
     operating: OperatingReadings
     y: Value  # readings on the scales of the channels, (channels, rows)
     slope: Value  # derivatives of these scales by the readings, (channels, rows)
-    exact: Value  # (1, 1) whether no row has errors of slip and load of its own
 
     def of_residuals(self, slopes: Value) -> Value:
         r"""Derivatives (2, channels, rows) of residuals by log slip and log load.
@@ -79,18 +76,11 @@ class SensorErrors:
     def whitened(self, system: Value, slopes: Value, weight: Value) -> Value:
         """A system (columns, readings) with errors of each row integrated out.
 
-        Where slip and load of all rows are exact, nothing is to be done.
-
         slopes: Those of the residuals.
         weight: That of each reading (1, readings).
         """
-
-        def general(system: Value, slopes: Value, noise: Value, weight: Value) -> Value:
-            of_row = slopes * noise.reshape(len(OPERATING_STD_INPUTS), 1, -1)
-            return whiten_rows(system, of_row.reshape(2, -1) * weight)
-
-        given = (system, slopes, self.operating.relative_noise, weight)
-        return shortcut(self.exact, lambda whole, *_: whole, general, *given)
+        noise = self.operating.relative_noise.reshape(len(OPERATING_STD_INPUTS), 1, -1)
+        return whiten_rows(system, (slopes * noise).reshape(2, -1) * weight)
 
 
 def whiten_rows(system: Value, of_row: Value) -> Value:
@@ -114,57 +104,6 @@ def whiten_rows(system: Value, of_row: Value) -> Value:
             part - scaled * (g * part).sum(axis=1, keepdims=True) for part in (system, *errors)
         )
     return system.reshape(0, -1)
-
-
-def integrate_out_errors(system: Value, terms: int, errors: int) -> Value:
-    """The system (m, terms) with the errors that all readings share integrated out.
-
-    As `whiten_rows`, with all readings in place of the channels of one row.
-
-    system: Rows (w a, w g), (m, terms + errors).
-    terms, errors: Number of monomials, and of errors.
-    """
-    one = constant(system.graph, np.ones((1, 1)))
-    for last in range(terms + errors - 1, terms - 1, -1):
-        a, g = system.split([last, 1], axis=1)
-        scaled = g / _kappa(gemm(g, g, one, transpose_a=True))
-        system = gemm(scaled, gemm(g, a, transpose_a=True), a, alpha=-1.0)
-    return system
-
-
-def integrate_out_sensor_errors(system: Value, terms: int) -> Value:
-    """The system (m, terms) with the errors in `SENSOR_ERROR_COLUMNS` integrated out.
-
-    Many sets have no offset of torque, and sets of torque alone none of sinkage and drawbar pull.
-    """
-    offsets = [SENSOR_ERROR_COLUMNS.index(f"{name}_bias") for name in RESPONSE_CHANNELS]
-    count, others = len(offsets), len(SENSOR_ERROR_COLUMNS) - len(offsets)
-
-    def of_offsets(whole: Value) -> Value:
-        of_torque = integrate_out_if_any(whole, terms + 1, count - 1)
-        return integrate_out_errors(of_torque, terms, 1)
-
-    return integrate_out_if_any(
-        integrate_out_errors(system, terms + count, others), terms, count, of_offsets
-    )
-
-
-def integrate_out_if_any(
-    system: Value, terms: int, errors: int, general: Callable[[Value], Value] | None = None
-) -> Value:
-    """As `integrate_out_errors`, but nothing is to be done where all errors are zero.
-
-    `general` integrates them out where they are not, if it is another function.
-    """
-    a, g = system.split([terms, errors], axis=1)
-    general = general or (lambda whole: integrate_out_errors(whole, terms, errors))
-    return shortcut(
-        g.sum_of_squares() <= 0.0,
-        lambda _, without: without,
-        lambda whole, _: general(whole),
-        system,
-        a,
-    )
 
 
 def _kappa(determinant: Value) -> Value:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,10 @@ from soilml.onboard.slip_stream import FLAGS, POSSIBLE, QUANTILES, RECENT
 from soilml.slip_filter.filter import SlipFilter
 from training.export_c.c_file import BYTES, kernel_texts, template_environment
 from training.export_c.c_text import array
-from training.export_c.functions import graph_function
 from training.export_c.interface import input_shapes
-from training.export_c.program import Program, SharedParts
-from training.export_c.stage_text import ARRAYS
-from training.export_c.tensor import Size, Tensor
+from training.export_c.program import ARRAYS, SharedParts
+from training.export_c.tensor import Tensor
+from training.export_c.translation import flat_nodes, translate
 from training.slip_step.graph import start_of
 
 #: Entries of the metadata that tell one file from another, and which rover and prior it is for.
@@ -37,11 +37,13 @@ def write_slip_c(
     """
     shared = SharedParts()
     inputs = {
-        key: Tensor(f"in_{key}", kind, tuple(Size(int(d)) for d in dims))
+        key: Tensor(f"in_{key}", kind, tuple(int(d) for d in dims))
         for key, (kind, dims) in input_shapes(model).items()
     }
-    function = graph_function("step_graph", model, Program(shared, {}), inputs, OUTPUTS)
-    used = [parts for parts in shared.constants.values() if parts[0] in function.constants]
+    known: dict[str, Tensor] = {}
+    nodes = flat_nodes(model.graph, known)
+    function = translate("step_graph", nodes, known, inputs, OUTPUTS, shared)
+    used = shared.used_in(function.text)
     start, _ = start_of(filter_)
     arrays = {ARRAYS[kind]: (kind, length) for kind, length in function.lengths.items()}
     sizes = {
@@ -68,9 +70,7 @@ def write_slip_c(
         "kernels": kernel_texts(shared),
         "identity": {key: metadata[key] for key in IDENTITY},
         "possible": POSSIBLE,
-        "finite": [
-            f"all_finite(out_{key}, {length})" for key, (_, length) in function.outputs.items()
-        ],
+        "finite": [f"all_finite(out_{key}, {prod(s)})" for key, (_, s) in function.outputs.items()],
         "load": (float(filter_.table.load[0]), float(filter_.table.load[-1])),
         **sizes,
     }

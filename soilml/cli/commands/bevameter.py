@@ -94,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.identification.bevameter.soil_section import missing_values, model_file_text
     from soilml.report.page import json_text
 
+    as_json = args.out is not None and is_json(args)
     plates, shear, left = _tables(args)
     case = None if args.model is None else read_case(args.model, available_effects(args))
     with working("fitting the tests"):
@@ -101,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     result = replace(result, remarks=(*left, *result.remarks))
     report = result.report()
     write_set({args.picture: report.pictures[0].save})
-    if args.out is not None and is_json(args):
+    if as_json:
         save_text(args.out, json_text(result.as_json()))
     elif args.out is not None:
         save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))

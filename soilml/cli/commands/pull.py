@@ -127,6 +127,8 @@ def run(args: argparse.Namespace) -> int:
     loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
     if len(loads or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
+    if loads is not None and min(loads) <= 0.0:
+        raise InputError(f"--load {args.load}: needed is a load above zero")
     if args.load is None and args.gear is None:
         whole = read_case(
             args.model, available_effects(args), with_bias=True, with_explanations=True

@@ -58,10 +58,7 @@ def _list(entries: list[SoilEntry]) -> str:
             for field in ("cohesion", "friction_angle", "shear_modulus", "n")
         )
         rows.append((entry.name, *values, entry.text))
-    notes = (
-        "* not in the paper: assumed. `soilml show soils NAME` has kc, kphi, and the source; "
-        "--format json all."
-    )
+    notes = "* not in the paper: assumed. `soilml show soils NAME` has kc, kphi, and the source."
     return f"{format_table(header, rows, last_left=True)}\n{notes}"
 
 

@@ -9,11 +9,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
-from soilml.report.numbers import channel_name, format_range, format_residual, pretty, significant
+from soilml.quantities import Z_90
+from soilml.report.figure_style import AFTER, BEFORE, LOADS, UNCHANGED
+from soilml.report.numbers import (
+    channel_name,
+    channel_unit,
+    format_range,
+    format_residual,
+    pretty,
+    significant,
+)
 from soilml.report.report import Picture
 
 if TYPE_CHECKING:
+    from soilml.config.remainder import Remainder, RemainderPart
     from soilml.gap.report.results import GapReduction, GapReport
 
 _SIGNIFICANT = 0.05  # Family-wise p value below which a region is marked
@@ -120,3 +129,46 @@ def draw_bars(panel: Any, rows: Mapping[str, tuple[float, float]], values: Seque
     panel.set_yticks(range(len(rows)), list(rows))
     panel.xaxis.set_major_formatter("{x:g}")
     panel.minorticks_off()
+
+
+#: Loads of the picture of a remainder, over the lightest and the heaviest driven; slips beyond the
+#: driven ones; slips of a curve.
+_LIGHTER, _HEAVIER, _FURTHER, _SLIPS = 0.6, 1.5, 0.3, 60
+
+
+def remainder_picture(remainder: Remainder) -> Picture:
+    """Mean and 90 % band of the remainder against slip, in and beyond the driven range."""
+    parts = list({(part.column, part.gear): part for part in remainder.parts}.values())
+    caption = (
+        "Mean and 90 % band of what no effect explains, by load. Grey: the driven slips; dashed: "
+        "loads that were not driven. Outside, the mean fades to zero, the band to a usual error."
+    )
+    told = ", ".join(dict.fromkeys(channel_name(part.column) for part in parts))
+    size = (4.6 * len(parts), 3.6)
+    draw = partial(_draw_remainder, remainder, parts)
+    return Picture("The remainder", draw, 1, len(parts), size, f"the remainder of {told}", caption)
+
+
+def _draw_remainder(remainder: Remainder, parts: Sequence[RemainderPart], axes: Any) -> None:
+    for part, panel in zip(parts, axes.flat, strict=True):
+        factor, unit = channel_unit(part.column)
+        (low, high), (light, heavy) = part.slip, part.load
+        slip = np.linspace(min(low, 0.0), min(high + _FURTHER, 0.95), _SLIPS)
+        loads = sorted({_LIGHTER * light, light, heavy, _HEAVIER * heavy})
+        name = part.column.rpartition("_")[0]
+        for load, colour in zip(loads, LOADS[:: len(LOADS) // len(loads)], strict=False):
+            mean, std = remainder.mean_and_std(name, slip, load, part.gear)
+            driven = light <= load <= heavy
+            half = Z_90 * factor * std
+            panel.plot(
+                slip, factor * mean, "-" if driven else "--", color=colour, label=f"{load:.3g} N"
+            )
+            panel.fill_between(
+                slip, factor * mean - half, factor * mean + half, color=colour, alpha=0.15, lw=0
+            )
+        panel.axvspan(low, high, color=UNCHANGED, alpha=0.15, lw=0)
+        panel.axhline(0.0, color=UNCHANGED, lw=1.0)
+        panel.set_title(f"{channel_name(part.column)} {part.gear}".strip())
+        panel.set_xlabel("slip")
+        panel.set_ylabel(f"remainder, {unit}")
+        panel.legend(fontsize=8, frameon=False)

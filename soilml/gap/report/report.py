@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
 from soilml.gap.report.listed_explanations import needed_sizes
-from soilml.gap.report.pictures import bars_picture, map_picture
+from soilml.gap.report.pictures import bars_picture, map_picture, remainder_picture
 from soilml.gap.report.results import STATUSES, GapReport
 from soilml.io.text_tables import csv_text
 from soilml.remarks import texts
@@ -290,6 +290,8 @@ def _pictures(found: GapReport) -> Iterator[Picture]:
         yield map_picture(found)
     if found.gap:
         yield bars_picture(found, PARTS)
+    if found.model.remainder is not None:
+        yield remainder_picture(found.model.remainder)
 
 
 def gap_files(

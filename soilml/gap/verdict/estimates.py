@@ -12,9 +12,10 @@ from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
-from soilml.gap.verdict.decision import NAMED_PROBABILITY, Decision
+from soilml.gap.verdict.decision import Decision
 from soilml.gap.verdict.learned_remainder import learned_remainder
 from soilml.gap.verdict.remainder import discrepancy_amplitudes
+from soilml.inference import constants
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
@@ -22,8 +23,6 @@ from soilml.numerics.prior import Prior
 from soilml.report.numbers import round_significant
 from soilml.results import EstimatedValue
 
-#: Probability that the explanations of a returned model hold together, and how many it has at most.
-HELD, MOST_RETURNED = 0.95, 12
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
 
 
@@ -87,16 +86,16 @@ def whole_answer(posterior: Posterior, decision: Decision) -> Explanation | None
     """
     if decision.claimed and decision.status != "class":
         return decision.shown
-    if posterior.no_effect > NAMED_PROBABILITY:
+    if posterior.no_effect > constants.NAMED_PROBABILITY:
         return next(node for node in posterior.nodes if not node.hypothesis.effects)
     return None
 
 
 def weighed_explanations(posterior: Posterior) -> list[tuple[float, Explanation]]:
-    """The likeliest explanations that together hold `HELD`, with their probabilities."""
+    """The likeliest explanations that together hold `constants.HELD`, with their probabilities."""
     found: list[tuple[float, Explanation]] = []
     for node in posterior.nodes:
-        if len(found) == MOST_RETURNED or sum(w for w, _ in found) >= HELD:
+        if len(found) == constants.MOST_RETURNED or sum(w for w, _ in found) >= constants.HELD:
             break
         found.append((posterior.node_weight(node), node))
     return found

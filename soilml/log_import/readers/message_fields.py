@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.io.bounds import COLUMNS, LOG_VALUES
+from soilml.io.bounds import COLUMNS, KEPT_VALUES
 from soilml.remarks import Remark
 
 _DEEPEST = 6
@@ -99,9 +99,9 @@ class TopicColumns:
 
 
 def thin_largest(topics: Iterable[TopicColumns]) -> None:
-    """Thin the topics with most values until all have as many as a log may have."""
+    """Thin the topics with most values until all have as many as are kept."""
     held = list(topics)
-    while sum(own.size for own in held) > LOG_VALUES.most:
+    while sum(own.size for own in held) > KEPT_VALUES:
         max(held, key=lambda own: own.size).thin()
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.io.bounds import LOG_VALUES
+from soilml.io.bounds import KEPT_VALUES
 from soilml.log_import.readers.text_layout import MISSING, TextLayout
 
 SMALLEST = 1 << 18  # Bytes from which a log is read so: below, the import of pyarrow takes longer
@@ -50,7 +50,7 @@ def read_by_arrow(
     except ImportError:
         return None
     size, text = path.stat().st_size - start, set(texts)
-    every = max(1, -int(-size / line * len(layout.names) // LOG_VALUES.most))
+    every = max(1, -int(-size / line * len(layout.names) // KEPT_VALUES))
     missing = [spelt for cell in MISSING for spelt in {cell, cell.upper(), cell.title(), "NaN"}]
     bad = 0
 

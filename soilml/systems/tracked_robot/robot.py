@@ -108,7 +108,7 @@ def grouser_pull(
     >>> from soilml import soil
     >>> twelve = DiscreteGrousers(pitch=0.05, tip=0.01, friction=0.6, yielding=0.1)
     >>> round(float(grouser_pull(WANG2018, soil("wang2018/clay"), 0.7, twelve).mean()), -1)
-    520.0
+    740.0
     """
     at = Operating(slip=np.asarray([slip]), load=np.asarray([robot.load]))
     model, track = Model(robot.track, effects), robot.track

@@ -115,7 +115,7 @@ class SlipRelation:
         --------
         >>> found = TORQUE_SLIP["simplified"].soil(1.1, 0.25)
         >>> [round(float(np.rad2deg(v))) for v in (found.mean[0], found.std[0])]  # degrees
-        [40, 5]
+        [40, 6]
         """
         x, i = _pairs(reading, slip, reading_std)
         if self.single is None:

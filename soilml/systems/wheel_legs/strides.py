@@ -210,7 +210,7 @@ def mobility(
     --------
     >>> found = mobility(soil_of_strides([0.25], {"torque": [1.1], "sinkage": [0.012]}))
     >>> found.traffic_class, round(found.efficiency, 1)
-    ('safe', 0.6)
+    ('trafficable', 0.7)
     """
     known = dict(known or {})
     if unknown := sorted(known.keys() - UNKNOWN.keys()):

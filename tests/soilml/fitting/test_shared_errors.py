@@ -11,7 +11,7 @@ from soilml import Operating, identify, read_case
 from soilml.config.measurement_noise import Noise
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.error_columns import error_columns
-from soilml.fitting.shared_errors import ModelledErrors, usual_errors
+from soilml.fitting.shared_errors import USUAL_LAW_ERRORS, ModelledErrors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import METHODS
 from soilml.io.table import Table
@@ -159,6 +159,19 @@ def test_columns_are_differences_of_readings_with_and_without_each_error(case):
         ends = [case.model + ModelledErrors(**{name: e * errors[name]}) for e in (-0.01, 0.01)]
         low, high = (of(model(case.soil, at)) for model in ends)
         np.testing.assert_allclose(found[name], (high - low) / 0.02, rtol=1e-3, atol=1e-7)
+    soil, tangent = case.soil, np.tan(case.soil.friction_angle)
+    laws = error_columns(case, data, USUAL_LAW_ERRORS)
+    stronger, weaker = (
+        of(
+            case.model(
+                replace(soil, cohesion=f * soil.cohesion, friction_angle=np.arctan(f * tangent)), at
+            )
+        )
+        for f in (1.001, 0.999)
+    )
+    np.testing.assert_allclose(
+        laws["strength"], USUAL_LAW_ERRORS["strength"] * (stronger - weaker) / 0.002, rtol=1e-3
+    )
     own = data.channel == data.channels.index("torque")
     torque = of(case.model(case.soil, at))[own]
     np.testing.assert_allclose(found["torque_gain"][own], 0.03 * torque, rtol=1e-6)

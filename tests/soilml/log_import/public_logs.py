@@ -16,7 +16,12 @@ def vesc_tool(rng, folder):
     """Motor controller VESC, log of VESC Tool: electrical rpm, current, one speed of its own."""
     d = steps(rng)
     n, poles, gear = d.t.size, 7, 20
-    names = ["ms_today", "input_voltage", "temp_mos_max", "temp_motor", "current_motor", "current_in", "d_axis_current", "q_axis_current", "erpm", "duty_cycle", "amp_hours_used", "tachometer", "fault_code", "vesc_id", "speed_meters_per_sec", "num_vescs", "roll", "pitch", "yaw", "accX", "accY", "accZ"]  # fmt: skip
+    names = [
+        *("ms_today", "input_voltage", "temp_mos_max", "temp_motor", "current_motor", "current_in"),
+        *("d_axis_current", "q_axis_current", "erpm", "duty_cycle", "amp_hours_used"),
+        *("tachometer", "fault_code", "vesc_id", "speed_meters_per_sec", "num_vescs"),
+        *("roll", "pitch", "yaw", "accX", "accY", "accZ"),
+    ]
     known = {
         "ms_today": 1000 * d.t + 4e7, "input_voltage": noisy(rng, 36 + 0 * d.t, 0.1),
         "current_motor": d.torque / 3, "current_in": d.torque / 9, "q_axis_current": d.torque / 3,
@@ -38,23 +43,8 @@ def tyre_test_consortium(rng, folder):
         "FX": d.pull, "FY": noisy(rng, 0 * d.t, 2), "FZ": -d.load, "MX": noisy(rng, 0 * d.t, 0.3),
         "MZ": noisy(rng, 0 * d.t, 0.2), "SR": slip, "TSTC": noisy(rng, 40 + 0 * d.t, 0.5),
     }  # fmt: skip
-    units = [
-        "sec",
-        "kph",
-        "rpm",
-        "deg",
-        "deg",
-        "cm",
-        "cm",
-        "kPa",
-        "N",
-        "N",
-        "N",
-        "Nm",
-        "Nm",
-        "none",
-        "degC",
-    ]
+    units = ["sec", "kph", "rpm", "deg", "deg", "cm", "cm", "kPa", "N", "N", "N", "Nm", "Nm"]
+    units += ["none", "degC"]
     log = write(folder / "B1654run21.dat", columns, separator="\t", units=units)
     return [log], Truth(d, "rotation travel load pull")
 
@@ -66,7 +56,8 @@ def rostopic_wrench(rng, folder):
     head = {"%time": clock, "field.header.seq": np.arange(d.t.size), "field.header.stamp": clock}
     wrench = {"field.wrench.force.x": d.pull, "field.wrench.force.y": noisy(rng, 0 * d.t, 0.5),
               "field.wrench.force.z": d.load, "field.wrench.torque.x": noisy(rng, 0 * d.t, 0.05),
-              "field.wrench.torque.y": d.torque, "field.wrench.torque.z": noisy(rng, 0 * d.t, 0.05)}  # fmt: skip
+              "field.wrench.torque.y": d.torque,
+              "field.wrench.torque.z": noisy(rng, 0 * d.t, 0.05)}  # fmt: skip
     joints = {"field.position0": way(d.t, d.omega), "field.velocity0": d.omega}
     twist = {"field.twist.twist.linear.x": noisy(rng, d.v, 2e-4)}
     parts = {"wrench": wrench, "wheel_joint_states": joints, "mocap_twist": twist}
@@ -94,7 +85,8 @@ def ardupilot_wheel_encoders(rng, folder):
     d = steps(rng)
     rim = way(d.t, d.omega) * RADIUS
     columns = {"TimeUS": 1e6 * d.t + 3e8, "Dist0": rim, "Qual0": 100 + 0 * d.t,
-               "RPM0": d.omega * RPM, "Dist1": rim, "Qual1": 100 + 0 * d.t, "RPM1": d.omega * RPM}  # fmt: skip
+               "RPM0": d.omega * RPM, "Dist1": rim, "Qual1": 100 + 0 * d.t,
+               "RPM1": d.omega * RPM}  # fmt: skip
     return [write(folder / "WENC.csv", columns)], Truth(d, "rotation")
 
 
@@ -155,5 +147,7 @@ def design_of_wheels(rng, folder):
     return [log], Truth(d, "load pull sinkage", {"radius": RADIUS})
 
 
-WRITERS = (vesc_tool, tyre_test_consortium, rostopic_wrench, cube_rover, ardupilot_wheel_encoders,
-           odometry_paths, inches_per_second, hub_motor_ramp, discrete_elements, design_of_wheels)  # fmt: skip
+WRITERS = (
+    *(vesc_tool, tyre_test_consortium, rostopic_wrench, cube_rover, ardupilot_wheel_encoders),
+    *(odometry_paths, inches_per_second, hub_motor_ramp, discrete_elements, design_of_wheels),
+)

@@ -1,4 +1,4 @@
-"""Graphs: operators and factors compute what numpy computes, and shortcuts choose a branch."""
+"""Graphs: operators and factors compute what numpy computes; composites."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from training.onnx_graph.value import (
     absolute,
     asinh,
     cholesky_columns,
+    composite,
     concat,
     constant,
     exp,
@@ -18,7 +19,6 @@ from training.onnx_graph.value import (
     maximum,
     minimum,
     reciprocal,
-    shortcut,
     softmax,
     sqrt,
     tanh,
@@ -93,24 +93,19 @@ def test_what_no_output_needs_is_left_out():
     assert len(model.graph.initializer) == 1
 
 
-@pytest.fixture
-def model():
-    """y is x where the sum of x is not positive, else x + 2, within two branches."""
+def test_a_composite_is_a_local_function_that_may_be_called_again():
+    def twice(x: Value) -> list[Value]:
+        return [x + x, x * 2.0 + 1.0]
+
     graph = Graph()
-    x = Value(graph, "x")
-
-    def general(inner: Value) -> Value:
-        return shortcut(inner.sum() <= 100.0, lambda v: v + 2.0, lambda v: v + 3.0, inner)
-
-    (shortcut(x.sum() <= 0.0, lambda v: v, general, x) * 1.5).named("y")
-    return graph.model({"x": [2]}, {"y": (1, [2])})
-
-
-@pytest.mark.parametrize("x", [(-1.0, 0.5), (1.0, 0.5), (99.0, 2.0)])
-def test_a_shortcut_is_taken_where_its_condition_is_true(model, x):
-    added = 0.0 if sum(x) <= 0.0 else 2.0 if sum(x) <= 100.0 else 3.0
-    found = session_of(model).run(None, {"x": np.asarray(x, np.float32)})[0]
-    assert found == pytest.approx(1.5 * (np.asarray(x) + added))
+    double, more = composite("Twice", ["double", "more"], twice, x=Value(graph, "x"))
+    composite("Twice", ["double", "more"], twice, x=double + more)[0].node("Identity").named("y")
+    model = graph.model({"x": [2]}, {"y": (1, [2])})
+    assert [function.name for function in model.functions] == ["Twice"]
+    x = np.asarray([1.0, -0.5], np.float32)
+    assert session_of(model).run(None, {"x": x})[0] == pytest.approx(8.0 * x + 2.0)
+    with pytest.raises(ValueError, match="another function Twice"):
+        composite("Twice", ["double"], lambda x: [x], x=double)
 
 
 @pytest.mark.parametrize("p", [2, 4, 6])

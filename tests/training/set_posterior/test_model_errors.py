@@ -50,7 +50,8 @@ def model_columns(posterior, readings, size) -> np.ndarray:
     inputs |= {name: inputs[name].reshape(1, -1) for name in ROW_INPUTS}
     _, rows = add_residual_rows(posterior.family, posterior.response, inputs)
     basis = monomials(SOIL, posterior.response.terms)
-    rows.system_at(constant(graph, basis[:, None])).named("out")
+    columns = rows.columns_at(constant(graph, basis[:, None]))
+    columns.node("Transpose").node("Compress", rows.used, axis=0).named("out")
     shapes = {key: posterior.inputs[key] for key in inputs}
     session = session_of(graph.model(shapes, {"out": (1, ["m", "columns"])}))
     noise = {"torque_std": 0.01 * readings["torque"], "sinkage_std": 0.01 * readings["sinkage"]}

@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from training.onnx_graph.builder import Graph, session_of
-from training.onnx_graph.value import Value
 from training.set_posterior.monomials import monomials
-from training.set_posterior.sensor_errors import integrate_out_errors
 from training.set_posterior.validation import graph_outputs, posterior_session
 
 
@@ -36,17 +33,3 @@ def test_the_system_has_residuals_over_noise(wheel_posterior, session, sets):
     for k, (values, std) in enumerate(zip(off.values(), noise, strict=True)):
         found = system[6 * k : 6 * k + 6, : len(response.terms)] @ monomials(x, response.terms)
         assert found == pytest.approx(values / np.hypot(std, response.error[k]), abs=2e-3)
-
-
-def test_common_errors_are_integrated_out_of_the_likelihood():
-    rng = np.random.default_rng(0)
-    a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 3)), rng.normal(size=5)
-    graph = Graph()
-    integrate_out_errors(Value(graph, "system"), 5, 3).named("out")
-    session = session_of(graph.model({"system": ["m", 8]}, {"out": (1, ["m", 5])}))
-    system = np.concatenate([a, g], axis=1).astype(np.float32)
-    found = session.run(None, {"system": system})[0] @ b
-    dense = np.linalg.solve(np.eye(8) + g @ g.T, a @ b)
-    assert found @ found == pytest.approx((a @ b) @ dense, rel=1e-5)
-    steady = np.concatenate([a, 0.0 * g], axis=1).astype(np.float32)
-    assert session.run(None, {"system": steady})[0] == pytest.approx(a, abs=1e-6)

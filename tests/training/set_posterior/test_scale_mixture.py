@@ -6,9 +6,9 @@ from scipy.special import logsumexp
 
 from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_COLUMNS
 from training.onnx_graph.builder import Graph, session_of
-from training.onnx_graph.value import Value
+from training.onnx_graph.value import Value, constant
 from training.set_posterior.error_scales import GROUPS, USUAL_SCALES
-from training.set_posterior.scale_mixture import add_scale_mixture
+from training.set_posterior.scale_mixture import integrate_out, scale_mixture
 
 SIZES, PROBABILITIES = USUAL_SCALES.sizes, USUAL_SCALES.probabilities
 JUDGED = 1  # The usual size
@@ -20,8 +20,9 @@ TERMS, ERRORS, ROWS, POINTS = 5, len(MODEL_ERROR_COLUMNS), 14, 6
 def session():
     graph = Graph()
     inputs = {name: Value(graph, name) for name in ("system", "size", "basis")}
-    mixture = add_scale_mixture(inputs["system"], inputs["size"], TERMS, USUAL_SCALES)
-    found = mixture.misfit(inputs["basis"])
+    system, errors = inputs["system"].last_columns(ERRORS)
+    mixture = scale_mixture(system, errors, inputs["size"], USUAL_SCALES, (True,) * ERRORS)
+    found = mixture.misfit(inputs["basis"], constant(graph, [1.0]))
     (found.log_likelihood * -2.0).named("surprise")
     found.least.node("Identity").named("least")
     (found.parts / found.total).named("shares")
@@ -63,3 +64,17 @@ def test_the_likelihood_is_the_average_over_scales(session, example):
     parts = [parts[JUDGED], *(part for k, part in enumerate(parts) if k != JUDGED)]
     assert shares == pytest.approx(np.exp(np.asarray(parts) - expected), abs=1e-4)
     assert least[0] == pytest.approx(misfits[JUDGED], rel=1e-4)
+
+
+def test_common_errors_are_integrated_out_of_the_likelihood():
+    rng = np.random.default_rng(0)
+    a, g, b = rng.normal(size=(8, 5)), rng.normal(size=(8, 3)), rng.normal(size=5)
+    graph = Graph()
+    integrate_out(Value(graph, "system"), 3).node("Identity").named("out")
+    session = session_of(graph.model({"system": ["m", 8]}, {"out": (1, ["m", 5])}))
+    system = np.concatenate([a, g], axis=1).astype(np.float32)
+    found = session.run(None, {"system": system})[0] @ b
+    dense = np.linalg.solve(np.eye(8) + g @ g.T, a @ b)
+    assert found @ found == pytest.approx((a @ b) @ dense, rel=1e-5)
+    steady = np.concatenate([a, 0.0 * g], axis=1).astype(np.float32)
+    assert session.run(None, {"system": steady})[0] == pytest.approx(a, abs=1e-6)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from training.export_c.operators import elementwise, products, rearrangement, reductions
+from training.export_c.operators import combination, elementwise, rearrangement
 from training.export_c.program import Translation
 
 OPERATORS: dict[str, Translation] = {
     **elementwise.OPERATORS,
-    **products.OPERATORS,
+    **combination.OPERATORS,
     **rearrangement.OPERATORS,
-    **reductions.OPERATORS,
 }

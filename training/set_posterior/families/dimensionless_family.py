@@ -18,7 +18,7 @@ from soilml.physics.gears import Wheel
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
-from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum, stack_rows
+from training.onnx_graph.value import Value, concat, constant, gemm, log, maximum
 from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.dimensionless_sets import (
     BEARING_RANGE,
@@ -237,7 +237,7 @@ class DimensionlessFamily:
         of_context[:, 3] = [-1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
         of_context[5, 4] = 1.0
         shared = of_context.T @ concat([log_context, n, n_log_radius], axis=0).reshape(-1, 1)
-        operating = stack_rows([readings["slip"], readings["load"]])
+        operating = concat([readings["slip"], readings["load"]], axis=0)
         log_operating = log(maximum(operating, SMALLEST))
         of_operating = np.asarray([[1.0, 0.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0, 0.0]])
         torque, torque_slope = add_log_torque(readings, radius)

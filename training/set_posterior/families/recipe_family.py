@@ -24,7 +24,7 @@ from soilml.onboard.set_contract import (
 from soilml.physics.effects.base import Effect
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
-from training.onnx_graph.value import Value, asinh, log, maximum, sqrt, stack_rows
+from training.onnx_graph.value import Value, asinh, concat, log, maximum, sqrt
 from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.families.wheel_family import (
     MOST_RELATIVE_NOISE,
@@ -172,7 +172,7 @@ class RecipeFamily:
 
     def add_context(self, readings: dict[str, Value]) -> ContextValues:
         """See `WheelFamily`."""
-        operating = stack_rows([readings["slip"], readings["load"]])
+        operating = concat([readings["slip"], readings["load"]], axis=0)
         torque, torque_slope = self._torque(readings)
         return ContextValues(
             features=log(maximum(operating, SMALLEST)),

@@ -6,18 +6,20 @@ static void add_product_transposed_REAL(int m, int k, int n, REAL alpha, const R
     for (int i = 0; i < m; ++i)
         for (int j = 0; j < n; ++j) {
             const REAL *left = a + i * row, *right = b + j * k;
-            four_REAL s = {0}, t = {0};
+            REAL s[8] = {0}, total = 0;
             for (int p = 0; p < wide; p += 8) {
-                s = plus_product_REAL(s, load_REAL(left + p), load_REAL(right + p));
-                t = plus_product_REAL(t, load_REAL(left + p + 4), load_REAL(right + p + 4));
+                s[0] += left[p] * right[p];
+                s[1] += left[p + 1] * right[p + 1];
+                s[2] += left[p + 2] * right[p + 2];
+                s[3] += left[p + 3] * right[p + 3];
+                s[4] += left[p + 4] * right[p + 4];
+                s[5] += left[p + 5] * right[p + 5];
+                s[6] += left[p + 6] * right[p + 6];
+                s[7] += left[p + 7] * right[p + 7];
             }
-            REAL part[8], total = 0;
-            store_REAL(s, part);
-            store_REAL(t, part + 4);
             for (int p = wide; p < k; ++p)
                 total += left[p] * right[p];
-            for (int q = 0; q < 8; ++q)
-                total += part[q];
+            total += ((s[0] + s[1]) + (s[2] + s[3])) + ((s[4] + s[5]) + (s[6] + s[7]));
             y[i * n + j] += alpha * total;
         }
 }

@@ -1,8 +1,8 @@
-/* The smallest of n elements, one or more. */
-static REAL smallest_of_REAL(const REAL *x, int n)
+/* The smallest of n elements, one or more, which are `step` apart. */
+static REAL smallest_of_REAL(const REAL *x, int n, int step)
 {
     REAL best = x[0];
     for (int i = 1; i < n; ++i)
-        best = x[i] < best ? x[i] : best;
+        best = x[i * step] < best ? x[i * step] : best;
     return best;
 }
