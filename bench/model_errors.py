@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from runner import ROOT, Bench, Row, Sample, each, percent, table
+from runner import ROOT, Bench, Row, Sample, each, percent, rms, table
 from scipy.stats import binom
 from wrong_worlds import LAW_WORLDS, NOISE_OF_LOAD, NOISE_OF_SLIP, WORLDS, simulate, unlisted_worlds
 
@@ -130,6 +130,8 @@ def one_world(case: Row) -> list[Row]:
         refused = np.mean([not e.in_range for e in found])
         means = {k: v.mean(axis=0) for k, v in scored(found, truth).items()}
         means["score"] = means["score"].mean()
+        error = (np.stack([e.mean for e in found]) - truth) / found[0].prior_std
+        means["error"] = rms(error, axis=0)
         rows.append({"answer": name, "refused": refused} | means)
     return rows
 
@@ -139,6 +141,7 @@ def tables(rows: list[Row]) -> str:
     columns = {
         "refused": each("refused", ".0%"),
         "90 % of c, phi, K": percent("covered"),
+        "RMSE": each("error"),
         "score": each("score"),
     }
     text = []

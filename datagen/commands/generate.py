@@ -9,7 +9,8 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option, add_workers_option, whole_number
+from soilml.cli.option_values import whole_number
+from soilml.cli.options import InputFile, add_effects_option, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 

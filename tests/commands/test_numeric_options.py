@@ -10,7 +10,8 @@ from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
 from soilml.cli.main import parser
-from soilml.cli.options import NumberFrom, leaves, number, slip_limit, whole_number
+from soilml.cli.option_values import NumberFrom, number, slip_limit, whole_number
+from soilml.cli.options import leaves
 from soilml.serve.command import port_number
 
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]

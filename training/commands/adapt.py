@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from soilml.cli.option_values import whole_number_from
 from soilml.cli.options import (
     InputFile,
     add_ignore_extra_option,
@@ -12,7 +13,6 @@ from soilml.cli.options import (
     add_seed_option,
     add_workers_option,
     folder_outputs,
-    whole_number_from,
 )
 from soilml.errors import InputError
 

@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_workers_option, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import create_folder, output_files
 

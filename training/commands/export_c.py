@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import InputFile, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name

@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_effects_option,
-    add_output,
-    whole_number_from,
-)
+from soilml.cli.option_values import NumberFrom, whole_number_from
+from soilml.cli.options import InputFile, add_effects_option, add_output
 from soilml.io.atomic_files import output_files
 
 DESCRIPTION = """\

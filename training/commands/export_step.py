@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import InputFile, add_output, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile, add_output
 
 DESCRIPTION = """\
 Write the set posterior of MODEL.onnx as OUT.onnx, in which every shape is a

@@ -55,7 +55,7 @@ from training.onnx_graph.value import (
 from training.set_posterior.draws import LARGEST_TANH, ProposalDraws, SampleSizes
 from training.set_posterior.families.wheel_family import WheelFamily
 from training.set_posterior.monomials import Terms, derivative, pair_factors
-from training.set_posterior.scale_mixture import Misfit, Scaled
+from training.set_posterior.scale_mixture import PointMisfit, Scaled
 
 #: Gauss-Newton steps along the solved axis in the prior round, from 0; in adapted rounds there is
 #: one, from the regression on the other coordinates, which is closer.
@@ -144,7 +144,7 @@ class Round:
     points: Value  # (1 + p, n) limited to the box
     weights: Value  # (1, n) of a power of the density that several samples share, sum 1
     power: Value  # (1, 1) that power
-    misfit: Misfit  # by scale of the model's errors
+    misfit: PointMisfit  # by scale of the model's errors
 
 
 def gauss_newton(
@@ -300,12 +300,12 @@ def adapted_round(
         samples = concat([ones, unbounded, solved], axis=0)
         return [samples, points, weights, power, *found]
 
-    names = ["samples", "points", "weights", "power", *Misfit._fields]
+    names = ["samples", "points", "weights", "power", *PointMisfit._fields]
     samples, points, weights, power, *found = composite(
         "AdaptedRound", names, body, moments=moments, systems=mixture.systems,
         log_weight=mixture.log_weight, system=system, variance=variance, **draws._asdict(),
     )  # fmt: skip
-    return samples, Round(points, weights, power, Misfit(*found))
+    return samples, Round(points, weights, power, PointMisfit(*found))
 
 
 def adapted_rounds(

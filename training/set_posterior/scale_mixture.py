@@ -23,7 +23,7 @@ from training.onnx_graph.value import (
 from training.set_posterior.error_scales import ErrorScales
 
 
-class Misfit(NamedTuple):
+class PointMisfit(NamedTuple):
     """How well points explain the readings."""
 
     least: Value  # (1, n) sum of squared residuals, with usual errors of the model
@@ -48,7 +48,7 @@ class Scaled:
     systems: Value  # A_k, (scales, m, terms), that of the scale that is judged first
     log_weight: Value  # (scales, 1) logarithms of p_k over the root of the determinant
 
-    def misfit(self, basis: Value, variance: Value) -> Misfit:
+    def misfit(self, basis: Value, variance: Value) -> PointMisfit:
         """At points with these monomials (terms, n), with noise of this variance (1,)."""
 
         def body(systems: Value, log_weight: Value, basis: Value, variance: Value) -> list[Value]:
@@ -62,10 +62,12 @@ class Scaled:
             return [squares.take([0], axis=0), log(total) + largest, parts, total]
 
         given = {"systems": self.systems, "log_weight": self.log_weight}
-        found = composite("Misfit", Misfit._fields, body, **given, basis=basis, variance=variance)
-        return Misfit(*found)
+        found = composite(
+            "Misfit", PointMisfit._fields, body, **given, basis=basis, variance=variance
+        )
+        return PointMisfit(*found)
 
-    def mean(self, misfit: Misfit, weights: Value) -> Value:
+    def mean(self, misfit: PointMisfit, weights: Value) -> Value:
         """One system (m, terms) for proposals: the mean of all by the posterior of their scales.
 
         misfit, weights: Of a sample of the posterior, whose weights (1, n) have the sum 1.

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from soilml.cli.option_values import NumberFrom, slip_limit, whole_number_from
 from soilml.cli.options import (
-    NumberFrom,
     add_effects_option,
     add_exact_model_option,
     add_gravity_options,
@@ -14,8 +14,6 @@ from soilml.cli.options import (
     add_output,
     add_row_options,
     gravity_change,
-    slip_limit,
-    whole_number_from,
 )
 from soilml.errors import InputError
 
@@ -120,7 +118,8 @@ def run(args: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from soilml.cli.options import available_effects, parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
+    from soilml.cli.options import available_effects
     from soilml.cli.output import save_columns, show_rows, tell, write_columns, write_set
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
@@ -205,7 +204,7 @@ def _tests_elsewhere(
     """Columns and remarks of tests that are rated for the pull under another gravity."""
     import numpy as np
 
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.experiment_design.transfer_tests import TARGET_SLIP, advise_transfer
 
     load = args.target_load

@@ -52,7 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Audit and print or write."""
-    from soilml.cli.options import available_effects, parse_costs, parse_names
+    from soilml.cli.option_values import parse_costs, parse_names
+    from soilml.cli.options import available_effects
     from soilml.cli.output import show_result, tell
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table

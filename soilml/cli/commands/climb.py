@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    add_ignore_extra_option,
-    add_seed_option,
-    folder_outputs,
-    slip_limit,
-)
+from soilml.cli.option_values import slip_limit
+from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, folder_outputs
 from soilml.io.atomic_files import write_files
 
 #: Files of the folder of --out.

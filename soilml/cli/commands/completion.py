@@ -36,6 +36,9 @@ def run(args: argparse.Namespace) -> int:
     import shtab
 
     root = args.make_parser()
+    for action in root._actions:  # shtab leaves out what the help leaves out
+        if action.metavar == "COMMAND":
+            action.help = "command"
     for name, command in leaves(root):
         for action in command._actions:
             if action.choices is None and action.nargs != 0:

@@ -6,14 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_output,
-    add_report_option,
-    parse_names,
-    whole_number_from,
-)
+from soilml.cli.option_values import NumberFrom, parse_names, whole_number_from
+from soilml.cli.options import InputFile, add_output, add_report_option
 
 if TYPE_CHECKING:
     from soilml.report.page import Content

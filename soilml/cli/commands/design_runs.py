@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from soilml.cli.options import InputFile, add_output, add_seed_option, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile, add_output, add_seed_option
 
 DESCRIPTION = """\
 Propose the runs of [simulator] in MODEL.toml: slip, load and the soil in the

@@ -7,12 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    add_output,
-    add_report_option,
-    add_row_options,
-)
+from soilml.cli.options import InputFile, add_output, add_report_option, add_row_options
 from soilml.errors import InputError, TableError
 
 if TYPE_CHECKING:

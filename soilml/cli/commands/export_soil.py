@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    add_seed_option,
-    folder_outputs,
-    named_numbers,
-    whole_number_from,
-)
+from soilml.cli.option_values import named_numbers, whole_number_from
+from soilml.cli.options import InputFile, add_seed_option, folder_outputs
 from soilml.errors import InputError
 
 DESCRIPTION = """\

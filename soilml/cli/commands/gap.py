@@ -44,10 +44,10 @@ error in them appears as an effect.
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
 slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start here),
-gap.json, model.toml (the model with the effects that the evidence supports, or
-with a suspected one, marked so, where rows kept back are predicted better with
-it) and next_runs.csv (runs to measure next). The exit status is 0 whatever the
-result and 2 for bad input.
+gap.json, model.toml (the model with the effect that is missing, or all likely
+explanations with their weights, by whose mixture other commands predict) and
+next_runs.csv (runs to measure next). The exit status is 0 whatever the result
+and 2 for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.
@@ -93,7 +93,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    from soilml.cli.options import available_effects, parse_costs, parse_names
+    from soilml.cli.option_values import parse_costs, parse_names
+    from soilml.cli.options import available_effects
     from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows

@@ -96,7 +96,8 @@ def run(args: argparse.Namespace) -> int:
     """Identify and write the result."""
     from dataclasses import asdict, replace
 
-    from soilml.cli.options import available_effects, parse_names
+    from soilml.cli.option_values import parse_names
+    from soilml.cli.options import available_effects
     from soilml.cli.output import show_result, write_with_report
     from soilml.cli.tables import (
         print_table_hints,

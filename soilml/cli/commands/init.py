@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.options import whole_number_from
+from soilml.cli.option_values import whole_number_from
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
 from soilml.io.cell_text import is_number, read_number

@@ -5,14 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_effects_option,
-    add_row_options,
-    folder_outputs,
-    whole_number_from,
-)
+from soilml.cli.option_values import NumberFrom, whole_number_from
+from soilml.cli.options import InputFile, add_effects_option, add_row_options, folder_outputs
 
 SIZE = NumberFrom(0.01, 1000.0, "m")  # Of a cell, and how far a reading reaches
 DESCRIPTION = """\
@@ -78,7 +72,8 @@ def run(args: argparse.Namespace) -> int:
     """Make the map and write its folder."""
     import numpy as np
 
-    from soilml.cli.options import available_effects, parse_numbers
+    from soilml.cli.option_values import parse_numbers
+    from soilml.cli.options import available_effects
     from soilml.cli.output import show_result
     from soilml.cli.progress import stage_progress
     from soilml.cli.tables import read_case_of_rows, read_rows

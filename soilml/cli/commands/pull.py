@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from soilml.cli.option_values import slip_limit
 from soilml.cli.options import (
     InputFile,
     add_by_option,
@@ -18,7 +19,6 @@ from soilml.cli.options import (
     add_report_option,
     add_row_options,
     gravity_change,
-    slip_limit,
 )
 from soilml.errors import InputError
 
@@ -41,16 +41,17 @@ with 90 % bands.
   soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
 
 RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm and, where
-measured, drawbar_pull_N and sinkage_m. Samples of the soil are drawn from the
-posterior given the rows (--free names its parameters), or from the estimate of
-a trained model (--from), and the model computes the pull of each. All rows are
-assumed to come from one soil, unless --by run asks for a result for each run.
+measured, drawbar_pull_N and sinkage_m. The soil (--free names its parameters),
+effects that the model may lack, and its smooth error are drawn together from
+one posterior given the rows, or the soil from the estimate of a trained model
+(--from). All rows are assumed to come from one soil, unless --by run asks for a
+result for each run. A MODEL.toml of gap with several [[explanation]] predicts
+by their mixture.
 
 Loads are those of the rows, unless --load names others. Slips reach 0.6, the
 highest measured slip, or --slip-limit. On a slope, a wheel carries the
 component of its load normal to the slope and pulls the component along it. The
-bands include errors of the model where [discrepancy] states that of the pull,
-but neither load transfer nor side slopes.
+bands include errors of the model, but neither load transfer nor side slopes.
 
 A model file with [rover] answers for the whole rover, unless --load or --gear
 names one wheel: the slip that slopes need, the margin of pull, the work of the
@@ -106,7 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Predict and write the results."""
-    from soilml.cli.options import available_effects, parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
+    from soilml.cli.options import available_effects
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
@@ -158,7 +160,7 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
     """The same for a whole rover."""
     import numpy as np
 
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.cli.tables import result_by_group
     from soilml.traction.rover_report import rover_report
 

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_gear_option,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import InputFile, add_gear_option, add_output
 from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")

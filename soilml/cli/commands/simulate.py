@@ -6,13 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_effects_option,
-    add_gear_option,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -109,7 +104,8 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
     import numpy as np
 
-    from soilml.cli.options import available_effects, parse_numbers
+    from soilml.cli.option_values import parse_numbers
+    from soilml.cli.options import available_effects
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import (
-    InputFile,
-    add_effects_option,
-    add_ignore_extra_option,
-    add_output,
-)
+from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
 
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\

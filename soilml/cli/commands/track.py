@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import InputFile, NumberFrom, add_gear_option, add_output
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import InputFile, add_gear_option, add_output
 from soilml.errors import InputError
 
 FORMATS = ("table", "csv", "json")
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluate the log and write the table."""
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.cli.output import write_rows
     from soilml.config.case import read_case_of_one_gear
     from soilml.io.read_table import read_table

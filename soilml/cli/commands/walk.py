@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    NumberFrom,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import add_output
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -67,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     """Simulate the walks and write the tables."""
     import numpy as np
 
-    from soilml.cli.options import parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
     from soilml.systems.wheel_legs.gaits import walk_tables
@@ -99,7 +97,7 @@ def _grounds(args: argparse.Namespace) -> dict[str, LinearGround]:
     """The grounds of --ground or --stiffness, by name."""
     from dataclasses import replace
 
-    from soilml.cli.options import parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 
     if args.stiffness is not None:

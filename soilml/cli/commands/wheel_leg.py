@@ -5,13 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_by_option,
-    add_ignore_extra_option,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import InputFile, add_by_option, add_ignore_extra_option, add_output
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -148,7 +143,7 @@ def _known_soil(text: str) -> tuple[float, float]:
     """Friction angle (rad) and stiffness 1 cm deep (Pa) of `--known`."""
     import math
 
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.systems.wheel_legs import GROUNDS
 
     if text.upper() in GROUNDS:
@@ -188,7 +183,7 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
 
 def _heavy(args: argparse.Namespace) -> dict[str, Any]:
     """Arguments of `mobility` by --assume and --wheel."""
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.io.cell_text import read_number
     from soilml.physics.gears import Wheel
     from soilml.physics.operating_point import Operating

@@ -73,7 +73,7 @@ class MapGuess:
         self.steady = rows_are_runs(logs)
         self.labels: list[str] = []
         self.stated = agreed_constants(logs)
-        self.time, self.time_why = TimeMap(rate=1.0), ""
+        self.time, self.time_why = TimeMap(rate=100.0), ""
         self.runs_map, self.runs_table = self._divided(logs[0])
         if self.labels:
             first = lines_of_first(first, self.runs_map.column)

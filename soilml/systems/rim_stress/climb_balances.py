@@ -18,7 +18,6 @@ from soilml.systems.rim_stress.force_balance import (
     force_components,
     force_of,
     magnification,
-    pull_under,
 )
 
 #: Values of k_x, evenly spaced in the logarithm, between which forces are interpolated linearly;
@@ -46,12 +45,16 @@ def pull_of_rover(
     for each wheel if the loads of the wheels are known, else one for both. `wheels` are the
     components of front and rear. References: Nagatani et al., eqs. 6, 7, 10 and 11.
     """
-    front, rear = wheels
-    if not rover.has_known_loads:
-        half = 0.5 * rover.weight * np.cos(slope)
-        return 2.0 * pull_under(front + rear, half, cohesion, tangent)
-    loads = zip(wheels, rover.loads(slope), strict=True)
-    return 2.0 * sum(pull_under(parts, load, cohesion, tangent) for parts, load in loads)
+    loaded: list[tuple[Floats, Real]] = [
+        (wheels[0] + wheels[1], 0.5 * rover.weight * np.cos(slope))
+    ]
+    if rover.has_known_loads:
+        loaded = list(zip(wheels, rover.loads(slope), strict=True))
+    pulls = [
+        force_of(parts, PULL, magnification(parts, load, cohesion, tangent), cohesion, tangent)
+        for parts, load in loaded
+    ]
+    return 2.0 * sum(pulls)
 
 
 @dataclass(frozen=True)

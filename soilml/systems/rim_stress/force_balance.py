@@ -121,16 +121,20 @@ def force_of(parts: Floats, force: int, magnification: Real, cohesion: Real, tan
 
 
 def magnification(parts: Floats, load: Real, cohesion: Real, tangent: Real) -> Real:
-    """M with which the wheel carries a load (N), at c (Pa) and tan(phi); NaN where none does."""
-    per_unit = force_of(parts, LIFT, 1.0, 0.0, tangent)
+    """M with which the wheel carries a load (N), at c (Pa) and tan(phi); only above 0 does it."""
     left = load - force_of(parts, LIFT, 0.0, cohesion, tangent)
-    solvable = (per_unit > 0.0) & (left > 0.0)
-    return np.where(solvable, left / np.where(solvable, per_unit, 1.0), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(left / force_of(parts, LIFT, 1.0, 0.0, tangent))
 
 
 def pull_under(parts: Floats, load: Real, cohesion: Real, tangent: Real) -> Real:
-    """Drawbar pull (N) of a wheel that carries a load (N), at c (Pa) and tan(phi)."""
-    return force_of(parts, PULL, magnification(parts, load, cohesion, tangent), cohesion, tangent)
+    """Drawbar pull (N) of a wheel that carries a load (N), at c (Pa) and tan(phi).
+
+    NaN where no magnification carries the load.
+    """
+    scale = magnification(parts, load, cohesion, tangent)
+    carried = (force_of(parts, LIFT, 1.0, 0.0, tangent) > 0.0) & (scale > 0.0)
+    return np.where(carried, force_of(parts, PULL, scale, cohesion, tangent), np.nan)
 
 
 @dataclass(frozen=True)

@@ -307,7 +307,7 @@ def test_gap_works_on_a_black_box_and_writes_a_model_that_has_it(folder, tmp_pat
     assert main(["gap", model, str(tmp_path / "runs.csv"), "--out", str(tmp_path / "gap")]) == 0
     report = json.loads((tmp_path / "gap/gap.json").read_text())
     assert report["status"] != "no-gap"
-    again = read_case(tmp_path / "gap/model.toml")
+    again = read_case(tmp_path / "gap/model.toml", with_explanations=True)
     assert again.simulator is not None and again.model.gear.name == "simulator"
 
 
