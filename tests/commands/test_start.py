@@ -74,7 +74,7 @@ def test_identify_loads_neither_distributions_nor_the_runtime_for_trained_models
     lines += [f"a,{slip},{load},{slip * load / 10}" for slip in (0.2, 0.4) for load in (40, 90)]
     (tmp_path / "runs.csv").write_text("\n".join(lines) + "\n")
     loaded, printed = modules_after("identify", model_file, tmp_path / "runs.csv")
-    assert "scipy" in loaded and "averaged, 4 rows" in "".join(printed)
+    assert "scipy" in loaded and "cohesion" in "".join(printed)
     assert not loaded & {
         "scipy.stats",
         "onnxruntime",
