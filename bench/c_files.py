@@ -79,7 +79,7 @@ def generated(name: str, rows: int = 32) -> Path:
     if not source.exists():
         model = str(ROOT / "exported" / f"{name}.onnx")
         with redirect_stdout(sys.stderr):
-            if main(["export-c", model, str(source), "--rows", str(rows)]):
+            if main(["export-c", model, str(source), "--step-rows", str(rows)]):
                 sys.exit(f"{name}.onnx cannot be exported")
     return source
 
@@ -273,8 +273,8 @@ MEMORY_COLUMNS = {
     "constants, kB": "constants",
     "state of a set": "state",
     "tracker": "tracker",
-    "work, --rows 1": "work 1",
-    "work, --rows 32": "work 32",
+    "work, --step-rows 1": "work 1",
+    "work, --step-rows 32": "work 32",
     "stack here, bytes": "stack",
     "path": "path",
     "Cortex-M4F, million instructions": "instructions",

@@ -10,11 +10,14 @@ from runner import Bench, Row, Sample, rms, table
 
 from soilml.numerics.quantiles import QUANTILES
 from soilml.quantities import SHEAR
-from soilml.systems.climbing.ability import climbing_ability
-from soilml.systems.climbing.climb import Rover
-from soilml.systems.climbing.identify import identify_ground
-from soilml.systems.climbing.simulated_rover import SimulatedRover, StressArc
-from soilml.systems.climbing.stress_by_slip import StressBySlip
+from soilml.systems.rim_stress import (
+    Rover,
+    SimulatedRover,
+    StressBySlip,
+    climbing_ability,
+    identify_ground,
+)
+from soilml.systems.rim_stress.simulated_rover import StressArc
 
 #: Slip at which the pull is compared; slope (rad) that a random rover must at least climb.
 SLIP, MIN_STEEPEST = 0.4, 0.2

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,32 +14,30 @@ from soilml.physics.effects import EFFECTS
 from soilml.physics.operating_point import Operating
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
+Order = np.ndarray[Any, np.dtype[np.int64]]
 #: slip, load (N), torque (N m), sinkage (m), drawbar_pull (N): arrays of one shape.
 Readings = dict[str, Floats]
 Report = Callable[[Readings], Readings]
+#: Operating conditions: six slips at six loads (N); sets have the first rows of a shuffle of them.
+SLIP = np.repeat([0.08, 0.14, 0.21, 0.29, 0.38, 0.48], 6)
+LOAD = np.tile([40.0, 52.0, 65.0, 79.0, 94.0, 110.0], 6)
+COLUMNS = {"torque": "torque_Nm", "sinkage": "sinkage_m", "drawbar_pull": "drawbar_pull_N"}
 #: Operating conditions that some effects need: speed (m/s), pass in a rut, slip angle (rad).
 EFFECT_CONDITIONS = {"speed": 0.2, "pass_number": 2.0, "slip_angle": 0.2}
-#: Number of rows -> the groups of rows that share one soil.
-Partition = Callable[[int], Sequence[slice]]
 
 
 @dataclass(frozen=True)
 class Fault:
     """A difference between the model of an estimator and reality, or the readings of it.
 
-    `report` maps true readings to reported ones; `case` maps the nominal case to the true one.
-    `partition` gives the rows that share one soil, where the fault is known; `mix_rows` combines
-    the rows of a set with those of another set, both (sets, rows); `sinkage_only`: no other channel
-    is affected.
+    `report` maps true readings to reported ones; `case` maps the nominal case to the true one;
+    `mix_rows` combines the rows of a set with those of another set, both (sets, rows).
     """
 
-    group: str
     name: str
     report: Report = field(default=lambda r: r)
     case: Callable[[Case], Case] = field(default=lambda case: case)
-    partition: Partition = field(default=lambda rows: (slice(0, rows),))
     mix_rows: Callable[[Readings, Readings], Readings] = field(default=lambda own, other: own)
-    sinkage_only: bool = False
 
 
 def _scaled(name: str, factor: float) -> Report:
@@ -76,16 +74,16 @@ def units() -> list[Fault]:
     """Readings in another unit than the model file expects."""
     g = 9.80665
     found = [
-        Fault("unit", f"torque in {unit}", _scaled("torque", factor))
+        Fault(f"torque in {unit}", _scaled("torque", factor))
         for unit, factor in (("N mm", 1e3), ("N cm", 1e2), ("kN m", 1e-3), ("kgf m", 1.0 / g))
     ]
     found += [
-        Fault("unit", f"load in {unit}", _scaled("load", factor))
+        Fault(f"load in {unit}", _scaled("load", factor))
         for unit, factor in (("kg", 1.0 / g), ("g", 1e3 / g), ("kN", 1e-3))
     ]
-    found.append(Fault("unit", "slip in percent", _scaled("slip", 100.0)))
+    found.append(Fault("slip in percent", _scaled("slip", 100.0)))
     return found + [
-        Fault("unit", f"sinkage in {unit}", _scaled("sinkage", factor), sinkage_only=True)
+        Fault(f"sinkage in {unit}", _scaled("sinkage", factor))
         for unit, factor in (("mm", 1e3), ("cm", 1e2))
     ]
 
@@ -94,7 +92,7 @@ def wheels() -> list[Fault]:
     """Readings of a larger or smaller wheel than that of the model file."""
     factors = (0.5, 1.0 / 1.5, 0.8, 1.25, 1.5, 2.0)
     return [
-        Fault("wheel", f"{key} x {factor:.2f}", case=_with_wheel(key, factor))
+        Fault(f"{key} x {factor:.2f}", case=_with_wheel(key, factor))
         for key in ("radius", "width")
         for factor in factors
     ]
@@ -103,10 +101,10 @@ def wheels() -> list[Fault]:
 def sensors() -> list[Fault]:
     """Scale and offset errors of the slip and torque sensors."""
     return [
-        Fault("sensor", "slip read as 1.1 s", _scaled("slip", 1.1)),
-        Fault("sensor", "slip read as s + 0.1", _shifted("slip", 0.1)),
-        Fault("sensor", "torque + 0.1 N m", _shifted("torque", 0.1)),
-        Fault("sensor", "torque + 0.2 N m", _shifted("torque", 0.2)),
+        Fault("slip read as 1.1 s", _scaled("slip", 1.1)),
+        Fault("slip read as s + 0.1", _shifted("slip", 0.1)),
+        Fault("torque + 0.1 N m", _shifted("torque", 0.1)),
+        Fault("torque + 0.2 N m", _shifted("torque", 0.2)),
     ]
 
 
@@ -121,17 +119,16 @@ def effects(case: Case) -> list[Fault]:
         twice = np.clip(2.0 * size[cls.about.size], bound.lower, bound.upper)
         size[cls.about.size] = float(twice)
         label = f"{name}, {cls.about.size} {twice:g}"
-        found.append(Fault(f"effect ({cls.about.kind})", label, case=_with_effect(cls(**size))))
+        found.append(Fault(label, case=_with_effect(cls(**size))))
     return found
 
 
 def definitions() -> list[Fault]:
     """Readings of another definition: of slip by travel, of torque by its unit or its side."""
     return [
-        Fault("unit", "torque in lbf ft", _scaled("torque", 1.356)),
-        Fault("sensor", "torque halved", _scaled("torque", 0.5)),
+        Fault("torque in lbf ft", _scaled("torque", 1.356)),
+        Fault("torque halved", _scaled("torque", 0.5)),
         Fault(
-            "sensor",
             "slip read as s / (1 - s)",
             lambda r: r | {"slip": r["slip"] / (1.0 - r["slip"])},
         ),
@@ -142,15 +139,11 @@ def mixed_rows() -> list[Fault]:
     """Sets whose rows are not all readings of one soil."""
     return [
         Fault(
-            "rows",
             "two soils, half of the rows each",
-            partition=lambda rows: (slice(0, rows // 2), slice(rows // 2, rows)),
             mix_rows=_half_of_another_soil,
         ),
         Fault(
-            "rows",
             "torque of one row doubled",
-            partition=lambda rows: (slice(1, rows),),
             mix_rows=_first_torque_doubled,
         ),
     ]
@@ -175,3 +168,27 @@ def simulate(case: Case, theta: Floats, slip: Floats, load: Floats) -> Readings:
         "sinkage": np.asarray(force.sinkage),
         "drawbar_pull": np.asarray(force.drawbar_pull),
     }
+
+
+def add_noise(r: Readings, case: Case, seed: int) -> Readings:
+    """Readings with the recipe's noise."""
+    rng = np.random.default_rng(seed)
+    std = {name: np.asarray(case.noise[key].std(r[name])) for name, key in COLUMNS.items()}
+    return r | {k: r[k] + std[k] * rng.standard_normal(std[k].shape) for k in COLUMNS}
+
+
+def shuffled_conditions(sets: int, seed: int) -> Order:
+    """Order (sets, conditions) of rows: every slip once, then every slip at another load, ..."""
+    rng = np.random.default_rng(seed)
+    loads, slips = (rng.permuted(np.tile(np.arange(6), (sets, 6, 1)), axis=2) for _ in range(2))
+    chosen = np.take_along_axis(loads.swapaxes(1, 2), slips, axis=2)  # (sets, round, position)
+    return (6 * slips + chosen).reshape(sets, 36)
+
+
+def select_rows(r: Readings, fault: Fault, order: Order) -> Readings:
+    """Rows (sets, rows) in this order, with the fault's mixing of rows."""
+    own, other = (
+        {k: np.take_along_axis(v, order, axis=1) for k, v in source.items()}
+        for source in (r, {k: np.roll(v, 1, axis=0) for k, v in r.items()})
+    )
+    return fault.mix_rows(own, other)

@@ -8,8 +8,18 @@ from typing import Any
 
 import numpy as np
 from board import estimator_of
-from faults import Fault, Readings, definitions, faults, simulate
-from flags import LOAD, SLIP, add_noise, select_rows, shuffled_conditions
+from faults import (
+    LOAD,
+    SLIP,
+    Fault,
+    Readings,
+    add_noise,
+    definitions,
+    faults,
+    select_rows,
+    shuffled_conditions,
+    simulate,
+)
 from runner import ROOT, Bench, Row, Sample, each, percent, table
 from wrong_worlds import World
 from wrong_worlds import simulate as simulate_world
@@ -79,7 +89,7 @@ def read(case: Row, estimator: Estimator) -> tuple[Readings, Floats]:
         if world.name == name:
             drives = simulate_world(world, sets, ROWS, SEED)
             return drives.readings, drives.truth
-    rng, fault = np.random.default_rng(SEED), studied().get(name, Fault("-", "no fault"))
+    rng, fault = np.random.default_rng(SEED), studied().get(name, Fault("no fault"))
     truth = np.stack([model.prior[key].at(rng.random(sets)) for key in SHEAR], axis=1)
     order = shuffled_conditions(sets, SEED)[:, :ROWS]
     true = simulate(fault.case(model), truth, SLIP, LOAD)
@@ -90,23 +100,24 @@ def read(case: Row, estimator: Estimator) -> tuple[Readings, Floats]:
 
 
 def flagged(case: Row) -> list[Row]:
-    """Each set with torque and with all channels: flags of the answer, of both detectors."""
+    """Shares of sets, by torque and by all channels: flagged by answer and detectors, covered."""
     estimator, rows = Estimator.load(ROOT / "exported" / "wheel.onnx"), []
     files = (estimator, estimator.on(**dict.fromkeys(SENSOR_ERROR_INPUTS, 0.0)))
     readings, truth = read(case, estimator)
     for count, channels in ((3, "torque"), (5, "all channels")):
+        flags, covered = [], []
         for i, soil in enumerate(truth):
             own = {name: readings[name][i] for name in CHANNELS[:count]}
             try:
                 answer, exact = (file.run(**own) for file in files)
             except InputError:
-                rows.append({"channels": channels} | dict.fromkeys(FLAGS, True))
+                flags.append((True, True, True))
                 continue
-            flags = (not answer.in_range, bool(answer.disagrees), bool(exact.disagrees))
-            covered = (soil >= answer.low) & (soil <= answer.high)
-            rows.append(
-                {"channels": channels, "covered": covered} | dict(zip(FLAGS, flags, strict=True))
-            )
+            flags.append((not answer.in_range, bool(answer.disagrees), bool(exact.disagrees)))
+            covered.append((soil >= answer.low) & (soil <= answer.high))
+        shares = dict(zip(FLAGS, np.mean(flags, axis=0), strict=True))
+        held = {"covered": np.mean(covered, axis=0)} if covered else {}
+        rows.append({"channels": channels} | shares | held)
     return rows
 
 

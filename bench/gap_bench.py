@@ -25,6 +25,7 @@ from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.plans import Plan, benchmark_plans
 from soilml.config.case import Case, read_case
 from soilml.fitting.operating_points import operating_points
+from soilml.fitting.predictions import forces
 from soilml.gap import GapReport, gap
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS
@@ -227,10 +228,7 @@ def predicted(case: Case, table: Table) -> dict[str, np.ndarray]:
             for name, values in predicted(case.of_gear(gear), plain.rows(own)).items():
                 y[name][own] = values
         return y
-    at = operating_points(table)
-    force = case.model(case.soil, at)
-    if case.remainder is not None:
-        force = case.remainder.added_to(force, at.slip, at.load)
+    force = forces(case, operating_points(table))
     return {name: np.asarray(getattr(force, name)) for name in CHANNELS}
 
 

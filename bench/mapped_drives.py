@@ -31,7 +31,7 @@ WAVES = 200  # Of a smooth random field
 class MappedDrive:
     """Rows (n,) of all wheels, in the order of time, and the truth about them."""
 
-    columns: dict[str, Any]  # As `soilml map` reads it
+    columns: dict[str, Any]  # As `soilml drive map` reads it
     soil: Floats  # Cohesion (Pa), friction angle (rad), shear modulus (m), (n, 3)
     patch: np.ndarray[Any, np.dtype[np.int64]]
 

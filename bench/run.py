@@ -12,8 +12,8 @@ sys.path[:0] = [str(ROOT / folder) for folder in ("bench", "tests")]
 MODULES = (
     "forward_model",
     "training_bench",
+    "peers",
     "sets",
-    "flags",
     "faults_on_board",
     "model_errors",
     "streams",
@@ -28,6 +28,7 @@ MODULES = (
     "wheel_leg_slip",
     "adapt",
     "gap_bench",
+    "gap_pull",
     "gap_speed",
     "challenge",
 )

@@ -56,7 +56,7 @@ class Drive:
     soils: tuple[dict[str, float], ...]
 
     def columns(self) -> dict[str, Any]:
-        """A table with a row for each time and wheel, as `soilml slip` reads it."""
+        """A table with a row for each time and wheel, as `soilml drive slip` reads it."""
         count, wheels = self.torque.shape
         return {
             "time_s": np.repeat(self.time, wheels),

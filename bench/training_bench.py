@@ -13,7 +13,7 @@ from runner import Bench, Row, Sample, each, one_case, table
 from datagen.generate import generate
 from datagen.recipe import read_recipe
 from training.benchmark.acceptance import goals
-from training.benchmark.report import LEGEND, format_goals, format_tables
+from training.benchmark.report import LEGEND, benchmark_tables, goals_table
 from training.benchmark.suite import benchmark
 from training.dataset import read_dataset
 from training.spec import read_any_wheel_spec, read_spec
@@ -22,6 +22,7 @@ from training.train import train, train_any_wheel
 FILES = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 #: Rows of the data of the recipe `wheel`, whose own number is the first; rows of a quick look.
 ROWS, QUICK_ROWS = (96_000, 192_000, 400_000), 4_000
+WIDE = 400  # Characters of a line of the tables, which have all columns
 ABOUT_COMPARISON = (
     "Written by `soilml compare`. The reference wheel follows the recipe `benchmark`: c 0 to 3 "
     "kPa, phi 25 to 45 deg, K 5 to 30 mm, slip 0.05 to 0.6, load 30 to 120 N. Torque noise is 2 %, "
@@ -39,7 +40,8 @@ ABOUT_TIME = (
 def comparison(case: Row) -> Row:
     """Released models and analytic methods on the fixed benchmark, with acceptance goals."""
     results = benchmark({name: estimator_of(name) for name in FILES})
-    return {"text": f"{format_goals(goals(results))}\n\n{format_tables(results)}"}
+    tables = [goals_table(goals(results)), *benchmark_tables(results)]
+    return {"text": "\n\n".join(f"{one.title}\n\n{one.text(WIDE)}" for one in tables)}
 
 
 def comparison_table(rows: list[Row]) -> str:

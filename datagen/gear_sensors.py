@@ -21,8 +21,8 @@ from soilml.parameters import check, declared
 from soilml.physics.gears import Midstance
 from soilml.physics.soils import Soil
 from soilml.quantities import QUANTITIES
-from soilml.systems.wheel_legs.slip_models import GRAVITY, VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
+from soilml.systems.wheel_legs.stances import GRAVITY, SpringLeg, vibration_amplitude
+from soilml.systems.wheel_legs.stride_relations import VIBRATION_SLIP, soil_spring, spring_soil
 
 #: Relations of vibration to slip: the rotating spring, or the straight line fitted to tests.
 LAWS = ("spring", "line")
@@ -125,7 +125,7 @@ class StickSlip:
         Raises `InputError` for a soil on which that line has no slope.
         """
         if self.law == "line":
-            a, b = VIBRATION_SLIP["linear"].line(leg["increment"], leg["stiffness"])
+            a, b = VIBRATION_SLIP["linear"].line(*spring_soil(leg["increment"], leg["stiffness"]))
             if b.min() < MIN_SLOPE:
                 drop = np.rad2deg(leg["increment"][int(np.argmin(b))])
                 raise InputError(

@@ -83,6 +83,14 @@ _ALL = (
         "angle", "theta", "rad", "place on the rim, from straight down; rotation of a shear ring"
     ),
     Quantity("normal", "sigma_s", "Pa", "normal stress that a sensor on the rim reads"),
+    Quantity("force", "F_s", "N", "force that a sensor on the rim reads"),
+    Quantity("belt_travel", "L_t", "m", "way of a track's belt since the start of a pull"),
+    Quantity("travel", "L", "m", "way of the robot since the start of a pull"),
+    Quantity("tension", "", "N", "tension between a robot and what it pulls"),
+    Quantity("front_laser", "l_f", "m", "distance from a laser at the front to the ground"),
+    Quantity("rear_laser", "l_r", "m", "distance from a laser at the rear to the ground"),
+    Quantity("inclination", "delta", "rad", "inclination of a robot, positive with its tail down"),
+    Quantity("sensor", "", "-", "number of a sensor in the row across the rim, 1 or more"),
     Quantity(
         "wheel",
         "",

@@ -149,16 +149,21 @@ class Interval(tuple[NDArray[np.float64], NDArray[np.float64]]):
 class Result:
     """A result of an analysis: `summary` for people, `to_frame` for pandas.
 
-    Its class gives `summary` and `frame_columns`; the frame's index is the first of these columns.
+    Its class gives `report`, of which all texts and pages are made, and `frame_columns`; the
+    frame's index is the first of these columns.
     """
 
-    def summary(self) -> str:
-        """The verdict in the first line, then at most five lines."""
+    def report(self) -> Any:
+        """What the result says, as a `soilml.report.report.Report`."""
         raise NotImplementedError
 
     def frame_columns(self) -> dict[str, Any]:
         """Columns of `to_frame` in SI units, of which the first one is the index."""
         raise NotImplementedError
+
+    def summary(self) -> str:
+        """The verdict in the first line, then at most five lines."""
+        return str(self.report().summary())
 
     def to_frame(self) -> Any:
         """A pandas data frame in SI units: one row for each parameter, or for each reading.
@@ -168,28 +173,27 @@ class Result:
         columns = self.frame_columns()
         return data_frame(columns).set_index(next(iter(columns)))
 
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the first picture of the report; returns its axes.
+
+        ax: Axes of matplotlib, as many as it has panels; a new figure where None.
+
+        Raises `InputError` for another number of axes, and where there is nothing to draw.
+        """
+        report = self.report()
+        if not report.pictures:
+            raise InputError(f"there is no picture of this result: {report.verdict}")
+        return report.pictures[0].plot(ax)
+
     def __str__(self) -> str:
         return self.summary()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.summary().splitlines()[0]}>"
+        return f"<{type(self).__name__}: {self.report().verdict}>"
 
     def _repr_html_(self) -> str:
-        """The summary and the frame's rows, for notebooks; needs no pandas."""
-        from html import escape
-
-        columns = self.frame_columns()
-        rows = zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True)
-        head = "".join(f"<th>{escape(name)}</th>" for name in columns)
-        body = "".join(
-            f"<tr>{''.join(f'<td>{escape(_cell(cell))}</td>' for cell in row)}</tr>" for row in rows
-        )
-        table = f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
-        return f"<pre>{escape(self.summary())}</pre>{table}"
-
-
-def _cell(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+        """Verdict, lines and the first table, for notebooks; needs no pandas."""
+        return str(self.report()._repr_html_())
 
 
 def data_frame(columns: dict[str, Any], index: Any = None) -> Any:

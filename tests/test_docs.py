@@ -70,9 +70,8 @@ def test_the_analyses_of_the_readme_find_the_hidden_effect(monkeypatch):
     names: dict = {}
     exec(blocks("README.md", "python")[0], names)
     assert names["fit"].names == ("cohesion", "friction_angle", "shear_modulus")
-    exact = names["fit"].exact_model
-    assert any(remark.code == "excess-residuals" for remark in exact.warnings)
-    assert names["fit"].explanations[0].effect == "slip-sinkage"
+    assert any(remark.code == "excess-residuals" for remark in names["fit"].warnings)
+    assert names["fit"].explanations[0].effects == ("slip-sinkage",)
     assert names["report"].status == "named"
     assert names["report"].cause_set == (("slip-sinkage",),)
 

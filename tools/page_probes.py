@@ -16,7 +16,6 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -83,50 +82,13 @@ def _slip_models(script: ModuleType) -> Callable[[], object]:
 
 def _tracked_robot(script: ModuleType) -> None:
     """Two groups of pulls in place of eight."""
-    script.GROUPS, script.draw = 2, _nothing
+    script.GROUPS = 2
 
 
-def _without_pictures(script: ModuleType) -> None:
-    """All figures of a script that is quick but for what it draws."""
-    script.draw = _nothing
-
-
-def _springs(script: ModuleType) -> None:
-    """Nine springs in place of 63."""
-    chapter = script.chapter
-    chapter.STIFFNESSES, chapter.DROPS = chapter.STIFFNESSES[::3], chapter.DROPS[::4]
-
-
-def _stick_slip(script: ModuleType) -> None:
-    _springs(script)
-    script.STIFFNESSES, script.DROPS, script.ROWS, script.STRAIGHT = (4000.0,), (0.15, 0.3), 300, 0
-    script.MECHANISMS = {"gradual": {"softening": (0.03,)}}
-    script.draw = _nothing
-
-
-def _wheel_leg_slip(script: ModuleType) -> Callable[[], object]:
-    """Few springs, stances and soils, and two effects in place of the catalogue."""
-    from soilml.physics.effects import EFFECTS
-
-    _springs(script)
-    effects = {name: EFFECTS[name] for name in ("slip-sinkage", "torque-gain")}
-    script.gap = partial(script.gap, effects=effects)
-    script.REALISATIONS = 1
-    stances, soils = script.simulate_stances, script.sample_soils
-    script.simulate_stances = lambda count, seed: stances(40, seed)
-    script.sample_soils = lambda count, seed: soils(20, seed)
+def _chains(script: ModuleType) -> None:
+    """The two quickest chains."""
+    script.CHAINS = {name: script.CHAINS[name] for name in ("wheel-leg", "track")}
     script.OUT = _folder()
-    return script.run  # type: ignore[no-any-return]
-
-
-def _wheel_legs(script: ModuleType) -> None:
-    """Fewer feet, and a third of the instants of each walk."""
-    names = ("gait_metrics", "sinkage_fit")
-    for module in (script, *(sys.modules[f"soilml.systems.wheel_legs.{name}"] for name in names)):
-        module.walk = partial(module.walk, steps=300)  # type: ignore[attr-defined]
-    script.compare_feet = partial(script.compare_feet, (4e5, 7e5, 1e6), ("LTF", "SRF"))
-    script.compare_legs = partial(script.compare_legs, turns=1.0)
-    script.strip, script.OUT = _nothing, _folder() / "picture.png"
 
 
 def _import_wheel_leg(script: ModuleType) -> None:
@@ -164,12 +126,8 @@ def _moon(script: ModuleType) -> None:
 PROBES: dict[str, Shrink] = {
     "examples/papers/lunar_lssvm.py": _lunar,
     "examples/papers/slip_models.py": _slip_models,
-    "examples/papers/climbing.py": _without_pictures,
-    "examples/papers/force_sensor_wheel.py": _without_pictures,
-    "examples/papers/stick_slip.py": _stick_slip,
+    "examples/papers/chains.py": _chains,
     "examples/papers/tracked_robot.py": _tracked_robot,
-    "examples/papers/wheel_leg_slip.py": _wheel_leg_slip,
-    "examples/papers/wheel_legs.py": _wheel_legs,
     "examples/import/wheel_leg.py": _import_wheel_leg,
     "examples/gravity/moon.py": _moon,
     "examples/map/compare.py": _map_compare,

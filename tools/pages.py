@@ -3,14 +3,14 @@
 A block stands between two comments, of which the first has the command and the first words of a
 paragraph of its output. Further paragraphs follow where a number says so:
 
-    <!-- output: python examples/papers/climbing.py | Steepest slopes | 2 -->
+    <!-- output: python examples/papers/chains.py | climb | 2 -->
     ...
     <!-- end of output -->
 
 A picture follows a comment with the file that such a command draws, from which it is copied:
 
-    <!-- drawn: demo/papers/climbing.png -->
-    ![climbing](climbing.png)
+    <!-- drawn: demo/papers/track.png -->
+    ![track](track.png)
 
 python tools/pages.py                          write the blocks of all pages
 python tools/pages.py --check docs/papers/x.md   compare those of one; status 1 if one is stale

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
 from soilml.config.compatibility import recipe_content
-from soilml.config.model_settings import text_in_si
 from soilml.errors import InputError, TableError
+from soilml.io.declared_settings import text_in_si
 from soilml.io.read_table import read_table
 from soilml.onboard.features import compute_features, inputs_of
 from soilml.parameters import declared
@@ -93,9 +93,9 @@ class Dataset:
             row=self.row[index],
         )
 
-    def limit_rows_per_run(self, most: int = 2) -> Dataset:
-        """At most `most` rows of each run: the errors of rows of one soil are correlated."""
-        return self.rows(np.sort(np.concatenate([run[:most] for run in self.runs()])))
+    def rows_of_each_run(self, most: int = 2) -> NDArray[np.int64]:
+        """Indices of at most `most` rows of each run, whose errors are correlated."""
+        return np.sort(np.concatenate([run[:most] for run in self.runs()]))
 
     def runs(self) -> list[NDArray[np.int64]]:
         """Row indices of each run, shuffled.
@@ -111,12 +111,6 @@ class Dataset:
     def units(self) -> tuple[str, ...]:
         """Unit of each target."""
         return tuple(QUANTITIES[name].unit for name in self.target_names)
-
-    @property
-    def run_length(self) -> NDArray[np.int64]:
-        """Rows of the run that each row belongs to, (n,)."""
-        _, code, count = np.unique(self.run, return_inverse=True, return_counts=True)
-        return np.asarray(count[code])
 
 
 def read_dataset(
@@ -190,41 +184,3 @@ def _ends(prior: object, truth: Floats, name: str) -> tuple[float, float]:
         low, high = (text_in_si(v, unit, name) if isinstance(v, str) else float(v) for v in prior)
         return low, high
     return float(truth.min()), float(truth.max())
-
-
-@dataclass(frozen=True)
-class DataSplit:
-    """Training, validation and calibration rows; no soil is in two of them."""
-
-    train: Dataset
-    validation: Dataset
-    calibration: Dataset
-
-
-def split_by_run(
-    data: Dataset, seed: int, validation: float = 0.1, calibration: float = 0.2
-) -> DataSplit:
-    """Split by run into given shares of the runs for validation and calibration.
-
-    Where at least half of the rows are runs of a single row, all longer runs are used for
-    calibration, with a tenth of the single rows: pooling is calibrated on the longer runs, and
-    single rows cover more soils for training.
-    """
-    single = data.run_length == 1
-    codes, first = np.unique(data.run, return_index=True)
-    shuffled = np.random.default_rng(seed).permutation(len(codes))
-    rank = np.empty(len(codes))
-    rank[shuffled] = (np.arange(len(codes)) + 0.5) / len(codes)
-    if 0.5 <= single.mean() < 1.0:
-        single_runs = np.flatnonzero(single[first])
-        order = np.argsort(rank[single_runs])
-        rank[:] = 1.0
-        rank[single_runs[order]] = (np.arange(single_runs.size) + 0.5) / single_runs.size
-        calibration = 0.1
-    row_rank = rank[np.searchsorted(codes, data.run)]
-    first_validation, first_calibration = 1.0 - validation - calibration, 1.0 - calibration
-    return DataSplit(
-        train=data.rows(row_rank < first_validation),
-        validation=data.rows((row_rank >= first_validation) & (row_rank < first_calibration)),
-        calibration=data.rows(row_rank >= first_calibration),
-    )

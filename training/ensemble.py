@@ -9,9 +9,11 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.onboard.fusion_rules import BEST_LINEAR, RULES, best_linear, shrink_correlation
 from training.calibration.recalibration import CalibratedRegressor
-from training.dataset import Dataset
 from training.onnx_graph.builder import Graph
 from training.onnx_graph.value import Value, concat, reciprocal, sqrt
+
+#: Rows of which correlations are shrunk entirely; by a share of this number over theirs beyond.
+SHRUNK_ROWS = 10.0
 
 
 @dataclass(frozen=True)
@@ -29,8 +31,11 @@ class Ensemble:
 
     def predict(self, features: Floats, return_std: bool = True) -> tuple[Floats, Floats]:
         """Mean and standard deviation (n, q) by the rule, before recalibration."""
-        predictions = [member.predict(features) for member in self.members]
-        mean, std = np.stack([m for m, _ in predictions]), np.stack([s for _, s in predictions])
+        means, stds = zip(*(member.predict(features) for member in self.members), strict=True)
+        return self.combine(np.stack(means), np.stack(stds))
+
+    def combine(self, mean: Floats, std: Floats) -> tuple[Floats, Floats]:
+        """The same from the members' means and standard deviations (m, n, q)."""
         if self.rule == BEST_LINEAR:
             weighted = self.weights[:, None, :] * std
             variance = np.einsum("inq,qij,jnq->nq", weighted, self.correlation, weighted)
@@ -50,15 +55,21 @@ class Ensemble:
         return add_rowwise_fusion(self.rule, graph, means, stds)
 
 
-def fuse_members(members: list[CalibratedRegressor], rule: str, data: Dataset) -> Ensemble:
-    """Fuse members by a rule, with the covariance of their errors on held-out rows."""
-    predictions = [member.predict(data.features) for member in members]
-    error = np.stack([data.targets - m for m, _ in predictions])  # (m, n, q)
-    z = error / np.stack([s for _, s in predictions])
+def fuse_members(
+    members: list[CalibratedRegressor], rule: str, mean: Floats, std: Floats, truth: Floats
+) -> Ensemble:
+    """Fuse members by a rule, with the covariance of their errors.
+
+    mean, std (m, n, q): Their estimates of rows that they have not seen, whose true values are
+        `truth` (n, q).
+    """
+    error = truth - mean
+    z = error / std
     rmse = np.sqrt(np.mean(error**2, axis=1))
     m, _, q = error.shape
+    share = min(0.1, SHRUNK_ROWS / len(truth))
     correlation = np.stack(
-        [shrink_correlation(np.corrcoef(z[:, :, k]).reshape(m, m)) for k in range(q)]
+        [shrink_correlation(np.corrcoef(z[:, :, k]).reshape(m, m), share) for k in range(q)]
     )
     weights = np.stack(
         [best_linear(rmse[:, k], rmse[:, k], correlation[k]).weights for k in range(q)], axis=1

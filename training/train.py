@@ -1,10 +1,9 @@
-"""Training: fit, recalibrate and fuse the regressors of a spec, and measure them on unseen rows."""
+"""Training: fit, recalibrate, fuse and measure the regressors of a spec."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,32 +12,19 @@ from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.fusion_rules import RULES
-from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_within_prior
-from soilml.quantities import Z_90
+from soilml.onboard.gaussian_pooling import PoolingCalibration
 from training.available_memory import available_memory
-from training.calibration.held_out import carry_errors, measure_held_out
-from training.calibration.recalibration import (
-    CalibratedRegressor,
-    Metrics,
-    compute_metrics,
-    covariance_matrices,
-    recalibrate,
-)
+from training.calibration.held_out import carry_errors
+from training.calibration.recalibration import CalibratedRegressor, Metrics, covariance_matrices
 from training.calibration.row_pooling import (
-    LEAST_GROUPS,
     calibrate_pooling,
-    calibrate_single_rows,
-    groups_by_length,
-    measured_rows,
-    row_groups,
     run_conditions,
-    runs_with_pattern,
+    score_pooling,
+    single_rows,
 )
 from training.calibration.training_domain import TrainingDomain
-from training.dataset import Dataset, DataSplit, split_by_run
-from training.ensemble import fuse_members
-from training.few_rows import LeftOut, fit_few_rows
+from training.cross_fit import LeftOut, cross_fit
+from training.dataset import Dataset
 from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
@@ -59,7 +45,7 @@ TrainedSetPosterior = tuple[SetPosteriorGraph, dict[int, SetFigures]]
 
 @dataclass(frozen=True)
 class TrainedModel:
-    """A trained model, what its file needs, and its metrics on unseen rows."""
+    """A trained model, what its file needs, and its metrics on rows left out."""
 
     spec: Spec  # what it was trained from
     estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
@@ -69,20 +55,18 @@ class TrainedModel:
     pooling: PoolingCalibration
     prior: PriorSummary  # prior of the targets
     data: Dataset
-    parts: DataSplit
     #: of single rows: of each member, of each fusion rule, and of the estimator
     scores: dict[str, Metrics]
     #: of pooled rows, by pattern of operating conditions and number of rows
     pooled_scores: dict[str, dict[int, Metrics]]
     members: tuple[CalibratedRegressor, ...]  # the single regressors
+    left_out: LeftOut  # estimates of all rows by fits that have not seen their runs
     #: of repeated readings at one slip, by their number, for targets that differ between rows
     repeat_scores: dict[int, Metrics] = field(default_factory=dict)
     #: posterior of several rows, where the spec asks for it
     set_posterior: SetPosteriorGraph | None = None
     #: its metrics by number of rows
     set_figures: dict[int, SetFigures] = field(default_factory=dict)
-    #: of a campaign of few rows: estimates of all rows by fits that have not seen their runs
-    left_out: LeftOut | None = None
 
     def predict(self, features: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
         """Mean, standard deviation (n, q) and in-range flag (n,), as in the exported file.
@@ -104,10 +88,9 @@ def train(
 ) -> TrainedModel:
     """Fit and recalibrate every regressor of a spec, fuse them, and measure the result.
 
-    The calibration rows are cut in three by run. On the first part the members are recalibrated and
-    the correlation of their errors is measured; on the second the fused estimate is recalibrated;
-    on the third all metrics are measured. Where they are too few for that, each row is judged by a
-    fit to the other runs instead (`training.few_rows`).
+    Every row is learned from. Every row also calibrates: the errors that standard deviations,
+    fusion and metrics rest on are those of fits that have not seen the row's run
+    (`training.cross_fit`).
 
     Parameters
     ----------
@@ -136,52 +119,41 @@ def train(
     >>> train(spec, data).scores["estimator"].relative  # doctest: +SKIP
     array([0.943, 0.881, 0.688])
     """
-    parts = split_by_run(data, spec.seed)
-    first, second, third = _split_in_three(parts.calibration.limit_rows_per_run(), spec.seed)
-    scored = np.isin(parts.calibration.run, third.run)
-    calibration = parts.calibration.rows(~scored)
-    if len(row_groups(calibration.runs(), 1)) < LEAST_GROUPS:
-        return _train_on_few_rows(spec, data, progress)
-    prior = _prior(parts.train)
-    labels = [_label(regressor, parts) for regressor in spec.regressors]
+    prior = PriorSummary(
+        data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper
+    )
+    labels = {regressor.name: _label(regressor, data) for regressor in spec.regressors}
     # first, because it refuses loads that the soils do not carry
     set_posterior, set_figures = _train_set_posterior(spec, data, progress)
-    members = []
-    for regressor, label in zip(spec.regressors, labels, strict=True):
-        _fit(regressor, parts, partial(progress, f"fitting {label}"))
-        members.append(recalibrate(regressor, first))
-    scores = {m.regressor.name: score(m, third, prior.std) for m in members}
-    if len(members) > 1:
-        scores |= score_rules(members, first, second, third, prior.std)
-        estimator = recalibrate(fuse_members(members, spec.rule, first), second)
-    else:
-        estimator = recalibrate(members[0].regressor, _unscored_rows(parts, third))
-    scores["estimator"] = score(estimator, third, prior.std)
-    mean, std = estimator.predict(calibration.features)
-    covariance = covariance_matrices(std, estimator.correlation)
-    alone = spec.per_row or spec.set_posterior is not None  # rows are not pooled as Gaussians
-    calibrate = calibrate_single_rows if alone else calibrate_pooling
-    pooling = calibrate(mean, covariance, calibration, prior, run_conditions(parts.train))
-    trained = TrainedModel(
+    found = cross_fit(spec, data, prior, labels, progress)
+    left, conditions = found.left_out, run_conditions(data)
+    pooling = single_rows(conditions, left.factor)
+    pooled_scores: dict[str, dict[int, Metrics]] = {}
+    repeats: dict[int, Metrics] = {}
+    if not spec.per_row and spec.set_posterior is None:
+        covariance = covariance_matrices(left.std, found.estimator.correlation)
+        parts = (left.mean, covariance, data, prior, conditions, left.factor)
+        pooling, pooled_scores = calibrate_pooling(*parts), score_pooling(*parts)
+    if spec.per_row:
+        mean = np.clip(left.mean, prior.lower, prior.upper)
+        # with few runs, all rows are kept
+        rows = replace(data, run=np.arange(len(data))) if left.few else data
+        pooling, repeats = carry_errors(mean, left.std, pooling, rows, prior.std)
+    return TrainedModel(
         spec=spec,
-        estimator=estimator,
-        domain=TrainingDomain.of(parts.train.features, spec.features, spec.seed),
+        estimator=found.estimator,
+        domain=TrainingDomain.of(data.features, spec.features, spec.seed, left.few),
         pooling=pooling,
         prior=prior,
         data=data,
-        parts=parts,
-        scores=scores,
-        pooled_scores=score_pooling(estimator, pooling, parts.calibration.rows(scored), prior),
-        members=tuple(members),
+        scores=found.scores,
+        pooled_scores=pooled_scores,
+        members=found.members,
+        left_out=left,
+        repeat_scores=repeats,
         set_posterior=set_posterior,
         set_figures=set_figures,
     )
-    if spec.per_row:
-        pooling, repeats = carry_errors(
-            trained.predict, pooling, calibration, parts.calibration.rows(scored), prior.std
-        )
-        trained = replace(trained, pooling=pooling, repeat_scores=repeats)
-    return trained
 
 
 def train_any_wheel(spec: AnyWheelSpec, progress: Progress) -> TrainedSetPosterior:
@@ -211,62 +183,13 @@ def _train_set_posterior(
     return posterior, validate_posterior(posterior, progress)
 
 
-def _train_on_few_rows(spec: Spec, data: Dataset, progress: Progress) -> TrainedModel:
-    """The same where too few rows remain to calibrate on: all are learned from, and left out."""
-    parts, prior = DataSplit(data, data, data), _prior(data)
-    for regressor in spec.regressors:
-        _label(regressor, parts)  # refuses what does not fit into memory
-    set_posterior, set_figures = _train_set_posterior(spec, data, progress)
-    estimator, members, left = fit_few_rows(
-        spec.regressors, spec.rule, data, prior, spec.seed, progress
-    )
-    last, conditions = left[-1], run_conditions(data)
-    alone = spec.per_row or spec.set_posterior is not None
-    covariance = covariance_matrices(last.std, estimator.correlation)
-    calibrate = calibrate_single_rows if alone else calibrate_pooling
-    pooling = replace(
-        calibrate(last.mean, covariance, data, prior, conditions),
-        single_row_coverage_factor=last.factor,
-    )
-    if spec.per_row:
-        clipped = np.clip(last.mean, prior.lower, prior.upper)
-        answers = (clipped, last.std, np.ones(len(data), bool))
-        single = replace(data, run=np.arange(len(data)))  # few rows: all are carried
-        held_out = measure_held_out(lambda features: answers, single, conditions, last.factor)
-        pooling = replace(pooling, held_out=held_out)
-    names = [*(regressor.name for regressor in spec.regressors), "estimator"]
-    return TrainedModel(
-        spec=spec,
-        estimator=estimator,
-        domain=TrainingDomain.of(data.features, spec.features, spec.seed, few=True),
-        pooling=pooling,
-        prior=prior,
-        data=data,
-        parts=parts,
-        scores={
-            name: compute_metrics(data.targets, part.mean, part.std, prior.std)
-            for name, part in zip(names, [*left[: len(members)], last], strict=True)
-        },
-        pooled_scores={},
-        members=tuple(members),
-        set_posterior=set_posterior,
-        set_figures=set_figures,
-        left_out=last,
-    )
-
-
-def _prior(data: Dataset) -> PriorSummary:
-    """Mean and spread of the targets in the training rows, within the range of the recipe."""
-    return PriorSummary(data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper)
-
-
-def _label(regressor: FeatureSubset, parts: DataSplit) -> str:
+def _label(regressor: FeatureSubset, data: Dataset) -> str:
     """Name of a regressor with what its fit will take; raises `InputError` where it does not fit.
 
     It is said and refused before anything is fitted.
     """
-    rows, outputs = parts.train.targets.shape
-    inputs = regressor.select(parts.train.features[:1]).shape[1]
+    rows, outputs = data.targets.shape
+    inputs = regressor.select(data.features[:1]).shape[1]
     needs = regressor.model.requirements(rows, inputs, outputs)
     if needs is None:
         return regressor.name
@@ -278,71 +201,3 @@ def _label(regressor: FeatureSubset, parts: DataSplit) -> str:
             'fewer prototypes with solution = "fixed-size"'
         )
     return f"{regressor.name} ({size})"
-
-
-def _fit(regressor: FeatureSubset, parts: DataSplit, progress: Callable[[int, int], None]) -> None:
-    progress(0, 1)
-    training = (parts.train.features, parts.train.targets)
-    validation = (parts.validation.features, parts.validation.targets)
-    regressor.fit(training, validation, progress)
-    if not np.isfinite(regressor.predict(parts.validation.features)).all():
-        raise InputError(f"{regressor.name} did not converge: change its settings in the spec")
-    progress(1, 1)
-
-
-def _split_in_three(data: Dataset, seed: int) -> tuple[Dataset, Dataset, Dataset]:
-    """Three parts of about equal size, by run."""
-    codes = np.unique(data.run)
-    part_of_run = np.random.default_rng(seed + 1).permutation(len(codes)) % 3
-    part = part_of_run[np.searchsorted(codes, data.run)]
-    return data.rows(part == 0), data.rows(part == 1), data.rows(part == 2)
-
-
-def _unscored_rows(parts: DataSplit, scored: Dataset) -> Dataset:
-    """Calibration rows, a few of each run, without the runs that metrics are measured on."""
-    few = parts.calibration.limit_rows_per_run()
-    return few.rows(~np.isin(few.run, scored.run))
-
-
-def score(estimator: CalibratedRegressor, data: Dataset, prior_std: Floats) -> Metrics:
-    """Metrics of single rows."""
-    return compute_metrics(data.targets, *estimator.predict(data.features), prior_std)
-
-
-def score_rules(
-    members: list[CalibratedRegressor],
-    first: Dataset,
-    second: Dataset,
-    third: Dataset,
-    prior_std: Floats,
-) -> dict[str, Metrics]:
-    """Metrics of every fusion rule, before and after recalibration."""
-    scores = {}
-    for rule in RULES:
-        ensemble = fuse_members(members, rule, first)
-        claimed = ensemble.predict(third.features)
-        scores[f"{rule}, as claimed"] = compute_metrics(third.targets, *claimed, prior_std)
-        scores[f"{rule}, recalibrated"] = score(recalibrate(ensemble, second), third, prior_std)
-    return scores
-
-
-def score_pooling(
-    estimator: CalibratedRegressor, pooling: PoolingCalibration, data: Dataset, prior: PriorSummary
-) -> dict[str, dict[int, Metrics]]:
-    """Metrics of pooled rows by pattern and number of rows, on runs not used for calibration."""
-    mean, std = estimator.predict(data.features)
-    covariance = covariance_matrices(std, estimator.correlation)
-    scores: dict[str, dict[int, Metrics]] = {}
-    for pattern in pooling.patterns:
-        by_length = scores[pooling.label(pattern)] = {}
-        runs = runs_with_pattern(pattern.varies, data, pooling.conditions)
-        for groups in groups_by_length(runs):
-            rule = pooling.rule(measured_rows(data, groups))
-            pooled = pool_within_prior(mean[groups], covariance[groups], prior, rule)
-            std = np.sqrt(np.diagonal(pooled.covariance, axis1=1, axis2=2))
-            # of a Gaussian with the same 90 % interval
-            std = std * rule.coverage_factor / Z_90
-            by_length[groups.shape[1]] = compute_metrics(
-                data.targets[groups[:, 0]], pooled.mean, std, prior.std
-            )
-    return scores

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from datagen.blind_sets.catalogued import RIG_MECHANISMS, SENSOR_MECHANISMS
 from datagen.blind_sets.plans import Plan, active_mechanisms
 from datagen.blind_sets.reading_errors import (
     AUTOCORRELATION,
@@ -33,6 +34,7 @@ from datagen.blind_sets.run_schedules import (
     COVARIATE_COLUMNS,
     POINTS,
     RunSchedule,
+    beyond_schedule,
     design_schedule,
     heavier_schedule,
     rows_between,
@@ -72,7 +74,9 @@ class BlindSet:
     it was recorded. `region` is 1.3 to 1.6 times heavier than the heaviest run; `between` has rows
     of the same runs at other slips. Channels that were not measured are NaN. `model`
     is the text of a model file without the hidden mechanism. In `truth`, `runs_true` and
-    `region_true` are the readings without noise, as is `between_true`; `runs_steady` and
+    `region_true` are the readings without noise, as is `between_true`; `beyond` has what a vehicle
+    meets within the range of the runs and beyond it, without errors of rig and sensors, NaN where
+    no soil carries it; `runs_steady` and
     `runs_without` are without scatter and discrepancy as well, `runs_without` and `region_without`
     without the mechanism.
     """
@@ -130,7 +134,8 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
         inside = _scattered(between, soil, wheels, active, simulated[0][1])
         if not all(np.isfinite(v).all() for v in inside):
             continue
-        schedules = (runs, region, between)
+        beyond, where = beyond_schedule(runs)
+        schedules = (runs, region, between, beyond)
         extra = draw_discrepancies(plan.discrepancy, schedules, simulated[0][0], extras)
         true = [_sum(s, e) for (s, _), e in zip(simulated, extra[:2], strict=True)]
         inside = _sum(inside, extra[2])
@@ -189,6 +194,17 @@ def draw_blind_set(plan: Plan, rows: int = POINTS) -> BlindSet:
         "between_true": _by_channel(inside),
         "between_elapsed": between.elapsed.tolist(),
         "region_elapsed": region.elapsed.tolist(),
+        "beyond": {
+            "where": where.tolist(),
+            "slip": beyond.slip.tolist(),
+            "load_N": beyond.load.tolist(),
+            "covariates": {name: float(v[0]) for name, v in beyond.covariates.items()},
+            "true": _by_channel(
+                _sum(
+                    _channels(_rows(beyond, soil, wheels), beyond, _of_a_vehicle(active)), extra[3]
+                )
+            ),
+        },
     }
     model = _model(nominal, plan.free, wheels, declared)
     return BlindSet(tables[0], tables[1], tables[2], model, truth)
@@ -256,6 +272,12 @@ def _scattered(
     values["friction_angle"] = rows.friction_angle + phi
     values["kc"], values["kphi"] = rows.kc * k, rows.kphi * k
     return _channels(WheelState(**values), schedule, active)
+
+
+def _of_a_vehicle(active: ActiveMechanisms) -> ActiveMechanisms:
+    """The mechanisms of soil and gear, which act on a vehicle too."""
+    of_rig = {m.key for m in (*RIG_MECHANISMS, *SENSOR_MECHANISMS)}
+    return tuple((m, size) for m, size in active if m.key not in of_rig)
 
 
 def _times(schedule: RunSchedule) -> Floats:

@@ -155,6 +155,40 @@ def rows_between(runs: RunSchedule, generator: np.random.Generator) -> RunSchedu
     )
 
 
+#: Loads beyond those driven, over the lightest and the heaviest; slips beyond the highest driven.
+LIGHTER, HEAVIER, FASTER = (0.6, 0.8), (1.25, 1.5), (0.08, 0.15)
+BEYOND_SLIPS = 5  # Slips at each load within and beyond those driven
+
+
+def beyond_schedule(runs: RunSchedule) -> tuple[RunSchedule, NDArray[np.str_]]:
+    """Steady rows within the range of others and beyond it, and where each of them is.
+
+    Where: `inside` (other slips and loads between), `lighter`, `heavier` and `faster`. Covariates
+    are the medians of the runs.
+    """
+    low, high = float(runs.load.min()), float(runs.load.max())
+    least, most = max(float(runs.slip.min()), 0.0), float(runs.slip.max())
+    slips = np.linspace(least, most, BEYOND_SLIPS + 2)[1:-1]
+    inside = np.geomspace(low, high, 3)
+    loads = {"inside": inside, "lighter": low * np.asarray(LIGHTER)}
+    loads["heavier"] = high * np.asarray(HEAVIER)
+    rows = [(s, w, where) for where, own in loads.items() for w in own for s in slips]
+    rows += [(min(most + s, 0.85), w, "faster") for w in inside for s in FASTER]
+    slip, load = (np.asarray([row[i] for row in rows], float) for i in (0, 1))
+    usual = {name: np.full(slip.size, np.median(v)) for name, v in runs.covariates.items()}
+    schedule = RunSchedule(
+        run=np.zeros(slip.size, np.int64),
+        names=np.full(slip.size, "beyond"),
+        slip=slip,
+        load=load,
+        gear=np.zeros(slip.size, np.int64),
+        elapsed=np.ones(slip.size),
+        covariates=usual,
+        varied=runs.varied,
+    )
+    return schedule, np.asarray([row[2] for row in rows])
+
+
 def _driven(
     load: Floats,
     needs: set[str],

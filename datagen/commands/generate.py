@@ -9,14 +9,14 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import InputFile, add_effects_option, add_workers_option, whole_number
+from soilml.cli.option_values import whole_number
+from soilml.cli.options import InputFile, add_effects_option, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import output_files
 
 if TYPE_CHECKING:
     from datagen.generate import Engine
 
-HELP = "simulate measurements from a recipe, as Parquet"
 #: Names of the engines: processes of this machine, or workers of dask.
 ENGINES = ("processes", "dask")
 DESCRIPTION = """\
@@ -71,7 +71,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "out", metavar="OUT.parquet", help="file to write, or with a slash at its end a folder"
     )
     parser.add_argument(
-        "--rows", type=whole_number, help="number of rows (default: that of the recipe)"
+        "--rows",
+        type=whole_number,
+        metavar="N",
+        help="number of rows (default: that of the recipe)",
     )
     parser.add_argument(
         "--seed", type=whole_number, help="seed of the random numbers (default: that of the recipe)"

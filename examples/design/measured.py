@@ -1,4 +1,4 @@
-"""Largest pull of four measured wheels beside the band of `soilml design` before any row.
+"""Largest pull of four measured wheels beside the band of `soilml plan wheels` before any row.
 
     python examples/design/measured.py DATA     # the folder with ding2011 and kls1_rashid1
 

@@ -14,7 +14,8 @@ import numpy as np
 from datagen.blind_sets.blind_set import BlindSet, draw_blind_set
 from datagen.blind_sets.plans import Plan
 from soilml.cli import main
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.text_tables import csv_text
+from soilml.report.aligned_text import format_table
 
 #: The plans of the stories; the analysis does not receive the truth.
 PLANS = {

@@ -16,9 +16,10 @@ from soilml.experiment_design import samples_of_rows
 from soilml.experiment_design.transfer_tests import TransferAdvice, advise_transfer
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.text_tables import csv_text
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import LAWS, GravityChange
+from soilml.report.aligned_text import format_table
 from soilml.report.figure_style import save_png
 from soilml.traction import Traction, predict_traction
 from soilml.traction.by_load import MeasuredRange, predictions_by_load, slip_grid

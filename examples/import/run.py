@@ -11,7 +11,7 @@ from rig import write_logs
 
 from soilml.cli import main
 from soilml.log_import import import_log
-from soilml.log_import.figures import draw_over_slip, draw_run, panels_over_slip
+from soilml.log_import.figures import draw_over_slip, draw_run, panels_over_slip, run_panels
 from soilml.report.figure_style import report_style
 
 FOLDER = Path("demo/import")
@@ -31,14 +31,13 @@ def picture(logs: list[str], chart: Path, target: Path) -> None:
 
     imported = import_log(logs, chart)
     with report_style():
-        figure = plt.figure(figsize=(15.2, 4.8))
+        figure = plt.figure(figsize=(15.2, 4.8), layout="constrained")
         first, second, third = figure.subfigures(1, 3)
-        draw_run(first, imported.series[0], imported.table)
-        draw_run(second, imported.series[3], imported.table)
+        for canvas, series in zip((first, second), imported.series[::3], strict=False):
+            draw_run(series, imported.table, canvas.subplots(run_panels(series), 1))
         shown = panels_over_slip(imported.table, imported.radius)[:2]
         for axes, panel in zip(third.subplots(2, 1, sharex=True), shown, strict=True):
             draw_over_slip(axes, imported.table, panel)
-        third.subplots_adjust(hspace=0.35)
         first.axes[-1].set_xlabel("time, s; sand_1")
         second.axes[-1].set_xlabel("time, s; sand_4: somebody pulls on the carriage at the end")
         figure.savefig(target, dpi=80, facecolor="white")

@@ -19,18 +19,14 @@ from numpy.typing import NDArray
 from soilml import Estimator, Model, Operating
 from soilml.cli import main
 from soilml.io.table import Table
-from soilml.io.text_tables import format_table
 from soilml.log_import import import_log
 from soilml.onboard.multi_sensor import fuse_estimates
+from soilml.papers.comin2017_slip import FOOT
+from soilml.physics.soils import Soil
 from soilml.quantities import Z_90, column
-from soilml.systems.wheel_legs.slip_models import VIBRATION_SLIP, soil_spring
-from soilml.systems.wheel_legs.stances import (
-    FOOT,
-    GRAVITY,
-    SpringLeg,
-    sample_soils,
-    simulate_stance,
-)
+from soilml.report.aligned_text import format_table
+from soilml.systems.wheel_legs import VIBRATION_SLIP, SpringLeg, simulate_stance
+from soilml.systems.wheel_legs.stances import GRAVITY
 
 Floats = NDArray[np.float64]
 
@@ -93,12 +89,26 @@ class Truth:
     sinkage: Floats
 
 
+def random_soils(count: int, seed: int) -> Soil:
+    """Soils whose properties are uniform within table I of Comin and Saaj 2017."""
+    draw = np.random.default_rng(seed).uniform
+    n, stiffness = draw(0.45, 0.95, count), draw(0.99e4, 2.36e4, count)
+    return Soil(
+        cohesion=draw(0.0, 1610.0, count),
+        friction_angle=np.deg2rad(draw(29.1, 42.8, count)),
+        shear_modulus=draw(0.017, 0.024, count) * FOOT.area**0.5,
+        kc=np.zeros(count),
+        kphi=stiffness / 0.01**n,
+        n=n,
+    )
+
+
 def write_logs(folder: Path, seed: int = 1) -> tuple[list[Path], Truth]:
     """Write two files for each run into a folder, and the map; the files, and the truth."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "map.toml").write_text(MAP)
     rng = np.random.default_rng(seed)
-    ground = sample_soils(len(SLIPS), seed=seed).soil
+    ground = random_soils(len(SLIPS), seed)
     slip = np.asarray(SLIPS)[:, None] + 0.02 * rng.standard_normal((len(SLIPS), STANCES))
     slip = np.clip(slip, 0.01, 0.6)
     each = type(ground)(**{
@@ -107,7 +117,7 @@ def write_logs(folder: Path, seed: int = 1) -> tuple[list[Path], Truth]:
     })  # fmt: skip
     force = Model(FOOT)(each, Operating(slip=slip, load=LOAD))
     sigma = np.asarray(each.kphi) * 0.01 ** np.asarray(each.n)
-    a, b = VIBRATION_SLIP["linear"].line(*soil_spring(each.friction_angle, sigma))
+    a, b = VIBRATION_SLIP["linear"].line(each.friction_angle, sigma)
     truth = Truth(
         slip, np.asarray(force.torque), np.maximum((slip - a) / b, 0.0), np.asarray(force.sinkage)
     )
@@ -261,13 +271,14 @@ def picture(files: list[Path], target: Path) -> None:
     """A run over time, and slip on board over slip."""
     import matplotlib.pyplot as plt
 
-    from soilml.log_import.figures import draw_run
+    from soilml.log_import.figures import draw_run, run_panels
     from soilml.report.figure_style import report_style
 
     imported = import_log(files, FOLDER / "map.toml")
     with report_style():
-        figure = plt.figure(figsize=(9.0, 5.2))
-        draw_run(figure, imported.series[2], imported.table)
+        series = imported.series[2]
+        figure, axes = plt.subplots(run_panels(series), 1, figsize=(9.0, 5.2), layout="constrained")
+        draw_run(series, imported.table, axes)
         figure.axes[-1].set_xlabel("time, s; each blue stretch is a stance")
         figure.savefig(target, dpi=80, facecolor="white")
     plt.close(figure)

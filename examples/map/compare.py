@@ -1,6 +1,6 @@
 """The map of drive.csv beside the true soil along it; `--make` draws the files.
 
-A rover drives 60 m over three soils that drift within their patches. `soilml map` sees slip,
+A rover drives 60 m over three soils that drift within their patches. `soilml drive map` sees slip,
 torque, load and position; the truth stands in truth.csv.
 """
 
@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from soilml import Estimator, read_case, read_table, soil_map
-from soilml.io.text_tables import csv_text, format_table
-from soilml.soil_maps.presentation import map_text
+from soilml.io.text_tables import csv_text
+from soilml.report.aligned_text import format_table
 from soilml.soil_maps.workflow import parameter_moments
 
 HERE = Path(__file__).parent
@@ -47,7 +47,7 @@ def compare() -> None:
     """Print the map, and a line for each parameter."""
     table = read_table(HERE / "drive.csv", filled=())
     found = soil_map(read_case(HERE / "rover.toml"), table, Estimator.load("wheel"))
-    print(map_text(found))
+    print(found.report().text(details=True))
     truth = read_table(HERE / "truth.csv", filled=())
     true = np.column_stack([truth[name] for name, _, _ in SHOWN])[found.drive.row]
     score, covariance = found.field.at(found.drive.place)

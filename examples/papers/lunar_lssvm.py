@@ -24,8 +24,8 @@ from lunar.sweep import Floats, add_torque_noise, bounds, soils, table, three_lo
 
 from soilml import Case, Estimator, identify, read_case
 from soilml.cli import main
-from soilml.io.text_tables import format_table
 from soilml.quantities import SHEAR
+from soilml.report.aligned_text import format_table
 
 HERE = Path(__file__).parent.relative_to(Path.cwd()) / "lunar"
 OUT = Path("demo/papers")

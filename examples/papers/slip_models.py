@@ -17,9 +17,9 @@ from datagen.generate import generate
 from datagen.recipe import packaged_file, read_recipe
 from soilml import Estimator, read_table
 from soilml.io.atomic_files import atomic_output
-from soilml.io.text_tables import format_table
 from soilml.onboard.multi_sensor import ACROSS_FILES, fuse_estimates
 from soilml.quantities import column
+from soilml.report.aligned_text import format_table
 from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import Spec, read_spec

@@ -1,4 +1,4 @@
-"""Slips that `soilml slip` infers from drive.csv, beside the true ones; `--make` draws the files.
+"""Slips that `soilml drive slip` infers from drive.csv, beside the true ones; `--make` draws them.
 
 Rows 0 to 39: one soil, all rims at one speed. Rows 40 to 79: the same soil, rim speeds 10 % apart.
 Rows 80 to 99: a hard floor.
@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from soilml import read_case, read_table
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.text_tables import csv_text
+from soilml.report.aligned_text import format_table
 from soilml.slip_filter.drive import slip_of_drive
 
 HERE = Path(__file__).parent

@@ -16,8 +16,9 @@ from soilml import Estimator, adapt, read_case, read_table
 from soilml.cli import main
 from soilml.io.atomic_files import save_text
 from soilml.io.table import Table
-from soilml.io.text_tables import csv_text, format_table
+from soilml.io.text_tables import csv_text
 from soilml.quantities import SHEAR, column
+from soilml.report.aligned_text import format_table
 
 HERE = Path(__file__).parent.relative_to(Path.cwd())
 OUT = Path("demo")

@@ -11,7 +11,7 @@ import numpy as np
 from hidden_world import LaterSoils
 
 from soilml import Estimator
-from soilml.gap.report.gap_figure import Bar, draw_bars
+from soilml.gap.report.pictures import draw_bars
 from soilml.io.atomic_files import atomic_output
 from soilml.quantities import Z_90, column
 from soilml.report.figure_style import AFTER, BEFORE, report_style
@@ -89,9 +89,8 @@ def draw_gap(axes: Any, path: Path) -> None:
     found = json.loads(path.read_text(encoding="utf-8"))
     part = found["gap"]["train"]
     pairs = {"all readings": part} | {channel_name(k): v for k, v in part["channels"].items()}
-    bars = [Bar(name, one["before"], one["after"]) for name, one in pairs.items()]
-    values = [x for bar in bars for x in (bar.before, bar.after)]
-    draw_bars(axes, bars, max(values), min(values))
+    rows = {name: (one["before"], one["after"]) for name, one in pairs.items()}
+    draw_bars(axes, rows, [value for pair in rows.values() for value in pair])
     effect = found["effects"][0]
     axes.set_title(
         f"3  The missing effect: {effect['name']}, probability {effect['probability']:.2f}"

@@ -8,10 +8,11 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from soilml import __version__
+from soilml.cli.old_spellings import present_words
 from soilml.cli.options import add_screen_options, declared_outputs, input_files, need_for_options
 from soilml.cli.process import (
     StopSignals,
@@ -28,100 +29,79 @@ from soilml.io.atomic_files import check_outputs, clear_interrupted, replaced
 DESCRIPTION = """\
 Estimate the soil under a rover: from slip, torque and load to cohesion,
 friction angle and shear modulus, each with its uncertainty.
-
-  files to try it with         soilml example
-  all of it in the browser     soilml serve
-  from a log to a table        soilml import
-  from a model to data         soilml simulate, generate
-  from data to a model file    soilml train
-  from a model file to C       soilml export c, export fusion
-  to a graph of fixed shapes   soilml export step
-  the slip filter for a board  soilml export slip
-  from a campaign to a file    soilml adapt
-  from measurements to soil    soilml estimate (trained model, as on board)
-                               soilml identify (analytic methods)
-                               soilml bevameter (plate and shear tests)
-  what the model lacks         soilml gap
-  what to measure next         soilml plan next, plan effects
-  runs of your own simulator   soilml plan runs
-  from soil to a simulator     soilml export soil
-  comparison of methods        soilml compare
-  slopes that can be climbed   soilml pull
-  wheels for a slope           soilml design
-  slip without odometry        soilml slip
-  soil along a drive as a map  soilml map
-  systems of the papers        soilml paper climb, sensor-wheel, wheel-leg, walk
 """
 EPILOG = "`soilml COMMAND --help` explains one command with an example."
+_OWN, _GROUND = "soilml.cli.commands.", "training.commands."
 
-#: The commands of this distribution, in the order of the help text; they are present where the
-#: packages can be imported, installed or not. Those of others have an entry point in the group
-#: `soilml.commands`.
-COMMANDS = {
-    "init": "soilml.cli.commands.init",
-    "example": "soilml.cli.commands.example",
-    "models": "soilml.cli.commands.models",
-    "doctor": "soilml.cli.commands.doctor",
-    "completion": "soilml.cli.commands.completion",
-    "serve": "soilml.serve.command",
-    "import": "soilml.cli.commands.import_",
-    "soils": "soilml.cli.commands.soils",
-    "effects": "soilml.cli.commands.effects",
-    "simulate": "soilml.cli.commands.simulate",
-    "identify": "soilml.cli.commands.identify",
-    "bevameter": "soilml.cli.commands.bevameter",
-    "export-soil": "soilml.cli.commands.export_soil",
-    "audit": "soilml.cli.commands.audit",
-    "gap": "soilml.cli.commands.gap",
-    "adapt": "training.commands.adapt",
-    "generate": "datagen.commands.generate",
-    "train": "training.commands.train",
-    "export-c": "training.commands.export_c",
-    "export-fusion": "training.commands.export_fusion",
-    "export-step": "training.commands.export_step",
-    "export-slip": "training.commands.export_slip",
-    "estimate": "soilml.cli.commands.estimate",
-    "advise": "soilml.cli.commands.advise",
-    "design-runs": "soilml.cli.commands.design_runs",
-    "pull": "soilml.cli.commands.pull",
-    "design": "soilml.cli.commands.design",
-    "slip": "soilml.cli.commands.slip",
-    "map": "soilml.cli.commands.map_",
-    "compare": "training.commands.compare",
-    "climb": "soilml.cli.commands.climb",
-    "sensor-wheel": "soilml.cli.commands.sensor_wheel",
-    "wheel-leg": "soilml.cli.commands.wheel_leg",
-    "walk": "soilml.cli.commands.walk",
-    "papers": "soilml.cli.commands.papers",
+#: Commands by section of the list: the module of each, and what the list says. They are present
+#: where the packages can be imported, installed or not. Those of other distributions have an entry
+#: point in the group `soilml.commands`.
+SECTIONS: dict[str, dict[str, tuple[str, str]]] = {
+    "Start": {
+        "example": (_OWN + "example", "files to try the commands with"),
+        "init": (_OWN + "init", "a first model file: wheel, soil, priors, noise"),
+        "serve": ("soilml.serve.command", "all of this in the browser"),
+        "show models": (_OWN + "models", "trained files that come with the package"),
+        "show soils": (_OWN + "soils", "published soils, or one with its source"),
+        "show effects": (_OWN + "effects", "effects that a model can include, or one of them"),
+        "setup check": (_OWN + "doctor", "libraries, trained files, output of this installation"),
+        "setup completion": (_OWN + "completion", "completion for bash, zsh or fish"),
+    },
+    "Data": {
+        "import": (_OWN + "import_", "logs of a rig or a rover become a table of runs"),
+        "simulate": (_OWN + "simulate", "readings on one soil, at slips and loads that you name"),
+        "generate": ("datagen.commands.generate", "training data: many random soils by a recipe"),
+    },
+    "Soil": {
+        "identify": (_OWN + "identify", "soil from runs: fits the equations of MODEL.toml"),
+        "estimate": (_OWN + "estimate", "soil from runs: a trained MODEL.onnx, as on board"),
+        "bevameter": (_OWN + "bevameter", "soil from plate and shear tests, without a wheel"),
+    },
+    "Model": {
+        "gap": (_OWN + "gap", "does the model fit the runs, and what does it lack?"),
+        "adapt": (_GROUND + "adapt", "a trained file on the model that the runs corrected"),
+        "train": (_GROUND + "train", "a trained file from data"),
+        "compare": (_GROUND + "compare", "score trained files and fits on known soils"),
+        "export c": (_GROUND + "export_c", "a trained file as C99 code"),
+        "export fusion": (_GROUND + "export_fusion", "the fusion of several files as C99 code"),
+        "export step": (_GROUND + "export_step", "one step of a stream as ONNX of fixed shapes"),
+        "export slip": (_GROUND + "export_slip", "the slip filter of a rover as ONNX and C99"),
+        "export soil": (_OWN + "export_soil", "a soil for Chrono, Gazebo, Isaac or a table"),
+    },
+    "Rover": {
+        "pull": (_OWN + "pull", "drawbar pull, and the steepest slope that can be climbed"),
+        "drive slip": (_OWN + "slip", "slip without odometry, from torque and pitch"),
+        "drive map": (_OWN + "map_", "the soil along a drive, and slopes that can be climbed"),
+        "plan next": (_OWN + "advise", "the row to measure next on a given soil"),
+        "plan effects": (_OWN + "audit", "effects that planned runs could identify"),
+        "plan wheels": (_OWN + "design", "wheels to build for a given slope"),
+        "plan runs": (_OWN + "design_runs", "runs of your own simulator"),
+    },
+    "Papers": {
+        "paper climb": (_OWN + "climb", "steepest slope of a rover with force-sensor wheels"),
+        "paper sensor-wheel": (_OWN + "sensor_wheel", "pull of a wheel from the stress on its rim"),
+        "paper wheel-leg": (
+            _OWN + "wheel_leg",
+            "soil and traffic class from strides of a wheel-leg",
+        ),
+        "paper walk": (_OWN + "walk", "simulated walks of wheel-legs"),
+        "paper track": (_OWN + "track", "soil and belt of a tracked robot from a log of pulls"),
+        "paper numbers": (_OWN + "papers", "printed numbers beside the computed ones"),
+    },
 }
-#: Commands of two words: the group, and by its second word the command. The command's own name is
-#: an older one, which still works.
+#: Module of each command.
+COMMANDS = {name: entry[0] for own in SECTIONS.values() for name, entry in own.items()}
+#: What the list says of commands of two words.
 GROUPS = {
-    "export": {
-        "c": "export-c",
-        "fusion": "export-fusion",
-        "step": "export-step",
-        "slip": "export-slip",
-        "soil": "export-soil",
-    },
-    "plan": {"next": "advise", "effects": "audit", "runs": "design-runs"},
-    "paper": {
-        "climb": "climb",
-        "sensor-wheel": "sensor-wheel",
-        "wheel-leg": "wheel-leg",
-        "walk": "walk",
-        "numbers": "papers",
-    },
+    "show": "what comes with the package",
+    "setup": "this installation",
+    "export": "files for a board or a simulator",
+    "drive": "along a drive",
+    "plan": "what to measure or build next",
+    "paper": "of the papers",
 }
-#: What the list of commands says of a group.
-GROUP_HELP = {
-    "export": "a model file as C or a graph, the slip filter, a soil for simulators",
-    "plan": "the next row, effects that runs could name, runs of a simulator",
-    "paper": "systems of the source papers, and their printed numbers",
-}
-_TWO_WORDS = {name: (group, word) for group, own in GROUPS.items() for word, name in own.items()}
 #: Options whose value may begin with a minus sign.
-_NEGATIVE_VALUES = ("--slip", "--load", "--slips")
+_NEGATIVE_VALUES = ("--slip", "--load")
 _WRONG_COMMAND = re.compile(r"argument COMMAND: invalid choice: '(.*)' \(choose from (.*)\)")
 _UNKNOWN_OPTION = re.compile(r"unrecognized arguments: (?:[^-].*? )?(--?[\w-]+)")
 _NEGATIVE = re.compile(r"-[\d.]")
@@ -141,6 +121,9 @@ class _Parser(argparse.ArgumentParser):
             names = re.findall(r"[\w-]+", wrong[2])
             near = did_you_mean(wrong[1], names)
             message = f"no command {wrong[1]!r}; {near}there are: {', '.join(names)}"
+        if message.endswith("required: COMMAND"):
+            below = next(a.choices for a in self._actions if a.metavar == "COMMAND")
+            message = f"needed is one of: {', '.join(below or ())}"
         if unknown := _UNKNOWN_OPTION.search(message):
             near = did_you_mean(unknown[1], self.known).removesuffix(" ")
             message += f"; {near}" if near else ""
@@ -153,39 +136,66 @@ class _Parser(argparse.ArgumentParser):
             stream.flush()
 
 
-def parser(command: str | None = None) -> argparse.ArgumentParser:
+def parser(words: Sequence[str] | None = None) -> argparse.ArgumentParser:
     """The parser of the command line.
 
-    command: The first word of a command line. If it is a command, its module alone is imported and
-        its arguments are declared; if it is an option such as --help, or None, those of all
-        commands.
+    words: The command line. The module of its command alone is imported, and its arguments are
+        declared; those of all commands where None.
     """
     layout: Any = argparse.RawDescriptionHelpFormatter
-    root = _Parser("soilml", description=DESCRIPTION, epilog=EPILOG, formatter_class=layout)
+    chosen = None if words is None else _command_of(words)
+    known = COMMANDS if chosen else COMMANDS | _other_commands()
+    listed = "\n".join([DESCRIPTION, *_list(known)])
+    usage = "soilml COMMAND ... [--help] [--version]"
+    root = _Parser("soilml", usage, listed, EPILOG, formatter_class=layout)
     root.add_argument("--version", action="version", version=f"soilml {__version__}")
-    commands = root.add_subparsers(metavar="COMMAND", required=True)
-    own = command in (*COMMANDS, "--version")
-    every = command is None or (command.startswith("-") and not own)
-    for name, path in (COMMANDS if own else COMMANDS | _other_commands()).items():
-        if not every and command != name:
-            commands.add_parser(name)
+    required: dict[str, Any] = {"metavar": "COMMAND", "required": True}
+    commands = root.add_subparsers(prog="soilml", help=argparse.SUPPRESS, **required)
+    groups: dict[str, Any] = {}
+    helps = {name: entry[1] for own in SECTIONS.values() for name, entry in own.items()}
+    for name, path in known.items():
+        group, _, word = name.rpartition(" ")
+        if group and group not in groups:
+            text = f"{GROUPS[group][0].upper()}{GROUPS[group][1:]}."
+            made = commands.add_parser(group, help=GROUPS[group], description=text)
+            groups[group] = made.add_subparsers(**required)
+        into = groups[group] if group else commands
+        if words is not None and name != chosen:
+            into.add_parser(word, help=helps.get(name, ""))
             continue
         module = importlib.import_module(path)
-        shown: dict[str, Any] = {"help": module.HELP}
-        if name in _TWO_WORDS:  # the list has its group
-            shown = {"prog": f"soilml {' '.join(_TWO_WORDS[name])}"}
-        sub = commands.add_parser(
-            name, description=module.DESCRIPTION, formatter_class=layout, **shown
+        sub = into.add_parser(
+            word, help=helps.get(name, ""), description=module.DESCRIPTION, formatter_class=layout
         )
         module.add_arguments(sub)
         add_screen_options(sub, getattr(module, "FORMATS", ()))
-        if command == name:
+        if words is not None:
             root.known = [option for option in sub._option_string_actions if len(option) > 2]
             root.prog = sub.prog
-        sub.set_defaults(run=module.run, outputs=getattr(module, "outputs", declared_outputs))
-    for group, text in GROUP_HELP.items() if every else ():
-        commands.add_parser(group, help=f"{', '.join(GROUPS[group])}: {text}", add_help=False)
+        outputs = getattr(module, "outputs", declared_outputs)
+        sub.set_defaults(run=module.run, outputs=outputs, command=name)
     return root
+
+
+def _command_of(words: Sequence[str]) -> str:
+    """The command that a command line begins with; empty where it begins with none."""
+    return next((" ".join(words[:n]) for n in (1, 2) if " ".join(words[:n]) in COMMANDS), "")
+
+
+def _list(known: dict[str, str]) -> Iterator[str]:
+    """The lines of the list of commands; a group is one line."""
+    others = dict.fromkeys(known.keys() - COMMANDS.keys(), ("", "of another package"))
+    for title, own in (SECTIONS | ({"Others": others} if others else {})).items():
+        seen: dict[str, str] = {}
+        for name, (_, text) in own.items():
+            group, _, word = name.rpartition(" ")
+            if not group:
+                seen[name] = text
+                continue
+            before = seen.get(group, "").partition(":")[0]
+            seen[group] = f"{before}{', ' if before else ''}{word}: {GROUPS[group]}"
+        yield f"{title}:"
+        yield from (f"  {name:<10} {text}" for name, text in seen.items())
 
 
 def _other_commands() -> dict[str, str]:
@@ -258,33 +268,17 @@ def _run(arguments: Sequence[str] | None, signals: StopSignals) -> int:
 def _status(words: list[str]) -> int:
     """Run the command of these words; returns the exit status."""
     typed = words or ["--help"]
-    words = _join_negative_values(_one_name(typed))
-    args = parser(words[0] if words else "").parse_args(words)
+    words = _join_negative_values(present_words(typed))
+    args = parser(words).parse_args(words)
     args.command_line, args.make_parser = typed, parser
     SCREEN.choose(getattr(args, "format", None), args.quiet, args.verbose)
     check_outputs(args.outputs(args), input_files(args))
     check_memory_limit()
-    need_for_options(args, words[0])
+    need_for_options(args, args.command)
     status = int(args.run(args) or 0)
     if sys.stdout is not None:
         sys.stdout.flush()
     return status
-
-
-def _one_name(words: list[str]) -> list[str]:
-    """The words with the command's own name first, in place of a group and its second word.
-
-    Raises `InputError` for a group without one of its words.
-    """
-    group = GROUPS.get(words[0])
-    if group is not None:
-        if len(words) > 1 and words[1] in group:
-            return [group[words[1]], *words[2:]]
-        near = did_you_mean(words[1], list(group)) if len(words) > 1 else ""
-        raise InputError(f"soilml {words[0]}: {near}needed is one of: {', '.join(group)}")
-    if words[0] in _TWO_WORDS and sys.stderr is not None and sys.stderr.isatty():
-        print(f"this command is now `soilml {' '.join(_TWO_WORDS[words[0]])}`", file=sys.stderr)
-    return words
 
 
 def _interrupted(stop: KeyboardInterrupt | Terminated) -> int:

@@ -1,12 +1,11 @@
-"""Output of a command: a file, CSV or JSON into a pipe, or an aligned table on a terminal."""
+"""Output of a command: files, CSV or JSON into a pipe, reports and tables on a terminal."""
 
 from __future__ import annotations
 
 import argparse
-import re
 import sys
-import textwrap
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,39 +18,56 @@ from soilml.errors import InputError
 from soilml.io.atomic_files import write_files
 from soilml.io.cell_text import escaped
 from soilml.io.spreadsheet import split_sheet
-from soilml.io.text_tables import WIDTH, csv_blocks, format_table, wrapped
-from soilml.report.figure_style import save_png
-from soilml.report.page import Content, Provenance, Report, json_text, report_texts
-from soilml.report.terminal import rounded, shown_column
+from soilml.io.text_tables import csv_blocks
+from soilml.report.aligned_text import wrapped
+from soilml.report.page import Content, Provenance, json_text, report_texts
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 
 if TYPE_CHECKING:
-    from soilml.report.column_panels import ColumnPanels
-    from soilml.report.parameter_figure import ParameterIntervals
-
-_ENDING = re.compile(r"_(std|p05|p95)$")
-_MOST_TEXT = 44  # Most characters of a text cell on a terminal
+    from soilml.report.report import Picture
 
 
 def write_columns(
     columns: Mapping[str, Any],
     out: str | None,
     picture: str | None = None,
-    panels: ColumnPanels | ParameterIntervals | None = None,
+    drawn: Picture | None = None,
     others: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> None:
     """Write the columns to the CSV file `out`; without one, print them.
 
-    picture: PNG file of `panels`; None where the option was not given.
+    picture: PNG file of `drawn`; None where the option was not given.
     others: Columns of further CSV files.
     """
     files: dict[Path, Content] = {}
     if out is not None:
         files[Path(out)] = partial(save_columns, columns)
     files |= {Path(name): partial(save_columns, table) for name, table in (others or {}).items()}
-    if picture is not None and panels is not None:
-        files[Path(picture)] = partial(save_png, panels.plot, *panels.shape, panels.size)
+    if picture is not None and drawn is not None:
+        files[Path(picture)] = drawn.save
     write_files(files)
     tell_columns(columns, out)
+
+
+def write_rows(
+    report: Report,
+    columns: Mapping[str, Any],
+    out: str | None,
+    picture: str | None,
+) -> None:
+    """Write the columns to the CSV file `out` and the report's picture to a PNG file; say the rest.
+
+    None as a path is an option that was not given; without `out`, the columns go into a pipe.
+    """
+    write_set({out: partial(save_columns, columns), picture: report.pictures[0].save})
+    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    show_rows(report, columns, content, out)
+
+
+def write_set(contents: Mapping[str | None, Content]) -> None:
+    """Write files as one set; None as a path is an option that was not given."""
+    write_files({Path(path): content for path, content in contents.items() if path is not None})
 
 
 def save_columns(columns: Mapping[str, Any], path: Path) -> None:
@@ -72,21 +88,34 @@ def tell_columns(columns: Mapping[str, Any], out: str | None) -> None:
             write_stdout(text)
         return
     content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    write_stdout(f"{format_columns(columns)}\n" if form == "table" else json_text(content))
+    table = ReportTable.of("rows", columns).text
+    write_stdout(f"{table()}\n" if form == "table" else json_text(content))
 
 
-def show_verdict(text: str, out: str | None) -> None:
-    """Print a verdict above a table that is about to be printed; not above CSV or JSON."""
-    if out is None and SCREEN.form_of_rows() == "table":
-        show(f"{text}\n")
+def show_result(report: Report, content: Mapping[str, Any]) -> None:
+    """Print a report as text, into a pipe too, or its content as JSON where --format says so.
 
-
-def show_result(text: str, content: Mapping[str, Any]) -> None:
-    """Print a result as text, into a pipe too, or as JSON where --format says so."""
+    -v prints all of it, -q no remarks.
+    """
     if SCREEN.form == "json":
         write_stdout(json_text(content))
-    else:
-        show(text)
+        return
+    show((replace(report, remarks=()) if SCREEN.quiet else report).text(SCREEN.verbose))
+
+
+def show_rows(
+    report: Report, columns: Mapping[str, Any], content: Any, out: str | None = None
+) -> None:
+    """Print CSV into a pipe, with remarks on standard error; else as `show_result`.
+
+    out: File that has the columns already, which is then all that is said beside the remarks.
+    """
+    if out is None and SCREEN.form_of_rows() != "csv":
+        show_result(report, content)
+        return
+    tell_columns(columns, out)
+    for text in [*(f"! {remark}" for remark in report.remarks), *report.next_steps]:
+        tell(text)
 
 
 def show(text: str) -> None:
@@ -136,64 +165,3 @@ def write_with_report(
         names = (REPORT_FILES[0], REPORT_FILES[1])
         files |= report_texts(report, origin_of(args, read), content, names, Path(args.report))
     write_files(files, folders=[args.report])
-
-
-def format_columns(columns: Mapping[str, Any], width: int = WIDTH) -> str:
-    """The columns as an aligned table, text first, in usual units and as many digits as are known.
-
-    A standard deviation stands beside its value. Columns that do not fit into `width` characters
-    are left out, and a line names them: ends of intervals first, then the last ones.
-    """
-    text = [name for name, values in columns.items() if np.asarray(values).dtype.kind in "US"]
-    shown = {name: _cut_cells(columns[name]) for name in text}
-    for name in columns:
-        if name in text or (name.endswith("_std") and name.removesuffix("_std") in columns):
-            continue
-        cells = _cells(columns, name)
-        if f"{name}_std" in columns:
-            pairs = zip(cells, _cells(columns, f"{name}_std"), strict=True)
-            cells = [f"{value} +- {std}" if value and std else value for value, std in pairs]
-        shown[shown_column(name)[1]] = cells
-    left_out = _left_out(shown, width)
-    kept = [name for name in shown if name not in left_out]
-    rows = list(zip(*(shown[name] for name in kept), strict=True))
-    table = format_table(kept, rows, text_columns=len(text))
-    if not left_out:
-        return table
-    names = textwrap.fill(f"not shown here, but with --out: {', '.join(left_out)}", width)
-    return f"{table}\n{names}"
-
-
-def _cells(columns: Mapping[str, Any], name: str) -> list[str]:
-    """Cells of a column of numbers, rounded by its standard deviation or by its interval."""
-    factor, _ = shown_column(name)
-    values = np.asarray(columns[name])
-    if values.dtype.kind in "b":
-        return ["yes" if value else "no" for value in values]
-    base = _ENDING.sub("", name)
-    spread = np.zeros(values.size)
-    if f"{base}_std" in columns:
-        spread = np.asarray(columns[f"{base}_std"], dtype=float)
-    elif f"{base}_p05" in columns and f"{base}_p95" in columns:
-        spread = (np.asarray(columns[f"{base}_p95"]) - np.asarray(columns[f"{base}_p05"])) / 3.3
-    pairs = zip(factor * values.astype(float), factor * np.nan_to_num(spread), strict=True)
-    return [rounded(float(value), float(std)) for value, std in pairs]
-
-
-def _cut_cells(values: Sequence[Any]) -> list[str]:
-    return [t if len(t) <= _MOST_TEXT else f"{t[: _MOST_TEXT - 3]}..." for t in map(str, values)]
-
-
-def _left_out(shown: Mapping[str, Sequence[str]], width: int) -> list[str]:
-    """Names of the columns that do not fit, in their order."""
-    widths = {name: max(map(len, (name, *cells))) + 2 for name, cells in shown.items()}
-    order = [*reversed(list(shown))]
-    first = [n for n in order if n.endswith(("_p05", "_p95"))]
-    out: list[str] = []
-    for name in dict.fromkeys([*first, *order]):
-        if sum(widths[n] for n in shown if n not in out) - 2 <= width:
-            break
-        if name in ("in_range", "disagrees", "run") or len(out) == len(shown) - 1:
-            continue
-        out.append(name)
-    return [name for name in shown if name in out]

@@ -57,12 +57,13 @@ def read_case_of_rows(
     table: Table | None,
     effects: Mapping[str, type[Effect]] = EFFECTS,
     with_bias: bool = True,
+    with_explanations: bool = False,
 ) -> Case:
     """The case of one gear: that of `--gear`, or the one that all rows name.
 
     Raises `InputError` where the file has several gears and neither says which.
     """
-    case = read_case(path, effects, with_bias)
+    case = read_case(path, effects, with_bias, with_explanations=with_explanations)
     names = [] if table is None or "gear" not in table else list(dict.fromkeys(table["gear"]))
     gear: str | None = args.gear
     if case.gears and gear is None and len(names) == 1 and names[0]:

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+from soilml.config.explanations import CaseExplanation, one_of, take_explanations
 from soilml.config.measurement_noise import (
     Discrepancy,
     Noise,
     take_bias,
     take_discrepancy,
     take_noise,
+    unestimated_bias,
 )
 from soilml.config.model_settings import (
     UNNAMED_GEAR,
@@ -77,9 +79,9 @@ class Case:
         of `discrepancy`.
     drive
         What the rover's drives report beside the torque on the soil.
-    suspected
-        Names of effects that a gap analysis suspects and does not name: `grousers@lugged`. They are
-        a part of every prediction.
+    explanations
+        Explanations of a gap analysis with their probabilities; empty where the case is the whole
+        answer. Every prediction is their mixture, beside the one remainder.
     """
 
     model: Model
@@ -94,7 +96,7 @@ class Case:
     remainder: Remainder | None = None
     simulator: Simulator | None = None
     drive: DriveErrors = field(default_factory=DriveErrors)
-    suspected: tuple[str, ...] = ()
+    explanations: tuple[CaseExplanation, ...] = ()
 
     @property
     def states_model_error(self) -> bool:
@@ -156,9 +158,12 @@ class Case:
         shared = [effect for effect in self.model.effects if effect.name not in replaced]
         remainder = None if self.remainder is None else self.remainder.of_gear(name)
         model = Model(own.gear, (*shared, *own.effects))
-        suspected = tuple(n for n in (_name_on_gear(s, name) for s in self.suspected) if n)
+        each = tuple(
+            CaseExplanation.of(e.weight, self.of_explanation(e).of_gear(name))
+            for e in self.explanations
+        )
         case = replace(
-            self, model=model, prior={}, gears={}, remainder=remainder, suspected=suspected
+            self, model=model, prior={}, gears={}, remainder=remainder, explanations=each
         )
         paths = self.paths_of_gear(name)
         prior = {paths[path]: prior for path, prior in self.prior.items() if path in paths}
@@ -170,27 +175,27 @@ class Case:
             return self
         return replace(self, remainder=None)
 
-    def without_suspected(self) -> Case:
-        """The case without its suspected effects, and without the remainder beside them."""
-        if not self.suspected:
-            return self
+    def without_learned_discrepancy(self) -> Case:
+        """Without the discrepancy that an earlier analysis learned: a further one finds it anew."""
+        known = [] if self.remainder is None else self.remainder.columns
+        left = {k: d for k, d in self.discrepancy.items() if not d.learned and k not in known}
+        return replace(self, discrepancy=left)
 
-        def known(model: Model, of_gear: str = "") -> Model:
-            kept = [e for e in model.effects if f"{e.name}{of_gear}" not in self.suspected]
-            return replace(model, effects=tuple(kept))
-
+    def of_explanation(self, one: CaseExplanation) -> Case:
+        """The case as one of its explanations has it, beside the remainder of all of them."""
         return replace(
             self,
-            model=known(self.model),
-            gears={name: known(own, f"@{name}") for name, own in self.gears.items()},
-            prior={
-                path: prior
-                for path, prior in self.prior.items()
-                if path.partition(".")[0] not in self.suspected
-            },
-            remainder=None,
-            suspected=(),
+            model=one.model,
+            gears=one.gears,
+            soil=one.soil,
+            prior=one.prior,
+            bias=unestimated_bias(self.bias, set(one.effects)),
+            explanations=(),
         )
+
+    def without_explanations(self) -> Case:
+        """The case before them: without the remainder beside them too."""
+        return replace(self, explanations=(), remainder=None) if self.explanations else self
 
     def paths_of_gear(self, name: str) -> dict[str, str]:
         """Paths of the parameters that act on one of several gears: here, and in `of_gear`."""
@@ -204,12 +209,6 @@ class Case:
         for path in located(own):
             paths[_path_of_gear(name, path)] = path.removeprefix("effects.")
         return paths
-
-
-def _name_on_gear(effect: str, gear: str) -> str:
-    """Name of an effect of the case in that of one of its gears, empty where it is of another."""
-    name, _, of_gear = effect.partition("@")
-    return name if of_gear in ("", gear) else ""
 
 
 def _path_of_gear(name: str, path: str) -> str:
@@ -227,6 +226,7 @@ def read_case(
     with_bias: bool = False,
     with_simulator: bool = True,
     files: NamedFiles | None = None,
+    with_explanations: bool = False,
 ) -> Case:
     """Read a case from a TOML model file.
 
@@ -246,6 +246,9 @@ def read_case(
     files
         Files that the model file may name; by default any, beside it. `NO_FILES` is for a text that
         others wrote.
+    with_explanations
+        Whether several tables [[explanation]] are read; otherwise they are refused, since the
+        caller needs one model.
 
     Returns
     -------
@@ -285,11 +288,11 @@ def read_case(
         case = replace(case, bias=take_bias(settings.table("bias")))
     elif "bias" in settings:
         settings.fail(
-            "[bias] is read by identify, pull, gap and estimate --case alone (in Python, "
+            "[bias] is read by identify, pull, gap and estimate --model alone (in Python, "
             "with_bias=True); for other commands delete it"
         )
     settings.finish()
-    return case
+    return case if with_explanations else one_of(case, str(path))
 
 
 def read_case_of_one_gear(
@@ -297,15 +300,17 @@ def read_case_of_one_gear(
     effects: Mapping[str, type[Effect]] = EFFECTS,
     gear: str | None = None,
     with_bias: bool = False,
+    with_explanations: bool = False,
 ) -> Case:
     """Read the case of one gear; `gear` names it where the file has several.
 
-    The table [bias] is read with `with_bias`, as by `read_case`.
+    The tables [bias] and [[explanation]] are read as by `read_case`.
 
     Raises `InputError` as `read_case` does, and where the file has several gears and none of this
     name.
     """
-    return case_of_one_gear(read_case(path, effects, with_bias), path, gear)
+    case = read_case(path, effects, with_bias, with_explanations=with_explanations)
+    return case_of_one_gear(case, path, gear)
 
 
 def case_of_one_gear(case: Case, path: str | os.PathLike[str], gear: str | None) -> Case:
@@ -375,7 +380,7 @@ def take_case(
     remainder = None
     if "remainder" in settings:
         remainder = take_remainder(settings.table("remainder"), gears)
-    return Case(
+    case = Case(
         model,
         own_soil,
         prior,
@@ -387,5 +392,5 @@ def take_case(
         remainder=remainder,
         simulator=simulator,
         drive=take_drive(settings.table("drive")) if "drive" in settings else DriveErrors(),
-        suspected=(*suspected, *of_gears),
     )
+    return take_explanations(settings, effects, case, (*suspected, *of_gears))

@@ -6,10 +6,13 @@ import os
 from typing import TypeAlias
 
 from soilml.config.case import Case, read_case
+from soilml.config.explanations import one_of
 
 GivenCase: TypeAlias = Case | str | os.PathLike[str]
 
 
-def as_case(case: GivenCase, with_bias: bool = True) -> Case:
+def as_case(case: GivenCase, with_bias: bool = True, with_explanations: bool = True) -> Case:
     """The case, read where it is a path; raises `InputError` as `read_case` does."""
-    return read_case(case, with_bias=with_bias) if isinstance(case, str | os.PathLike) else case
+    if isinstance(case, str | os.PathLike):
+        return read_case(case, with_bias=with_bias, with_explanations=with_explanations)
+    return case if with_explanations else one_of(case, "the case")

@@ -71,6 +71,18 @@ class Noise:
         return share_and_constant_as_setting(self.share, self.constant)
 
 
+@dataclass(frozen=True)
+class NoiseOfReading:
+    """What a key holds that may be `0.05`, `"2 %"` or `"2 % + 0.05"`, zero included."""
+
+    needed: str = NEEDED
+
+    def take(self, settings: Settings, key: str, kind: str) -> Noise:
+        """The two parts; raises `InputError` as `take_share_and_constant` does."""
+        share, constant = take_share_and_constant(settings, key, self.needed)
+        return Noise(constant=constant, share=share)
+
+
 def take_noise(settings: Settings, key: str) -> Noise:
     """Read `key = 0.05`, `key = "2 %"` or `key = "2 % + 0.05"`."""
     share, constant = take_share_and_constant(settings, key, NEEDED)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
-from contextlib import suppress
-from dataclasses import MISSING, fields, replace
-from typing import Any
+from dataclasses import replace
 
 from soilml.errors import InputError, did_you_mean
+from soilml.io.declared_settings import in_si, take_declared, take_quantity
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter, check, declared, with_values
@@ -20,68 +19,8 @@ from soilml.physics.model import Model
 from soilml.physics.soils import Soil, soil
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength, SoilTest
 
-#: Size of each unit in the SI unit that a parameter is declared in.
-UNITS: dict[str, dict[str, float]] = {
-    "rad": {"rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0, "°": math.pi / 180.0},
-    "m": {"m": 1.0, "cm": 1e-2, "mm": 1e-3},
-    "m/N": {"m/N": 1.0, "mm/N": 1e-3},
-    "Pa/m": {"Pa/m": 1.0, "kPa/m": 1e3, "MPa/m": 1e6},
-    "Pa": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6},
-    "N": {"N": 1.0, "kN": 1e3},
-    "N m": {"N m": 1.0, "Nm": 1.0, "mNm": 1e-3, "mN m": 1e-3},
-    "kg": {"kg": 1.0, "g": 1e-3},
-    "m/s": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3},
-    "m/s^2": {"m/s^2": 1.0},
-    "N/m": {"N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3},
-    "N/m^2": {"N/m^2": 1.0, "kN/m^2": 1e3},
-    "N/m^3": {"N/m^3": 1.0, "kN/m^3": 1e3},
-    "N/m^(n+1)": {"N/m^(n+1)": 1.0, "kN/m^(n+1)": 1e3},
-    "N/m^(n+2)": {"N/m^(n+2)": 1.0, "kN/m^(n+2)": 1e3},
-    "1/m": {"1/m": 1.0, "1/mm": 1e3},
-    "1/Pa": {"1/Pa": 1.0, "1/kPa": 1e-3, "1/MPa": 1e-6},
-    "1": {"%": 1e-2},
-}
-_VALUE = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*")
-
-
-def take_quantity(settings: Settings, key: str, unit: str) -> float:
-    """The value of `key` in a parameter's SI unit: a number, or a text with a unit.
-
-    >>> settings = Settings({"friction_angle": "33 deg"}, "model.toml [soil]")
-    >>> round(take_quantity(settings, "friction_angle", "rad"), 4)
-    0.576
-    """
-    value = settings.take(key, (int, float, str), _number(unit))
-    return in_si(settings, key, value, unit)
-
-
-def in_si(settings: Settings, key: str, value: Any, unit: str) -> float:
-    """A number, or a text with a unit, in the SI unit `unit`; `InputError` for another value."""
-    if not isinstance(value, str):
-        return float(value)
-    return text_in_si(value, unit, f"{settings.where}: {key}")
-
-
-def text_in_si(text: str, unit: str, what: str) -> float:
-    """The value of a text with a unit, in the SI unit `unit`.
-
-    Raises `InputError`, beginning with `what` it is of, for another text.
-    """
-    known = UNITS.get(unit, {})
-    match = _VALUE.fullmatch(text)
-    if match is not None and match[2] in known:
-        with suppress(ValueError):
-            return float(match[1]) * known[match[2]]
-    units = f", or a text with one of the units {', '.join(known)}" if known else ""
-    raise InputError(f"{what} is {text!r}; needed is {_number(unit)}{units}")
-
-
-def _number(unit: str) -> str:
-    return "a number" if unit == "1" else f"a number in {unit}"
-
-
 UNNAMED_GEAR = "gear"  # Name of the gear in [gear], beside those in [gears.NAME]
-SUSPECTED = "suspected"  # Key of an effect that predicts, and that nothing names
+SUSPECTED = "suspected"  # Key by which earlier versions marked what predicts and is not named
 #: Priors about zero by the name that they have in a model file.
 NORMAL = {"normal": Prior.normal, "half-normal": Prior.half_normal}
 #: Kinds of tests; the key of the measured quantity identifies the kind.
@@ -98,8 +37,7 @@ def take_gear(settings: Settings) -> Gear:
         settings.fail(
             f"type is {gear_type!r}; {did_you_mean(gear_type, GEARS)}there are: {', '.join(GEARS)}"
         )
-    gear: Gear = take_instance(GEARS[gear_type], settings)
-    settings.finish()
+    gear: Gear = take_declared(GEARS[gear_type], settings)
     return gear
 
 
@@ -120,11 +58,7 @@ def take_gears(
             named.fail(f"{name!r} is no name of a gear; needed are letters, digits, - and _")
         if name in tables:
             named.fail(f"{name!r} is the name of the gear in [gear]; take another one")
-        tables[name] = Settings(
-            named.take(name, dict, f"a table [gears.{name}]"),
-            f"{settings.where} [gears.{name}]",
-            settings.files,
-        )
+        tables[name] = named.table(name)
     gears, priors, suspected = {}, {}, []
     for name, own in tables.items():
         entries = own.tables("effect")
@@ -153,33 +87,11 @@ def take_effects(
         if entry.take(SUSPECTED, bool, "true or false", False):
             suspected.append(name)
         try:
-            model = model + take_instance(effects[name], entry)
+            model = model + take_declared(effects[name], entry)
         except InputError as error:
             entry.fail(str(error).removeprefix(f"{entry.where}: "))
-        entry.finish()
         prior |= {f"{name}.{k}": v for k, v in take_priors(priors, effects[name]).items()}
     return model, prior, tuple(suspected)
-
-
-def take_instance(cls: type, settings: Settings) -> Any:
-    """An instance of a parameter-bearing dataclass from a table's keys of the same names."""
-    parameters = declared(cls)
-    values = {
-        f.name: settings.text(f.name)
-        if isinstance(f.default, str)
-        else take_quantity(settings, f.name, parameters[f.name].unit)
-        if f.name in parameters
-        else settings.number(f.name)
-        for f in fields(cls)
-        if f.name in settings or f.default is MISSING
-    }
-    settings.permit(f.name for f in fields(cls))
-    try:
-        made = cls(**values)
-    except InputError as error:
-        settings.fail(str(error))
-    check(made, f"{settings.where}: ")
-    return made
 
 
 def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTest, ...]]:
@@ -201,7 +113,7 @@ def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTes
         made = with_values(base, values)
         check(made, f"{settings.where}: ")
     else:
-        made = take_instance(Soil, settings)
+        made = take_declared(Soil, settings)
     settings.finish()
     return made, take_priors(priors, Soil), tests
 
@@ -213,9 +125,7 @@ def _take_test(settings: Settings) -> SoilTest:
             "needed is pressure (Pa), with plate_width and sinkage, or strength (Pa), with "
             "normal_stress; and scatter, such as '15 %'"
         )
-    made: SoilTest = take_instance(kinds[0], settings)
-    settings.finish()
-    return made
+    return take_declared(kinds[0], settings)
 
 
 def take_prior(settings: Settings, key: str, *, unit: str = "1", about_zero: bool = False) -> Prior:

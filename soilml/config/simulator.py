@@ -11,6 +11,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
+from soilml.io.declared_settings import Numbers
 from soilml.io.read_table import read_table
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
@@ -122,7 +123,8 @@ def take_simulator(settings: Settings, gear: Gear) -> Simulator:
             f"command is {command!r}; it must contain {{design}}, the table that it reads, and "
             "{runs}, the table that it writes"
         )
-    slip, load = (_take_range(settings, key) for key in ("slip", "load_N"))
+    ends = Numbers("[lowest, highest]", 2, rising=True)
+    slip, load = (ends.take(settings, key, "") for key in ("slip", "load_N"))
     if not -1.0 < slip[0] < slip[1] < 1.0:
         settings.fail("slip must lie between -1 and 1")
     if load[0] <= 0.0:
@@ -144,14 +146,6 @@ def _take_runs(settings: Settings) -> Table:
     if len({x.shape for x in columns.values()}) != 1 or next(iter(columns.values())).ndim != 1:
         settings.fail(f"runs has columns of different lengths; needed are {needed}")
     return Table(columns, f"{settings.where} runs")
-
-
-def _take_range(settings: Settings, key: str) -> tuple[float, float]:
-    value = settings.take(key, list, "[lowest, highest]")
-    numbers = all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
-    if len(value) != 2 or not numbers or not value[0] < value[1]:
-        settings.fail(f"{key} is {value!r}; needed is [lowest, highest]")
-    return float(value[0]), float(value[1])
 
 
 def emulated(

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Annotated, Any
 
 import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
+from soilml.io.declared_settings import Key, Numbers, keys_of, take_declared
 from soilml.io.toml_settings import Settings
-from soilml.parameters import Parameter
+from soilml.parameters import Parameter, check_number
 from soilml.physics.gears.rigid_wheel import RigidWheel
 from soilml.physics.model import Model
 
@@ -126,8 +127,64 @@ class WheeledRover:
         }
 
 
-_MASS = Parameter("kg", 0.01, 1e5, "mass of the whole rover")
 _GRAVITY = Parameter("m/s^2", 0.01, 30.0, "gravity")
+_NEEDED = "a number in m/s^2, or one of earth, moon, mars"
+_LENGTHS = "in m, up to 100"
+
+
+def read_gravity(value: float | str, where: str = "") -> float:
+    """Gravity (m/s^2) from a number or a name; raises `InputError` for another."""
+    where = f"{where}: " if where else ""
+    if isinstance(value, str):
+        if value.lower() in GRAVITY:
+            return GRAVITY[value.lower()]
+        try:
+            value = float(value)
+        except ValueError:
+            raise InputError(f"{where}gravity is {value!r}; needed is {_NEEDED}") from None
+    check_number(f"{where}gravity", _GRAVITY, value)
+    return float(value)
+
+
+class GravityByName:
+    """Gravity as a number or by name."""
+
+    def take(self, settings: Settings, key: str, kind: str) -> float:
+        """Gravity, m/s^2."""
+        return read_gravity(settings.take(key, (int, float, str), _NEEDED), settings.where)
+
+
+@dataclass(frozen=True)
+class _WheelTable:
+    """A wheel of [rover.wheels]."""
+
+    position: Annotated[tuple[float, float], Numbers(f"[forward, left] {_LENGTHS}", 2, -100, 100)]
+    gear: str = ""
+
+
+@dataclass(frozen=True)
+class _RoverTable:
+    """The table [rover]."""
+
+    mass: Annotated[float, Parameter("kg", 0.01, 1e5, "mass of the whole rover")]
+    centre_of_mass: Annotated[
+        tuple[float, float, float], Numbers(f"[forward, left, height] {_LENGTHS}", 3, -100, 100)
+    ]
+    wheels: dict[str, _WheelTable] = field(default_factory=dict)
+    gravity: Annotated[float, GravityByName()] = GRAVITY["earth"]
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for a rover that cannot stand."""
+        if self.centre_of_mass[2] < 0.0:
+            raise InputError(
+                f"centre_of_mass is {list(self.centre_of_mass)!r}; its height above the ground "
+                "cannot be negative"
+            )
+        if len(self.wheels) < 2:
+            raise InputError(
+                "[rover.wheels] needs two wheels or more, each as "
+                "front-left = { position = [0.4, 0.3] }"
+            )
 
 
 def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
@@ -143,105 +200,49 @@ def take_rover(settings: Settings, gears: Mapping[str, Model]) -> WheeledRover:
             "a rover of four equal wheels is for soilml paper climb; here each wheel stands in "
             "[rover.wheels], as front-left = { position = [0.4, 0.3] }"
         )
-    mass = _bounded(settings, "mass", settings.number("mass"), _MASS)
-    centre = _place(settings, "centre_of_mass", 3, "[forward, left, height] in m")
-    if centre[2] < 0.0:
-        settings.fail(
-            f"centre_of_mass is {list(centre)!r}; its height above the ground cannot be negative"
-        )
-    gravity = read_gravity(settings.take("gravity", (int, float, str), _NEEDED, "earth"), settings)
-    entries = settings.table("wheels")
-    wheels = {}
-    for name in entries.content:
-        own = entries.table(name)
-        forward, left = _place(own, "position", 2, "[forward, left] in m")
-        gear = own.text("gear", "") or None
-        if gear is not None and gear not in gears:
+    found = take_declared(_RoverTable, settings)
+    for name, wheel in found.wheels.items():
+        if wheel.gear and wheel.gear not in gears:
             known = ", ".join(filter(None, gears)) or "none; write [gears.NAME] in place of [gear]"
-            own.fail(f"gear is {gear!r}; gears of this file: {known}")
-        kind = gears[gear or next(iter(gears))].gear
+            settings.fail(f"wheel {name}: gear is {wheel.gear!r}; gears of this file: {known}")
+        kind = gears[wheel.gear or next(iter(gears))].gear
         if not isinstance(kind, RigidWheel):
-            own.fail(
-                f"its gear is a {kind.name}, but [rover] shares the load among wheels that touch "
-                "the ground at one place each; leave [rover] out, and ask for one gear with --load"
+            settings.fail(
+                f"wheel {name}: its gear is a {kind.name}, but [rover] shares the load among "
+                "wheels that touch the ground at one place each; leave [rover] out, and ask for "
+                "one gear with --load"
             )
-        own.finish()
-        wheels[name] = RoverWheel(forward, left, gear)
-    if len(wheels) < 2:
-        settings.fail(
-            "[rover.wheels] needs two wheels or more, each as "
-            "front-left = { position = [0.4, 0.3] }"
-        )
-    settings.finish()
-    return WheeledRover(mass, (centre[0], centre[1], centre[2]), wheels, gravity)
-
-
-_NEEDED = "a number in m/s^2, or one of earth, moon, mars"
-
-
-def read_gravity(value: float | str, settings: Settings | None = None) -> float:
-    """Gravity (m/s^2) from a number or a name; raises `InputError` for another."""
-    where = f"{settings.where}: " if settings is not None else ""
-    if isinstance(value, str):
-        if value.lower() in GRAVITY:
-            return GRAVITY[value.lower()]
-        try:
-            value = float(value)
-        except ValueError:
-            raise InputError(f"{where}gravity is {value!r}; needed is {_NEEDED}") from None
-    if not _GRAVITY.lower <= value <= _GRAVITY.upper:
-        raise InputError(
-            f"{where}gravity is {value:g} m/s^2; needed is {_GRAVITY.lower:g} to {_GRAVITY.upper:g}"
-        )
-    return float(value)
-
-
-def _bounded(settings: Settings, key: str, value: float, bounds: Parameter) -> float:
-    if not bounds.lower <= value <= bounds.upper:
-        settings.fail(
-            f"{key} is {value:g} {bounds.unit}; needed is {bounds.lower:g} to {bounds.upper:g}"
-        )
-    return value
-
-
-def _place(settings: Settings, key: str, count: int, needed: str) -> tuple[float, ...]:
-    values = settings.take(key, list, needed)
-    numbers = [v for v in values if isinstance(v, (int, float)) and not isinstance(v, bool)]
-    if len(values) != count or len(numbers) != count or not np.isfinite(numbers).all():
-        settings.fail(f"{key} is {values!r}; needed is {needed}")
-    if max(abs(v) for v in numbers) > 100.0:
-        settings.fail(f"{key} is {values!r}; needed are lengths in m, up to 100")
-    return tuple(float(v) for v in numbers)
+    wheels = {n: RoverWheel(*w.position, w.gear or None) for n, w in found.wheels.items()}
+    return WheeledRover(found.mass, found.centre_of_mass, wheels, found.gravity)
 
 
 @dataclass(frozen=True)
 class DriveErrors:
-    """Constant of the motors, losses of the drives, and errors of the force balance.
+    """[drive]: constant of the motors, losses of the drives, and errors of the force balance.
 
     Standard deviations are those of errors that stay alike from row to row. `loss`, N m, is the
     friction between motor and wheel; the torque on the soil is the reading less it. `gain_std` is
     a share of the torque, in which errors of the model are. `pull_std` is a share of the weight.
     """
 
-    torque_per_ampere: float | None = None  # N m at the wheel for each ampere
-    loss: float = 0.0  # N m, of each wheel
-    loss_std: float = 0.2  # N m
-    gain_std: float = 0.07
-    pull_std: float = 0.015  # Constant error of the pitch, and of the pull
-    slope_std: float = 0.005  # rad, error of the pitch of a row
-    speed_std: float = 0.005  # Error of the rim speed of a row, as a share of it
+    torque_per_ampere: Annotated[
+        float | None, Parameter("N m/A", 1e-6, 1e6, "torque at the wheel for each ampere")
+    ] = None
+    loss: Annotated[float, Key("loss_Nm"), Parameter("N m", 0.0, 1e5, "of each wheel")] = 0.0
+    loss_std: Annotated[float, Key("loss_Nm_std"), Parameter("N m", 0.0, 1e5)] = 0.2
+    gain_std: Annotated[float, Parameter("1", 0.0, 1.0, "share of the torque")] = 0.07
+    # Constant error of the pitch, and of the pull
+    pull_std: Annotated[float, Parameter("1", 1e-4, 1.0, "share of the weight")] = 0.015
+    slope_std: Annotated[
+        float, Key("slope_rad_std"), Parameter("rad", 0.0, 0.5, "error of the pitch of a row")
+    ] = 0.005
+    speed_std: Annotated[
+        float, Key("rim_speed_std"), Parameter("1", 0.0, 0.2, "share of the rim speed of a row")
+    ] = 0.005
 
 
 #: Key of each field of `DriveErrors` in the file.
-DRIVE_KEYS = {
-    "torque_per_ampere": "torque_per_ampere",
-    "loss": "loss_Nm",
-    "loss_std": "loss_Nm_std",
-    "gain_std": "gain_std",
-    "pull_std": "pull_std",
-    "slope_std": "slope_rad_std",
-    "speed_std": "rim_speed_std",
-}
+DRIVE_KEYS = keys_of(DriveErrors)
 
 
 def take_drive(settings: Settings) -> DriveErrors:
@@ -249,27 +250,4 @@ def take_drive(settings: Settings) -> DriveErrors:
 
     Raises `InputError` for an unknown key or a value out of bounds.
     """
-    known = DriveErrors()
-    constant = None
-    if "torque_per_ampere" in settings:
-        constant = _number(settings, "torque_per_ampere", 0.0, 1e-6, 1e6, "N m/A")
-    found = DriveErrors(
-        constant,
-        _number(settings, "loss_Nm", known.loss, 0.0, 1e5, "N m"),
-        _number(settings, "loss_Nm_std", known.loss_std, 0.0, 1e5, "N m"),
-        _number(settings, "gain_std", known.gain_std, 0.0, 1.0, "as a share of the torque"),
-        _number(settings, "pull_std", known.pull_std, 1e-4, 1.0, "as a share of the weight"),
-        _number(settings, "slope_rad_std", known.slope_std, 0.0, 0.5, "rad"),
-        _number(settings, "rim_speed_std", known.speed_std, 0.0, 0.2, "as a share of the speed"),
-    )
-    settings.finish()
-    return found
-
-
-def _number(
-    settings: Settings, key: str, default: float, low: float, high: float, unit: str
-) -> float:
-    value = settings.number(key, default)
-    if not low <= value <= high:
-        settings.fail(f"{key} is {value:g}; needed is a number from {low:g} to {high:g}, {unit}")
-    return value
+    return take_declared(DriveErrors, settings)

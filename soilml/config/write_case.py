@@ -7,8 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 
 from soilml.config.case import Case
+from soilml.config.explanations import CaseExplanation, added_effects
 from soilml.config.measurement_noise import discrepancy_as_settings
-from soilml.config.model_settings import SUSPECTED, UNNAMED_GEAR
+from soilml.config.model_settings import UNNAMED_GEAR
 from soilml.config.remainder import remainder_lines
 from soilml.config.wheeled_rover import DRIVE_KEYS, DriveErrors, WheeledRover
 from soilml.numerics.prior import Prior
@@ -59,6 +60,8 @@ def case_as_toml(case: Case, comments: Sequence[str] = ()) -> str:
         lines += ["", *_drive_lines(case.drive)]
     for effect in case.model.effects:
         lines += ["", *_effect_lines(case, effect, "effect", effect.name)]
+    for one in case.explanations:
+        lines += ["", *_explanation_lines(case, one)]
     return "\n".join(lines) + "\n"
 
 
@@ -115,11 +118,27 @@ def _key(name: str) -> str:
     return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else json.dumps(name)
 
 
+def _explanation_lines(case: Case, one: CaseExplanation) -> list[str]:
+    """What an explanation has beside the case: its weight, soil, priors of the soil, effects."""
+    lines = ["[[explanation]]", f"weight = {_number(one.weight)}", "[explanation.soil]"]
+    for name in declared(Soil):
+        if float(getattr(one.soil, name)) != float(getattr(case.soil, name)):
+            lines.append(f"{name} = {_number(getattr(one.soil, name))}")
+    soil = {p: v for p, v in one.prior.items() if "." not in p and case.prior.get(p) != v}
+    if soil:
+        lines.append("[explanation.prior]")
+        lines += [f"{name} = {_setting(prior.as_setting())}" for name, prior in soil.items()]
+    own = case.of_explanation(one)
+    for path, effect in added_effects(case, one).items():
+        lines += _effect_lines(own, effect, "explanation.effect", path)
+    return lines
+
+
 def _effect_lines(case: Case, effect: Effect, table: str, path: str) -> list[str]:
     """An effect with its priors, which are those below `path`."""
     lines, default = [f"[[{table}]]", f'name = "{effect.name}"'], type(effect)()
-    if path in case.suspected:
-        lines.append(f"{SUSPECTED} = true  # it is not named")
+    if table.startswith("explanation") and "@" in path:
+        lines.append(f'gear = "{path.partition("@")[2]}"')
     for key in declared(type(effect)):
         if float(getattr(effect, key)) != float(getattr(default, key)):
             lines.append(f"{key} = {_number(getattr(effect, key))}")

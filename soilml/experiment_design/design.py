@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,9 @@ from soilml.fitting.levels import replicate_rows
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.quantities import column
 from soilml.results import Result
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 #: Default slips, and the number of default loads.
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
@@ -84,7 +87,7 @@ def candidate_grid(
     """
     if loads is None:
         if len(measured_loads) == 0:
-            raise InputError("no loads and no measured rows: give --loads 30,60,120, or RUNS.csv")
+            raise InputError("no loads and no measured rows: give --load 30,60,120, or RUNS.csv")
         low, high = LIGHTER * float(np.min(measured_loads)), HEAVIER * float(np.max(measured_loads))
         loads = [float(f"{load:.2g}") for load in np.geomspace(low, high, LOADS)]
     return CandidateGrid(tuple(sorted({*(slips or SLIPS)})), tuple(sorted({*loads})))
@@ -181,25 +184,11 @@ class Advice(Result):
         """The best repetition of a measured operating point; None without measured rows."""
         return best_row(self.repetitions, self.names, name) if self.repetitions else None
 
-    def plot(self, ax: Any = None, measured: Operating | None = None) -> NDArray[Any]:
-        """Draw a map for each parameter: its remaining fraction over slip and load (N) of a row.
+    def report(self) -> Report:
+        """The best next rows, and maps of what each row would leave."""
+        from soilml.experiment_design.presentation import report_of_advice
 
-        The frame marks the best row, rings the measured ones. Points at which the wheel might not
-        be carried are blank. Channels are those of the first set.
-
-        `ax`: axes of matplotlib, one for each parameter; by default a new figure. `measured`:
-        operating points of earlier rows. Returns the axes, (parameters,). Raises `InputError` for
-        another number of axes.
-        """
-        from soilml.experiment_design.presentation import plot_maps
-
-        return plot_maps(self, measured, ax)
-
-    def summary(self) -> str:
-        """The best next row, and what it leaves of each prior."""
-        from soilml.experiment_design.presentation import advice_verdict
-
-        return advice_verdict(self)
+        return report_of_advice(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each candidate, the best first, with the fractions that it leaves."""

@@ -113,7 +113,9 @@ def advise(
     InputError, TableError, FitError
         As `identify`; also without loads where there are no rows, and without declared noise.
     """
-    known = known_soil(as_case(case, with_bias=False), rows, free, exact_model)
+    known = known_soil(
+        as_case(case, with_bias=False, with_explanations=False), rows, free, exact_model
+    )
     grid = design.candidate_grid(slips, loads, known.loads)
     covariates = {} if known.measured is None else mean_covariates(known.measured)
     return design.advise(

@@ -12,7 +12,7 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.readings import Readings
-from soilml.identification.averaged_fit import soil_samples
+from soilml.identification.averaged import soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, prior_fractions
 from soilml.numerics.maximum_entropy import prior_quantiles

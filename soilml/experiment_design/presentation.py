@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -12,12 +11,12 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.experiment_design.design import Advice, RatedRow, channel_label
-from soilml.io.atomic_files import atomic_output
 from soilml.physics.operating_point import Operating
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import NEXT_ROW, Remark
-from soilml.report import numbers
-from soilml.report.figure_style import save_png, take_axes
+from soilml.report.numbers import parameter_name, share_left
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 
 #: Differences of remaining fractions that are not reported: the sampling error of one call.
 NEGLIGIBLE = 0.02
@@ -33,7 +32,7 @@ def is_identified(remaining_fraction: Floats) -> NDArray[np.bool_]:
 def abstention_message(name: str, remaining_fraction: float, rows: str = "these rows") -> str:
     """That a parameter is not identified; `rows` is "these rows" or "this row"."""
     name = name.replace("_", " ")
-    left = numbers.share_left(remaining_fraction)
+    left = share_left(remaining_fraction)
     return f"{name}: not identified by {rows}, {left} the prior's width remains"
 
 
@@ -122,64 +121,78 @@ def advice_as_json(advice: Advice) -> dict[str, object]:
     }
 
 
-def save_maps(path: str | os.PathLike[str], advice: Advice, measured: Operating | None) -> None:
-    """Write a PNG file with a map for each parameter; loads in N.
-
-    The frame marks the best point, rings the measured rows. Points at which the wheel might not be
-    carried are blank. Channels are those of the first set.
-    """
-    with atomic_output(path) as part:
-        save_png(partial(plot_maps, advice, measured), 1, len(advice.names), _size(advice), part)
-
-
-def _size(advice: Advice) -> tuple[float, float]:
-    return 3.3 * len(advice.names) + 1.2, 3.6
-
-
-def plot_maps(advice: Advice, measured: Operating | None, ax: Any) -> NDArray[Any]:
-    """Draw the maps into axes (parameters,); see `Advice.plot`."""
+def _draw_maps(advice: Advice, measured: Operating | None, axes: Any) -> None:
+    """Draw a map for each parameter into axes (1, parameters)."""
     from matplotlib.patches import Rectangle
 
     choices = advice.with_channels(advice.channel_sets[0])
     slips = sorted({c.candidate.slip for c in choices})
     loads = sorted({c.candidate.load for c in choices})
-    count = len(advice.names)
-    axes = take_axes(ax, 1, count, _size(advice))[0]
-    for i, (name, panel) in enumerate(zip(advice.names, axes, strict=True)):
+    for i, (name, panel) in enumerate(zip(advice.names, np.ravel(axes), strict=True)):
         fraction = np.full((len(loads), len(slips)), np.nan)
         for c in choices:
             cell = loads.index(c.candidate.load), slips.index(c.candidate.slip)
             fraction[cell] = c.remaining_fraction[i]
-        image = panel.imshow(
-            fraction, origin="lower", aspect="auto", cmap="viridis", vmin=0.0, vmax=1.0
-        )
+        panel.pcolormesh(fraction, cmap="viridis", vmin=0.0, vmax=1.0)
         for (row, col), share in np.ndenumerate(fraction):
-            ink = "black" if share > 0.6 else "white"
+            ink = "#010101" if share > 0.6 else "#fdfdfd"
             if np.isfinite(share) and fraction.size <= MOST_LABELS:
-                panel.text(col, row, f"{100 * share:.0f}", ha="center", va="center", color=ink)
+                text = f"{100 * share:.0f}"
+                panel.text(col + 0.5, row + 0.5, text, ha="center", va="center", color=ink)
         best = advice.best(name).candidate
-        corner = slips.index(best.slip) - 0.5, loads.index(best.load) - 0.5
-        frame = Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5)
-        panel.add_patch(frame)
+        corner = slips.index(best.slip), loads.index(best.load)
+        panel.add_patch(Rectangle(corner, 1, 1, fill=False, edgecolor="#d62728", linewidth=2.5))
         if measured is not None:
-            slip = np.interp(np.atleast_1d(measured.slip), slips, np.arange(len(slips)))
-            load = np.interp(np.atleast_1d(measured.load), loads, np.arange(len(loads)))
-            panel.plot(slip, load, "o", color="#d62728", fillstyle="none", markersize=25, mew=2)
+            slip = np.interp(np.atleast_1d(measured.slip), slips, np.arange(len(slips)) + 0.5)
+            load = np.interp(np.atleast_1d(measured.load), loads, np.arange(len(loads)) + 0.5)
+            panel.plot(slip, load, "o", color="#d62728", fillstyle="none", markersize=18, mew=2)
         across, up = (range(0, n, -(-n // TICKS)) for n in (len(slips), len(loads)))
-        panel.set_xticks(across, [f"{slips[k]:.3g}" for k in across])
-        panel.set_yticks(up, [f"{loads[k]:.3g}" for k in up])
+        panel.set_xticks([k + 0.5 for k in across], [f"{slips[k]:.3g}" for k in across])
+        panel.set_yticks([k + 0.5 for k in up], [f"{loads[k]:.3g}" for k in up])
+        panel.grid(visible=False)
         panel.set_title(f"{name.replace('_', ' ')}: now {advice.current_fraction[i]:.0%}")
         panel.set_xlabel("slip of the next row")
-    axes[count // 2].set_xlabel("slip (frame: best, rings: measured)")
-    axes[0].set_ylabel("load of the next row, N")
-    label = "expected remaining fraction of the prior width"
-    axes[0].figure.colorbar(image, ax=list(axes)).set_label(label, fontsize=9)
-    return np.asarray(axes)
+        panel.set_ylabel("load of the next row, N")
 
 
 def advice_verdict(advice: Advice) -> str:
     """The best next row, and what it leaves of each prior."""
     return f"Measure next: {row_message(advice, advice.best())}."
+
+
+def report_of_advice(
+    advice: Advice, measured: Operating | None = None, remarks: Sequence[Remark] = ()
+) -> Report:
+    """The report of an advice; `measured` are the operating points of earlier rows."""
+    rows, columns = best_rows(advice), []
+    for name, values in advice_columns(advice, rows).items():
+        if name.endswith("_left"):
+            symbol = parameter_name(name.removesuffix("_left")).split()[-1]
+            columns.append(Column(f"{symbol} left", values.tolist(), "share", digits=2))
+        elif name != "channels":
+            unit = "N" if name == "load_N" else "1"
+            columns.append(Column(name.removesuffix("_N"), list(values), unit, digits=3))
+    count = len(advice.names)
+    vague = advice.names if measured is None else [
+        n for n, ok in zip(advice.names, is_identified(advice.current_fraction), strict=True)
+        if not ok
+    ]  # fmt: skip
+    return Report(
+        kind="plan",
+        verdict=advice_verdict(advice),
+        tables=[ReportTable("Rows to measure next", columns, "Width that is left of each prior.")],
+        pictures=[
+            Picture(
+                "Next rows", partial(_draw_maps, advice, measured), 1, count, (3.8 * count, 3.6),
+                advice_verdict(advice),
+                "Expected width, in percent of the prior's, after a row at this slip and load. "
+                "Frame: the best row. Rings: measured rows. Blank: the soil might not carry it.",
+            )
+        ],
+        remarks=remarks,
+        status=f"{len(vague)} of {count} open" if vague else "identified",
+        title="Measurement to make next",
+    )  # fmt: skip
 
 
 def best_rows(advice: Advice) -> list[tuple[str, RatedRow]]:

@@ -29,9 +29,6 @@ WIDE_BOUND, ASSUMED_FACTOR = 100.0, 30.0
 #: Prior standard deviations of an effect's shape coefficients, in their own units.
 SHAPE_STD = {"slip_power": 1.0, "by_slip": 3.0, "by_load": 1.0}
 
-#: Ratio of bounds from which on a uniform parameter is sampled in its logarithm.
-FAR_APART = 3.0
-
 
 @dataclass(frozen=True)
 class Coordinate:
@@ -61,6 +58,8 @@ class Coordinate:
         Bounds of x.
     is_shape
         Whether it is a shape coefficient of an effect's law.
+    of_candidate
+        Whether it is of an effect that a hypothesis adds, and not of the case.
     """
 
     path: str
@@ -72,6 +71,7 @@ class Coordinate:
     lower: float = 0.0
     upper: float = 1.0
     is_shape: bool = False
+    of_candidate: bool = False
 
     @property
     def effect(self) -> str:
@@ -94,13 +94,6 @@ class Coordinate:
     def reference_size(self) -> float:
         """The value at x = 1: of an effect's size in an analysis of gaps, its reference size."""
         return self.prior.upper
-
-    @property
-    def centre(self) -> float:
-        """The x of the value zero, where there is a normal density about it; else 0."""
-        if self.normal_std is None:
-            return 0.0
-        return -self.prior.lower / (self.prior.upper - self.prior.lower)
 
     @property
     def fraction_precision(self) -> float:
@@ -179,6 +172,7 @@ def size_coordinate(effect: type[Effect], calibration: float | None) -> Coordina
         normal_std=calibration,
         lower=lower,
         upper=upper,
+        of_candidate=True,
     )
 
 
@@ -197,6 +191,7 @@ def shape_coordinates(effect: type[Effect]) -> list[Coordinate]:
                 lower=-bound,
                 upper=bound,
                 is_shape=True,
+                of_candidate=True,
             )
         )
     return coordinates
@@ -212,17 +207,6 @@ def rates_at(coordinates: Sequence[Coordinate], x: Floats) -> Floats:
     """Derivatives (p,) of the values by the coordinates, at x (p,)."""
     each = [float(c.rate(x[i : i + 1])[0]) for i, c in enumerate(coordinates)]
     return np.asarray(each, dtype=np.float64)
-
-
-def log_ratios(coordinates: Sequence[Coordinate]) -> Floats:
-    """Ratio (p,) of the bounds of each parameter that is uniform between bounds far apart.
-
-    One where the ratio is small, or where its logarithm is uniform already.
-    """
-    priors = [c.prior for c in coordinates]
-    plain = [not p.log and p.normal_std is None and p.lower > 0.0 for p in priors]
-    ratios = [p.upper / p.lower if own else 1.0 for p, own in zip(priors, plain, strict=True)]
-    return np.asarray([r if r >= FAR_APART else 1.0 for r in ratios])
 
 
 def _wide_prior(parameter: Parameter, nominal: float) -> Prior:

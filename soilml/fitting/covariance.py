@@ -239,36 +239,3 @@ def _moved(readings: Readings, name: str, values: Floats) -> Readings:
         load = readings.row_load
         at = replace(readings.at, load=np.clip(values, LEAST_LOAD * load, MOST_LOAD * load))
     return replace(readings, at=at)
-
-
-def sensor_columns(readings: Readings, prediction: Floats) -> Floats | None:
-    r"""Changes (sets, k, e) of the readings with gains and offsets of one standard deviation.
-
-    .. math:: y = (1 + e_1) f + e_2
-
-    for torque and sinkage; drawbar pull has an error in proportion to load instead of a gain. Gains
-    and shares of load that grow with slip are in proportion to it. All are linear in the errors at
-    predictions f (sets, k), so that errors with normal priors are integrated out without
-    approximation: their covariance is that of the columns. None without such errors of a measured
-    channel.
-    """
-    prediction = np.nan_to_num(prediction)
-    errors, slip, load, parts = readings.shared_errors, np.abs(readings.slip), readings.load, []
-    for i, channel in enumerate(readings.channels):
-        own = readings.channel == i
-        size = own * prediction
-        factors: dict[str, tuple[str, Floats]] = {
-            "torque_gain": ("torque", size),
-            "torque_bias": ("torque", own * 1.0),
-            "torque_by_slip": ("torque", size * slip),
-            "sinkage": ("sinkage", size),
-            "sinkage_bias": ("sinkage", own * 1.0),
-            "sinkage_by_slip": ("sinkage", size * slip),
-            "drawbar_pull": ("drawbar_pull", own * load),
-            "drawbar_pull_bias": ("drawbar_pull", own * 1.0),
-            "drawbar_pull_by_slip": ("drawbar_pull", own * load * slip),
-        }
-        for name, (measured, factor) in factors.items():
-            if name in errors and measured == channel:
-                parts.append(np.broadcast_to(errors[name] * factor, prediction.shape))
-    return np.stack(parts, axis=-1) if parts else None

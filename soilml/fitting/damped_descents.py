@@ -68,7 +68,7 @@ class DampedSteps:
     """Steps in the coordinates of a fit: their bounds, priors and curvature.
 
     lower, upper (p,): Bounds, at which steps end.
-    precision, centre (p,): Precision of each coordinate's normal density, or 0, and its middle.
+    precision (p,): Precision of each coordinate's normal density about zero, or 0.
     offset (p,): What is added to a coordinate to obtain a multiple of the parameter, where the
         parameter moves by ratios; infinite where it moves by differences.
     tests: Tests of the soil, which stand beside the residuals.
@@ -77,7 +77,6 @@ class DampedSteps:
     lower: Floats
     upper: Floats
     precision: Floats
-    centre: Floats
     offset: Floats
     tests: SoilTestTerms = field(default_factory=SoilTestTerms)
 
@@ -89,7 +88,6 @@ class DampedSteps:
             lower=problem.lower,
             upper=problem.upper,
             precision=problem.precision,
-            centre=problem.centre,
             offset=offset,
             tests=problem.soil_tests,
         )
@@ -138,7 +136,7 @@ class DampedSteps:
 
     def _descent(self, x: Floats, of_readings: Floats) -> Floats:
         """Half the negative gradient (b, p) at points (b, p), from that of the readings."""
-        return of_readings - self.precision * (x - self.centre) - self._of_tests(x)
+        return of_readings - self.precision * x - self._of_tests(x)
 
     def _steps(self, x: Floats, descent: Floats, normal: Floats, damping: Floats) -> Floats:
         """Damped steps (b, p) from points (b, p).

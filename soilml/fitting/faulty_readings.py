@@ -177,7 +177,10 @@ def _held(table: Table, key: str, noise: float) -> tuple[Booleans, str]:
     spoilt[order[1:]] = same_run & (values[order[1:]] == values[order[:-1]])
     if chance * len(table) > BY_CHANCE:
         spoilt[:] = False
-    return spoilt, "the same as in the row before, to the last digit: the sensor or logger held it"
+    return (
+        spoilt,
+        "the same as in the row before, to the last digit: the sensor or logger repeated it",
+    )
 
 
 def _blanked(table: Table, key: str, spoilt: Booleans) -> Table:

@@ -91,11 +91,6 @@ class LeastSquaresProblem:
         return np.asarray([c.std**-2 for c in self.coordinates])
 
     @cached_property
-    def centre(self) -> Floats:
-        """Coordinates (p,) at which the parameters with such a density are zero; 0 for others."""
-        return np.asarray([c.centre for c in self.coordinates])
-
-    @cached_property
     def lower(self) -> Floats:
         """Lower bounds of the coordinates, (p,)."""
         return np.asarray([c.lower for c in self.coordinates])
@@ -141,7 +136,7 @@ class LeastSquaresProblem:
 
     def objective(self, residual: Floats, x: Floats) -> Floats:
         """What is minimised, at whitened residuals (..., m) and coordinates (..., p)."""
-        of_prior = ((x - self.centre) ** 2 * self.precision).sum(axis=-1)
+        of_prior = (x**2 * self.precision).sum(axis=-1)
         of_tests = (self.soil_tests.deviation(x) ** 2).sum(axis=-1)
         return np.asarray((residual**2).sum(axis=-1) + of_prior + of_tests)
 
@@ -232,7 +227,8 @@ class Solution:
         A soil coordinate is uniform a priori; its precision enters as that of a Gaussian.
         """
         uniform = [
-            UNIFORM_PRECISION if np.isinf(c.std) and not c.effect else 0.0 for c in self.coordinates
+            UNIFORM_PRECISION if np.isinf(c.std) and not c.of_candidate else 0.0
+            for c in self.coordinates
         ]
         jacobian = np.vstack([self.jacobian, self.soil_tests.rates(self.x)])
         return np.asarray(jacobian.T @ jacobian + np.diag(self.precision + np.asarray(uniform)))

@@ -18,13 +18,12 @@ from soilml.fitting.covariance import (
     Whitening,
     discrepancy_process,
     noise_of_operation,
-    sensor_columns,
 )
 from soilml.fitting.damped_descents import levenberg_marquardt
+from soilml.fitting.error_columns import error_columns, stacked
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend, global_optimum
-from soilml.fitting.shared_errors import errors_at, with_modelled_errors
 from soilml.numerics.quantiles import chi_squared_quantile
 from soilml.numerics.smooth_process import LEAST_EIGENVALUE
 from soilml.remarks import Remark
@@ -34,39 +33,34 @@ from soilml.remarks import Remark
 NOISE_ROUNDS = 3
 #: Undeclared noise before any residual is known, as a fraction of the channel's RMS reading.
 INITIAL_NOISE = 0.05
-FEW = 16  # Readings of each channel of the few rows that tell good starts from bad ones
 
 
 @dataclass(frozen=True)
 class WeightedRows:
-    """Readings whose noise depends on what is expected of them, and the case that is fitted."""
+    """Readings whose noise depends on what is expected of them, and the case that is fitted.
 
-    case: Case  # With the errors that the model is solved with, where there are any
-    readings: Readings  # With the standard deviations (m,) that the fit gives them
-    declared: Readings  # The readings as they were declared
-    unknown: Sequence[Coordinate]  # The p free parameters, and behind them these errors
-    # Columns (m, e) of errors that all rows share and that act on the readings alone
+    readings: With the standard deviations (m,) that the fit gives them.
+    declared: As they were declared.
+    free: The p free parameters.
+    shared (m, e): Columns of errors that all rows share.
+    """
+
+    case: Case
+    readings: Readings
+    declared: Readings
+    free: Sequence[Coordinate]
     shared: Floats
 
     @staticmethod
     def of(case: Case, readings: Readings, free: Sequence[Coordinate]) -> WeightedRows:
-        """With noise as declared, and errors that all rows share as parameters."""
-        changed, unknown = with_modelled_errors(
-            case, readings.shared_errors, readings.row_load, free
-        )
+        """With noise as declared, and shared errors as the soil of the case has them."""
         std = np.where(np.isfinite(readings.std), readings.std, _initial_noise(readings))
-        shared = sensor_columns(readings, readings.measured[None, :])
-        return WeightedRows(
-            case=changed,
-            readings=replace(readings, std=std),
-            declared=readings,
-            unknown=unknown,
-            shared=np.zeros((len(readings), 0)) if shared is None else shared[0],
-        )
+        shared = _shared(case, readings)
+        return WeightedRows(case, replace(readings, std=std), readings, free, shared)
 
     @cached_property
     def columns(self) -> Floats:
-        """Columns (m, q) of the model discrepancy and of errors that act on the readings alone."""
+        """Columns (m, q) of the model discrepancy and of errors that all rows share."""
         process = discrepancy_process(
             self.readings,
             self.case.discrepancy,
@@ -80,43 +74,28 @@ class WeightedRows:
     def problem(self) -> LeastSquaresProblem:
         """The problem, weighted by noise, model discrepancy and shared errors."""
         whiten = Whitening.of(self.readings.std, self.columns)
-        return LeastSquaresProblem(self.case, self.unknown, self.readings, whiten)
-
-    def of_few_rows(self) -> WeightedRows:
-        """A few of the rows, from the lightest to the heaviest of each channel."""
-        selected, few = self.readings.of_rows(_few_rows(self.readings))
-        return replace(self, readings=few, shared=self.shared[selected])
+        return LeastSquaresProblem(self.case, self.free, self.readings, whiten)
 
     def with_noise_at(self, optimum: Solution) -> WeightedRows:
-        """The same with noise at the optimum's predictions, or from its residuals.
-
-        Errors of sensors that all rows share are in proportion to the same predictions.
-        """
+        """The same with noise and shared errors at an optimum, or noise from its residuals."""
         prediction, readings = optimum.prediction, self.declared
         total = np.hypot(
             readings.noise_at(prediction),
-            noise_of_operation(self.case, readings, self.unknown, optimum.x),
+            noise_of_operation(self.case, readings, self.free, optimum.x),
         )
-        free = sum(c.normal_std is None for c in self.unknown)
-        estimated = _residual_noise(readings, optimum.problem.residual(prediction), free)
-        shared = sensor_columns(readings, prediction[None, :])
+        residual = optimum.problem.residual(prediction)
+        estimated = _residual_noise(readings, residual, len(self.free))
         return replace(
             self,
             readings=replace(readings, std=np.where(np.isfinite(total), total, estimated)),
-            shared=self.shared if shared is None else shared[0],
+            shared=_shared(optimum.fitted(), readings),
         )
 
 
-def _few_rows(readings: Readings) -> NDArray[np.int64]:
-    """Rows that stand for all: from the lightest to the heaviest with a reading of each channel."""
-    rows = []
-    for i in range(len(readings.channels)):
-        measured = readings.row[readings.channel == i]
-        slip, load = readings.row_slip[measured], readings.row_load[measured]
-        in_order = measured[np.lexsort((slip, load))]
-        few = np.linspace(0, len(in_order) - 1, min(FEW, len(in_order)))
-        rows.append(in_order[few.round().astype(int)])
-    return np.unique(np.concatenate(rows))
+def _shared(case: Case, readings: Readings) -> Floats:
+    if not readings.shared_errors:
+        return np.zeros((len(readings), 0))
+    return stacked(error_columns(case, readings, readings.shared_errors), len(readings))
 
 
 def _initial_noise(readings: Readings) -> Floats:
@@ -169,8 +148,6 @@ class Misfit:
     def of(optimum: Solution, readings: Readings, parameters: int) -> Misfit:
         """That of an optimum, of which the first coordinates are the parameters."""
         squares = optimum.cost + readings.squares_within
-        if len(optimum.coordinates) > parameters:
-            squares += float(np.sum(errors_at(optimum.coordinates, optimum.x[None, :]) ** 2))
         count = readings.reading_count
         return Misfit(float(squares), count - parameters, count)
 
@@ -212,8 +189,8 @@ def fit_under_declared_noise(
     Raises `FitError` where no parameters in the prior carry the measured loads.
     """
     weighted = WeightedRows.of(case, readings, free)
-    if start is None or len(weighted.unknown) > len(free):
-        optimum = global_optimum(weighted.problem, weighted.of_few_rows().problem)
+    if start is None:
+        optimum = global_optimum(weighted.problem)
     else:
         optimum = levenberg_marquardt(weighted.problem, start)
     for _ in range(NOISE_ROUNDS if readings.undeclared or readings.shared_errors else 1):

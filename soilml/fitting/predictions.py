@@ -21,6 +21,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError, raised
 from soilml.fitting.coordinates import Coordinate
 from soilml.fitting.joined_cases import CaseSets, join_keys, joined_load_case
+from soilml.fitting.mixtures import mixed_forces
 from soilml.fitting.operating_points import rows_by_gear
 from soilml.fitting.readings import Readings
 from soilml.physics.contact import Force
@@ -199,7 +200,9 @@ def forces(case: Case, at: Operating) -> Force:
 
 
 def forces_of_one_gear(case: Case, at: Operating) -> Force:
-    """Forces of a case of one gear, with the mean of its remainder."""
+    """Forces of a case of one gear with its remainder; of several explanations, their mean."""
+    if case.explanations:
+        return mixed_forces(case, lambda one: forces_of_one_gear(one, at))
     force = case.model(case.soil, at)
     return force if case.remainder is None else case.remainder.added_to(force, at.slip, at.load)
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.arrays import Floats, Real, namespace
+from soilml.arrays import Real, namespace
 from soilml.config.case import Case
 from soilml.config.measurement_noise import EFFECT_OF_ERROR, KNOWN_PARTS, common_errors
-from soilml.fitting.coordinates import Coordinate
-from soilml.numerics.prior import Prior
 from soilml.parameters import Parameter
 from soilml.physics.effects.base import Effect, EffectCard
 from soilml.physics.effects.exit_angle import ExitAngle
@@ -52,6 +50,13 @@ USUAL_MODEL_ERRORS = {
     "sinkage_by_slip": 0.15,
     "drawbar_pull_by_slip": 0.1,
 }
+
+#: Usual standard deviations of errors of the laws of the soil, which act as another soil does: of
+#: the logarithms of strength (cohesion and tan phi together), of its growth with log load, and of
+#: the shear modulus. A law of another form is best fitted by a shear modulus 15 to 20 % off and a
+#: friction angle 3 to 9 % off (`shear-softening`, stress falling to half beyond its peak), and
+#: every third model has one: these are about half of that.
+USUAL_LAW_ERRORS = {"strength": 0.02, "strength_by_load": 0.0175, "law_of_shear": 0.08}
 
 
 def declared_errors(case: Case) -> dict[str, float]:
@@ -180,40 +185,3 @@ class ModelledErrors(Effect):
         forward = xp.maximum(moved, xp.zeros_like(moved))
         ahead = forward / xp.sqrt(xp.sqrt(1.0 + (forward / room) ** 4))
         return replace(geometry, exit=geometry.exit + xp.where(moved < 0.0, moved, ahead))
-
-
-FARTHEST = 4.0  # Farthest from zero that an error is looked for, in standard deviations
-
-
-def with_modelled_errors(
-    case: Case, errors: Mapping[str, float], load: Floats, free: Sequence[Coordinate]
-) -> tuple[Case, list[Coordinate]]:
-    """The case with errors that the model is solved with, and these behind the free parameters.
-
-    Fractions of an error are linear in it, unlike those of a normal prior: readings are then nearly
-    polynomials of them.
-
-    errors: Standard deviations of the errors that all rows share, by name.
-    load: Loads (n,) of the rows, N.
-    """
-    of_model = {f.name for f in fields(ModelledErrors)}
-    modelled = {name: std for name, std in errors.items() if name in of_model}
-    if not modelled:
-        return case, list(free)
-    effect = ModelledErrors(typical_load=float(np.median(np.abs(load))))
-    parameters = [
-        Coordinate(
-            path=f"{effect.name}.{name}",
-            unit="1",
-            prior=Prior(-FARTHEST * std, FARTHEST * std),
-            normal_std=std,
-        )
-        for name, std in modelled.items()
-    ]
-    return replace(case, model=case.model + effect), [*free, *parameters]
-
-
-def errors_at(free: Sequence[Coordinate], u: Floats) -> Floats:
-    """Errors (sets, e) in standard deviations, at fractions u (sets, p) of all parameters."""
-    each = [f.prior.at(u[:, i]) / f.normal_std for i, f in enumerate(free) if f.normal_std]
-    return np.stack(each, axis=1)

@@ -38,9 +38,7 @@ from soilml.gap.verdict.agreement import (
 )
 from soilml.gap.verdict.cause_of_remainder import described_cause
 from soilml.gap.verdict.decision import (
-    NO_GAP,
     decide,
-    predictive_suspect,
     ranked_sets,
     reasons,
     suspects,
@@ -57,16 +55,18 @@ from soilml.gap.verdict.entries import (
     conditions_of_suspects,
     named_effects,
     outlier_names,
-    prediction_notes,
     readings_and_predictions,
     repeat_notes,
     signature_similarity,
     variance_component_entries,
 )
-from soilml.gap.verdict.estimates import soil_after, soil_before, updated_case
-from soilml.gap.verdict.learned_remainder import learned_remainder, without_learned_discrepancy
+from soilml.gap.verdict.estimates import (
+    returned_case,
+    soil_after,
+    soil_before,
+    whole_answer,
+)
 from soilml.gap.verdict.lookalikes import like_another_force, like_another_soil
-from soilml.gap.verdict.noise_range import noise_range
 from soilml.gap.verdict.reductions import (
     gap_reductions,
     grown_channels,
@@ -76,10 +76,10 @@ from soilml.gap.verdict.reductions import (
     without_grown,
 )
 from soilml.gap.verdict.remainder import (
-    discrepancy_amplitudes,
     discrepancy_map,
     remaining_discrepancy,
 )
+from soilml.inference import constants
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
 from soilml.io.read_table import Rows, as_table
@@ -179,7 +179,7 @@ def gap(
     """
     case = as_case(case)
     effects = candidate_effects(case, effects)
-    case = without_learned_discrepancy(case).without_suspected()
+    case = case.without_learned_discrepancy().without_explanations()
     known_costs = check_costs(costs or {})
     table, copies = sound_rows(case, as_table(table))
     known, case = case.remainder, case.without_remainder_of(table)
@@ -274,7 +274,7 @@ def _build_report(
 ) -> GapReport:
     """Decide the status, then compute the entries of the report."""
     gains = predictive_gains(posterior, ranked_sets(posterior)[:SCORED], seed)
-    quiet = posterior.no_gap > NO_GAP
+    quiet = posterior.no_gap > constants.NO_GAP
     alone, _ = plain_fits(posterior, None)
     opened = opened_priors(posterior)
     obstacles = (*opened, *checks.naming_obstacles)
@@ -299,21 +299,16 @@ def _build_report(
     figures, not_reduced = without_grown(figures, addition)
     beside_remainder, _ = without_grown(beside_remainder, addition)
     smooth_gap = decision.status not in ("no-gap", "undecided")
-    suspected = predictive_suspect(decision, gains)
-    written = posterior.soil
-    if shown is not None and (decision.claimed or suspected):
-        written = shown
+    whole = whole_answer(posterior, decision)
+    written = whole or shown or posterior.soil
     replicates = repeats_that_disagree(posterior, written.fit) if smooth_gap else []
-    left = discrepancy_amplitudes(posterior, written) if smooth_gap else None
-    learned = learned_remainder(posterior, written) if smooth_gap else None
-    marked = tuple(n for n in suspected if n not in effect_names(case))  # what the case had stays
     listed = suspects(posterior, decision, gains) if smooth_gap else []
     doubted = [node for s in listed if s.times_usual and (node := posterior.node_of(s.effects))]
     explained = shown if decision.claimed and shown is not None else posterior.soil
     report = GapReport(
         status=decision.status,
         sentence="",
-        model=replace(updated_case(written, left, learned), suspected=marked),
+        model=returned_case(posterior, whole, seed),
         cause_set=decision.listed,
         probabilities={n: posterior.probability(n) for n in posterior.effects()},
         best_unclaimed=listed[0].effects if listed and not decision.claimed else (),
@@ -326,7 +321,7 @@ def _build_report(
         untestable=dict(posterior.untestable),
         notes=(
             *checks.notes,
-            *prediction_notes(() if decision.claimed else suspected, gains, not_reduced),
+            *not_reduced,
             *analysis_notes(
                 posterior,
                 alone,
@@ -357,8 +352,6 @@ def _build_report(
     if not smooth_gap:
         return report
     conditions = conditions_of_suspects(posterior, obstacles)
-    if decision.status == "suspected" and shown is not None:
-        conditions = (*conditions, noise_range(posterior, shown.hypothesis.effects))
     rivals = competing_explanations(posterior, decision, listed)
     return replace(
         report,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,11 +18,12 @@ from soilml.config.remainder import SAME_ROWS
 from soilml.errors import FitError, InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
+from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import included_bias
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import condensing
-from soilml.identification.averaged_fit import averaged
+from soilml.identification.averaged import averaged
 from soilml.identification.fit import Fit, disagreeing_soil_tests
 from soilml.identification.linear import linear
 from soilml.identification.newton import newton
@@ -106,7 +108,7 @@ def identify(
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
     0.494 +- 0.040 rad
     """
-    case, table = as_case(case), as_table(table)
+    case, table = as_case(case).without_explanations(), as_table(table)
     if method not in METHODS:
         raise InputError(f"no method {method!r}; there are: {', '.join(METHODS)}")
     if method in CLOSED_FORM and case.gears:
@@ -136,7 +138,11 @@ def identify(
         *_about_soil_tests(case, fit),
         *readings.notes,
     ]
-    return replace(fit, warnings=(*fit.warnings, *remarks))
+    shown = (
+        selected if tuple(c.path for c in selected) == fit.names else select_free(case, fit.names)
+    )
+    curves = partial(FittedReadings.of, case, readings, shown, fit.values, fit.covariance)
+    return replace(fit, warnings=(*fit.warnings, *remarks), curves=curves)
 
 
 def _within_priors(fit: Fit, selected: Sequence[Coordinate]) -> Fit:

@@ -20,7 +20,7 @@ from soilml.fitting.readings import CondensedRows, Readings
 from soilml.identification.nonlinear import nonlinear
 from soilml.physics.operating_point import COVARIATES, FROM_ORDER, Operating
 
-MOST_ROWS, CELLS = 5_000, 1024  # Rows above which they are condensed, and rows that become of them
+MOST_ROWS, CELLS = 2_000, 1024  # Rows above which they are condensed, and rows that become of them
 #: Rows of the fit that shows where the optimum is, and rounds in which it is approached.
 FIRST_ROWS, ROUNDS = 1000, 2
 BLOCK = 50_000  # Rows that are solved at a time

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,18 +17,16 @@ from soilml.fitting.levels import is_one_load
 from soilml.fitting.misfit import excess_residuals_remark
 from soilml.fitting.readings import Readings
 from soilml.identification.soil_explanation import SoilExplanation as SoilExplanation
-from soilml.numerics.prior import Prior
 from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
 from soilml.remarks import Remark
-from soilml.report.numbers import share_left
-from soilml.report.parameter_lines import parameter_lines
-from soilml.report.terminal import significant
+from soilml.report.numbers import share_left, significant
 from soilml.results import EstimatedValue, Interval, Result
 
 if TYPE_CHECKING:
-    from soilml.report.parameter_figure import ParameterIntervals
+    from soilml.fitting.fitted_readings import FittedReadings
+    from soilml.report.report import Report
 
 
 #: Size r of a correlation from which on two parameters are reported as a trade-off: one combination
@@ -39,10 +37,10 @@ STRONG_CORRELATION = 0.95
 BOUND_TOLERANCE = 1e-3
 
 
+#: What follows from residuals above the noise where all intervals are as much wider.
+WIDENED = "std is multiplied by this factor"
 #: Codes of the remarks by which rows speak against the model taken as exact.
 AGAINST_EXACT = ("excess-residuals", "unlikely")
-#: Probability of typical errors above which it is said that the shares do not test effects.
-MAJORITY = 0.5
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,10 +79,12 @@ class Fit(Result):
     samples
         Weighted samples of the posterior (`soilml.identification.posterior.PosteriorSamples`),
         where the method drew them.
+    draws
+        Equally likely values (n, p) of them, SI units.
+    curves
+        Gives the readings with the predictions at `values`, for pictures.
     explanations
         Of an averaged fit, the explanations of the rows, the likeliest first.
-    exact_model
-        Of an averaged fit, the one that takes model and sensors to be exactly as in the file.
     """
 
     method: str
@@ -100,8 +100,9 @@ class Fit(Result):
     low: Floats | None = None
     high: Floats | None = None
     samples: Any = field(default=None, repr=False, compare=False)
+    draws: Floats | None = field(default=None, repr=False, compare=False)
+    curves: Callable[[], FittedReadings] | None = field(default=None, repr=False, compare=False)
     explanations: tuple[SoilExplanation, ...] = ()
-    exact_model: Fit | None = None
 
     @property
     def mean(self) -> Floats:
@@ -142,17 +143,15 @@ class Fit(Result):
     @property
     def fits(self) -> bool:
         """Whether the rows do not reject model and sensors as in the file."""
-        exact = self.exact_model or self
-        return not any(remark.code in AGAINST_EXACT for remark in exact.warnings)
+        return not any(remark.code in AGAINST_EXACT for remark in self.warnings)
 
     @property
     def verdict(self) -> str:
         """Whether model and rows agree, and what to do where they do not, in one sentence."""
-        exact = self.exact_model or self
-        against = [remark.code for remark in exact.warnings if remark.code in AGAINST_EXACT]
+        against = [remark.code for remark in self.warnings if remark.code in AGAINST_EXACT]
         count = f"{self.rows_used} row{'' if self.rows_used == 1 else 's'}"
         if against:
-            size = f" ({significant(float(np.sqrt(exact.misfit)), 2)} times the noise; p < 0.001)"
+            size = f" ({significant(float(np.sqrt(self.misfit)), 2)} times the noise; p < 0.001)"
             known = against[0] == AGAINST_EXACT[0]
             return f"The model does not fit these rows{size if known else ''}: run `soilml gap`."
         left = self.remaining_fraction
@@ -164,11 +163,11 @@ class Fit(Result):
         text += "the soil" if not open_ else f"the soil, but not {', '.join(open_)}"
         return f"{text[0].upper()}{text[1:]}."
 
-    def summary(self) -> str:
-        """The verdict, then each parameter with its 90 % interval."""
-        left = [self.remaining_fraction.get(name) for name in self.names]
-        lines = parameter_lines(self.names, self.units, self.values, self.std, *self.interval, left)
-        return "\n".join([self.verdict, *(line.sentence for line in lines)])
+    def report(self) -> Report:
+        """Verdict, soil, readings beside the model, and what limits the result."""
+        from soilml.identification.report import fit_report
+
+        return fit_report(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each parameter: mean, standard deviation, 90 % interval, unit."""
@@ -181,31 +180,6 @@ class Fit(Result):
             "high": high,
             "unit": list(self.units),
         }
-
-    def intervals(
-        self, prior: Mapping[str, Prior] | None = None, label: str = ""
-    ) -> ParameterIntervals:
-        """Values and 90 % intervals for a figure, with the ranges of their priors where given."""
-        from soilml.report.parameter_figure import ParameterIntervals
-
-        ends = [
-            (np.nan, np.nan) if prior is None or name not in prior else _ends(prior[name])
-            for name in self.names
-        ]
-        low, high = np.asarray(ends, dtype=np.float64).reshape(-1, 2).T
-        values, own = self.values[None], self.interval
-        return ParameterIntervals(
-            self.names, self.units, (label,), values, own[0][None], own[1][None], low, high
-        )
-
-    def plot(self, ax: Any = None, prior: Mapping[str, Prior] | None = None) -> NDArray[Any]:
-        """Draw each parameter with its 90 % interval, in usual units (kPa, degrees, mm).
-
-        `ax`: axes of matplotlib, one for each parameter; a new figure where None. `prior`: priors
-        by parameter, such as those of the case, whose ranges are shaded. Returns the axes, (p,).
-        Raises `InputError` for another number of axes.
-        """
-        return self.intervals(prior).plot(ax)
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml identify` writes."""
@@ -225,39 +199,7 @@ class Fit(Result):
         }
         if self.explanations:
             content["explanations"] = [one.as_json() for one in self.explanations]
-        if self.use_of_shares is not None:
-            content["explanations_use"] = self.use_of_shares.as_json()
-        if self.exact_model is not None:
-            exact = self.exact_model.as_json()
-            kept = ("method", "parameters", "warnings", "misfit")
-            content["exact_model"] = {key: exact[key] for key in kept} | {
-                "use": self.exact_model.use_of_exact.as_json()
-            }
         return content
-
-    @property
-    def use_of_shares(self) -> Remark | None:
-        """What the shares of `explanations` are not, where those of typical errors are most."""
-        errors = [one for one in self.explanations if not (one.effect or one.exact)]
-        if sum(one.probability for one in errors) <= MAJORITY:
-            return None
-        text = (
-            "these shares weigh what the intervals include and are no test for a missing effect: "
-            "soilml gap makes that test"
-        )
-        return Remark("shares-no-test", text, severity="note")
-
-    @property
-    def use_of_exact(self) -> Remark:
-        """When to use this fit, which takes model and sensors as exact, in place of the average."""
-        if any(remark.code in AGAINST_EXACT for remark in self.warnings):
-            text = "the model misfits these rows: do not use exact_model"
-        else:
-            text = (
-                "use exact_model only where this model and these sensors were verified on a known "
-                "soil: it takes both to be exactly as in the model file"
-            )
-        return Remark("exact-model", text, severity="note")
 
     def _parameters(self) -> dict[str, Any]:
         """Each parameter with its value, standard deviation and interval."""
@@ -269,14 +211,6 @@ class Fit(Result):
             | ({"remaining_fraction": remaining[name]} if name in remaining else {})
             for name, v, s, low, high, unit in rows
         }
-
-
-def _ends(prior: Prior) -> tuple[float, float]:
-    """Ends of the central 99 % of a normal prior; those of any other."""
-    if prior.normal_std is None:
-        return prior.lower, prior.upper
-    low, high = prior.at(np.asarray([0.005, 0.995]))
-    return float(low), float(high)
 
 
 #: Deviation from a test of the soil, in standard deviations of its scatter, that is remarked on.
@@ -295,10 +229,14 @@ def with_warnings(
     free: Sequence[Coordinate],
     u: NDArray[np.float64],
     *,
-    excess_residuals: bool,
+    excess_residuals: str,
     undeclared: bool,
 ) -> Fit:
-    """The same fit with its warnings; `u` (p,) are its values as fractions of the priors."""
+    """The same fit with its warnings.
+
+    u (p,): Its values as fractions of the priors.
+    excess_residuals: What follows from residuals that exceed the noise; "" where they do not.
+    """
     one_load = is_one_load(readings.row_load)
     remarks: list[Remark] = []
     for i, f in enumerate(free):
@@ -321,11 +259,7 @@ def with_warnings(
         remarks.append(Remark("few-readings", text))
     remarks += _trade_offs(fit)
     if excess_residuals:
-        remarks.append(
-            excess_residuals_remark(
-                float(np.sqrt(fit.misfit)), case, "std is multiplied by this factor"
-            )
-        )
+        remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))
     if undeclared:
         names = readings.undeclared
         text = (

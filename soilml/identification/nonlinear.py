@@ -14,7 +14,7 @@ from soilml.fitting.least_squares import Solution
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise
 from soilml.fitting.readings import Readings
 from soilml.fitting.scipy_descents import descend
-from soilml.identification.fit import Fit, at_prior_bound, with_warnings
+from soilml.identification.fit import WIDENED, Fit, at_prior_bound, with_warnings
 from soilml.quantities import column
 
 
@@ -70,7 +70,7 @@ def nonlinear(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
         )
     weighted, optimum = fit_under_declared_noise(case, readings, free)
     with_prior = optimum
-    if np.any(at_prior_bound(optimum.x[: len(free)])):
+    if np.any(at_prior_bound(optimum.x)):
         with_prior = descend(
             weighted.problem, optimum.x, with_prior=True, near=optimum.linearisation
         )
@@ -87,11 +87,10 @@ def _fit(
     undeclared: bool,
 ) -> Fit:
     """The result at an optimum; `with_prior` is the one that a Gaussian prior is included in."""
-    unknown, x = optimum.coordinates, optimum.x
-    p = len(free)
-    found = Misfit.of(optimum, readings, p)
+    x = optimum.x
+    found = Misfit.of(optimum, readings, len(free))
     excess = not undeclared and found.exceeds_noise
-    of_prior = np.asarray([c.fraction_precision for c in unknown])
+    of_prior = np.asarray([c.fraction_precision for c in free])
     precision = np.diag(of_prior)
     for_tests = optimum.soil_tests.rates(x)
     precision += for_tests.T @ for_tests
@@ -103,8 +102,7 @@ def _fit(
         precision,
         np.where(np.isinf(optimum.problem.normal_std), of_prior, 0.0),
     )
-    covariance = covariance[:p, :p]
-    values, rate = values_at(free, x[:p]), rates_at(free, x[:p])
+    values, rate = values_at(free, x), rates_at(free, x)
     fit = Fit(
         method="nonlinear",
         names=tuple(f.path for f in free),
@@ -121,7 +119,13 @@ def _fit(
         channels=tuple(column(name) for name in readings.channels),
     )
     return with_warnings(
-        fit, case, readings, free, x[:p], excess_residuals=excess, undeclared=undeclared
+        fit,
+        case,
+        readings,
+        free,
+        x,
+        excess_residuals=WIDENED if excess else "",
+        undeclared=undeclared,
     )
 
 

@@ -3,30 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from soilml.arrays import Floats, Integers
 from soilml.config.case import Case
+from soilml.errors import FitError
 from soilml.fitting.coordinates import Coordinate
+from soilml.fitting.covariance import noise_of_operation, squared_residuals_and_log_determinant
 from soilml.fitting.least_squares import SoilTestTerms, Solution
-from soilml.fitting.misfit import declared_misfit, misfit_limit
+from soilml.fitting.misfit import Misfit, WeightedRows, fit_under_declared_noise
+from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
-from soilml.identification.fit import Fit, with_warnings
-from soilml.identification.posterior_density import PosteriorDensity, most_probable
-from soilml.identification.posterior_sampling import MOST_SAMPLED_ROWS, sampled
-from soilml.numerics.importance_sampling import LEAST_EFFECTIVE_SIZE, ImportanceSample
+from soilml.fitting.scipy_descents import descend
+from soilml.fitting.uncarried_loads import raise_uncarried
+from soilml.identification.fit import WIDENED, Fit, with_warnings
+from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
 from soilml.numerics.resampling import latin_hypercube, systematic_resampling
 from soilml.quantities import column
 from soilml.remarks import Remark
 
 #: Fractions of the posterior below the ends of the 90 % interval.
 INTERVAL = np.asarray([0.05, 0.95])
-#: Readings from which on the search begins at the optimum: fewer may leave several.
-MANY_READINGS = 48
-#: Factor on the noise up to which the posterior with the declared noise shows the region.
-SIMILAR_NOISE = 2.0
+#: Readings below which the whole prior is sampled: few readings may leave a region with edges.
+FEW_READINGS = 9
+#: Of more readings, samples begin with the linearised posterior, so much wider; samples of a round,
+#: effective size at which sampling ends, and most samples.
+WIDER, ROUND, ENOUGH, MOST_SAMPLES = 1.5, 1024, 1250.0, 16_384
+#: Effective sample size below which mean and spread of the samples are not reported: their errors
+#: then exceed 1 / sqrt(50) = 14 % of the standard deviation.
+LEAST_USABLE_SIZE = 50.0
+FEW_SAMPLES = 200.0  # Effective sample size below which a remark states the sampling error
+MOST_EVALUATIONS = 200_000  # Most model evaluations in one call, which bounds memory
+#: Draws of the soil in a result: the standard error of a standard deviation is then 4 %.
+STORED_DRAWS = 400
 CANDIDATES = 64  # Draws of the priors from which one is chosen by the tests of the soil
 
 
@@ -62,16 +74,9 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     Its mean has the least expected squared error of all estimators on data from this model, prior
     and noise. Relative noise is taken relative to the prediction, and noise of slip and load is
     added in quadrature, linearised at the best of the first samples. A model discrepancy is
-    integrated out: its covariance is added to that of the noise, and so is that of offsets and
-    gains of the sensors that all rows share. Shared errors that the model is solved with (of slip,
-    load, bearing and contact) are sampled together with the soil, and left out of the result. A
-    parameter that the rows do not determine has its prior as posterior.
-
-    From eight readings on, polynomials of the parameters take the place of the model in the region
-    of the posterior. They are used if they change the log density there by at most 0.1 (one
-    standard deviation), at points that they were not fitted to; otherwise the model itself is
-    sampled, which takes tens of times longer. Parameters that are uniform over several times their
-    least value are sampled in their logarithm.
+    integrated out: its covariance is added to that of the noise, and so is that of errors of the
+    sensors that all rows share, linearised at the optimum. A parameter that the rows do not
+    determine has its prior as posterior.
 
     Where the residuals exceed the declared noise significantly (one data set in a thousand does by
     chance), noise and discrepancy are multiplied by the root of the misfit and the posterior is
@@ -104,8 +109,9 @@ def posterior(case: Case, readings: Readings, free: Sequence[Coordinate]) -> Fit
     """
     found = posterior_samples(case, readings, free)
     fit, mean_u = fit_of_samples("posterior", found, readings, free)
+    excess = WIDENED if found.noise_inflated else ""
     return with_warnings(
-        fit, case, readings, free, mean_u, excess_residuals=found.noise_inflated, undeclared=False
+        fit, case, readings, free, mean_u, excess_residuals=excess, undeclared=False
     )
 
 
@@ -136,6 +142,7 @@ def fit_of_samples(
         low=low,
         high=high,
         samples=found,
+        draws=values[found.equally_weighted(STORED_DRAWS)],
     )
     return fit, mean_u
 
@@ -147,76 +154,114 @@ def posterior_samples(
 
     Raises `FitError` as `posterior` does.
     """
-    density, start = PosteriorDensity(case, readings, free), None
-    optimum = _optimum(density, case, free)
-    # no sample of so many parameters, or of so narrow a part, fits much better than the optimum
-    misfit = 0.0 if optimum is None else _misfit(density, optimum.x, len(free))
-    limit = misfit_limit(readings.reading_count - len(free))
-    if misfit <= limit:
-        sample, misfit = _with_misfit(density, optimum, len(free))
-        if misfit <= limit:
-            return PosteriorSamples(_of_first(sample, len(free)), misfit, 1.0)
-        start = sample if misfit < SIMILAR_NOISE**2 else None
-    # the samples come near the optimum only: what is stated is the misfit there, as everywhere
-    if (at_optimum := declared_misfit(case, readings, free)) and at_optimum.exceeds_noise:
-        misfit = min(misfit, at_optimum.per_freedom)
-    noise_scale = float(np.sqrt(misfit))
-    sample = sampled(PosteriorDensity(case, readings, free, noise_scale), start, optimum)
-    return PosteriorSamples(_of_first(sample, len(free)), misfit, noise_scale)
-
-
-def _of_first(sample: ImportanceSample, p: int) -> ImportanceSample:
-    """The same samples of the first p parameters alone."""
-    return replace(sample, u=sample.u[:, :p])
+    check_declared(readings)
+    weighted, optimum = fit_under_declared_noise(case, readings, free)
+    found = Misfit.of(optimum, readings, len(free))
+    scale = found.factor if found.exceeds_noise else 1.0
+    sample = sample_posterior(case, readings, free, scale, (weighted, optimum))
+    return PosteriorSamples(sample, found.per_freedom, scale)
 
 
 def sample_posterior(
-    case: Case, readings: Readings, free: Sequence[Coordinate]
-) -> tuple[ImportanceSample, float]:
-    """Weighted fractions of the priors under the noise as declared, and the misfit.
+    case: Case,
+    readings: Readings,
+    free: Sequence[Coordinate],
+    noise_scale: float = 1.0,
+    optimum: tuple[WeightedRows, Solution] | None = None,
+) -> ImportanceSample:
+    """Weighted fractions of the priors, under the declared noise times a factor.
 
-    Those of shared errors stand behind. Raises `FitError` as `posterior` does.
+    optimum: What `fit_under_declared_noise` gives, where it is known.
+
+    Raises `FitError` as `posterior` does.
     """
-    density = PosteriorDensity(case, readings, free)
-    return _with_misfit(density, _optimum(density, case, free), len(free))
+    check_declared(readings)
+    weighted, best = optimum or fit_under_declared_noise(case, readings, free)
+    density = PosteriorDensity(weighted, best.x, noise_scale)
+    if readings.reading_count < FEW_READINGS:
+        sample = importance_sample(density, len(free), most_samples=MOST_SAMPLES)
+    else:
+        best = descend(weighted.problem, best.x, with_prior=True, near=best.linearisation)
+        sample = importance_sample(
+            density,
+            len(free),
+            around=(best.x, WIDER * _normal_root(best, noise_scale)),
+            least_effective_size=ENOUGH,
+            most_samples=MOST_SAMPLES,
+            later=ROUND,
+        )
+    if not np.isfinite(sample.evidence):
+        raise_uncarried(case, readings.at)
+    if sample.effective_size < LEAST_USABLE_SIZE:
+        raise FitError(
+            f"the effective sample size is {sample.effective_size:.0f}, too small for a mean and a "
+            f"spread ({LEAST_USABLE_SIZE:.0f} needed): the posterior is too narrow a part of the "
+            "prior; use --method nonlinear, or narrow [soil.prior]"
+        )
+    return sample
 
 
-def _optimum(density: PosteriorDensity, case: Case, free: Sequence[Coordinate]) -> Solution | None:
-    """The most probable parameters, where a search from there is quicker than one of the priors."""
-    readings = density.readings
-    few, many = readings.reading_count < MANY_READINGS, len(readings.row_slip) > MOST_SAMPLED_ROWS
-    if not density.errors and (few or many):
-        return None
-    return most_probable(case, readings, free)
+def _normal_root(at: Solution, noise_scale: float) -> Floats:
+    """A root (p, p) of the covariance of the linearised posterior, in fractions of the priors."""
+    rates = at.soil_tests.rates(at.x)
+    precision = at.jacobian.T @ at.jacobian / noise_scale**2 + rates.T @ rates
+    precision += np.diag([c.fraction_precision for c in at.coordinates])
+    return np.linalg.cholesky(np.linalg.inv(precision))
 
 
-def _with_misfit(
-    density: PosteriorDensity, optimum: Solution | None, parameters: int
-) -> tuple[ImportanceSample, float]:
-    """Weighted fractions of the priors, with those of shared errors behind, and the misfit.
+@dataclass(frozen=True)
+class PosteriorDensity:
+    """Log posterior density, up to a constant, of fractions of the priors.
 
-    The noise is as declared. The misfit is that at the sample of largest weight, or with shared
-    errors at the optimum if it is less there.
+    Model discrepancy and errors that all rows share are integrated out, linearised at the optimum;
+    so is noise of slip and load.
+
+    weighted: Readings, their covariance, and the case.
+    optimum (p,): Fractions of the priors at the optimum.
+    noise_scale: Factor on all noise: above 1 where residuals exceed all that is declared.
     """
-    sample = sampled(density, None, optimum)
-    misfit = _misfit(density, sample.u[int(np.argmax(sample.weights))], parameters)
-    if optimum is not None:  # samples have nearly one more squared residual for each error
-        misfit = min(misfit, _misfit(density, optimum.x, parameters))
-    return sample, misfit
+
+    weighted: WeightedRows
+    optimum: Floats
+    noise_scale: float = 1.0
+
+    @cached_property
+    def _input_std(self) -> Floats:
+        own = self.weighted
+        return noise_of_operation(own.case, own.declared, own.free, self.optimum)
+
+    def __call__(self, u: Floats) -> Floats:
+        """Log density (sets,) of parameter sets u (sets, p); -inf without an equilibrium."""
+        size = max(MOST_EVALUATIONS // len(self.weighted.readings.row_slip), 1)
+        parts = [self._of(u[i : i + size]) for i in range(0, len(u), size)]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def _of(self, u: Floats) -> Floats:
+        own = self.weighted
+        y = predict(own.case, own.free, u, own.readings)
+        std = np.hypot(own.declared.noise_at(y), self._input_std)
+        squares, log_determinant = squared_residuals_and_log_determinant(
+            y - own.readings.measured, std, own.columns
+        )
+        # the factor on all noise enters the determinant as a constant, which does not matter
+        logs = -0.5 * squares / self.noise_scale**2 - log_determinant
+        logs -= 0.5 * (SoilTestTerms(own.case, own.free).deviation(u) ** 2).sum(axis=1)
+        return np.where(np.isfinite(logs), logs, -np.inf)
 
 
-def _misfit(density: PosteriorDensity, u: Floats, parameters: int) -> float:
-    """Squared residuals over declared variances, per degree of freedom, at fractions u (p,).
-
-    With a discrepancy, or errors that all rows share, weighted by the inverse covariance.
-    """
-    cost = density.squared_residuals(u[None, :]) + density.readings.squares_within
-    return cost / max(density.readings.reading_count - parameters, 1)
+def check_declared(readings: Readings) -> None:
+    """Raise `FitError` where the noise of a channel is not declared, with what to write."""
+    if undeclared := readings.undeclared:
+        lines = ", ".join(f"{name} = '3 %'" for name in undeclared)
+        raise FitError(
+            f"the posterior method needs the noise of {', '.join(undeclared)}: declare it in "
+            f"[noise] of the model file, such as {lines}"
+        )
 
 
 def _sampling_warnings(sample: ImportanceSample) -> tuple[Remark, ...]:
     size = sample.effective_size
-    if size >= 0.5 * LEAST_EFFECTIVE_SIZE:
+    if size >= FEW_SAMPLES:
         return ()
     text = f"the effective sample size is {size:.0f} only: sampling error of the values is about "
     return (Remark("few-samples", f"{text}{100 / np.sqrt(size):.0f} % of their std"),)

@@ -12,37 +12,35 @@ class SoilExplanation:
 
     Attributes
     ----------
-    effect
-        Name of an effect of the catalogue that the model lacks; "" for none.
-    error_scale
-        Size of all errors of sensors and model over the typical ones; 0 for those declared alone.
+    effects
+        Names of effects of the catalogue that the model lacks; none for the soil alone.
+    discrepancy
+        Whether there is a smooth error of the model beside them.
     probability
         Its share in the averaged answer.
     """
 
-    effect: str
-    error_scale: float
+    effects: tuple[str, ...]
+    discrepancy: bool
     probability: float
 
     @property
     def exact(self) -> bool:
-        """Whether it takes model and sensors to be exactly as in the file."""
-        return not self.effect and self.error_scale == 0.0
+        """Whether it takes the model, but for its sensors, to be as in the file."""
+        return not self.effects and not self.discrepancy
 
     def __str__(self) -> str:
         """What it says, in words."""
         if self.exact:
-            return "the model as in its file"
-        errors = f"typical errors x {self.error_scale:g}"
-        if not self.effect:
-            return errors
-        return f"{self.effect} and {errors}" if self.error_scale else self.effect
+            return "typical errors of the sensors alone"
+        errors = ("a smooth error of the model",) if self.discrepancy else ()
+        return " and ".join((*self.effects, *errors))
 
     def as_json(self) -> dict[str, Any]:
-        """Its content in a report; `effect` is null for none."""
+        """Its content in a report."""
         return {
-            "effect": self.effect or None,
-            "error_scale": self.error_scale,
+            "effects": list(self.effects),
+            "discrepancy": self.discrepancy,
             "probability": self.probability,
             "text": str(self),
         }

@@ -211,8 +211,8 @@ def estimators_for_case(
         if estimator.sets is not None and estimator.sets.missing_context:
             if case is None:
                 raise InputError(
-                    f"{estimator.path} is for wheels of any size: give --case MODEL.toml with your "
-                    "[gear], [soil], [soil.prior] and [noise]"
+                    f"{estimator.path} is for wheels of any size: give --model MODEL.toml with "
+                    "your [gear], [soil], [soil.prior] and [noise]"
                 )
             estimator, own = condition_on_case(estimator, case)
             remarks += own

@@ -22,8 +22,6 @@ if TYPE_CHECKING:
 
 #: Distance from the ends of an opened prior at which a fit starts: one at a bound would stay there.
 OFF_BOUNDS = 0.02
-#: Amplitude of a discrepancy, in usual ones, from which the priors of the soil are opened.
-LARGE_DISCREPANCY = 3.0
 
 
 def additions(
@@ -83,7 +81,7 @@ def _moves(
     if h.effects and not h.free_law:
         first = p + len(extra)
         for i, own in enumerate(fit.coordinates):
-            if own.effect:
+            if own.of_candidate:
                 column = fit.derivatives[:, i] * fit.x[i]
                 extra += [(c, column * terms[c.name]) for c in problem.shapes(own.effect)]
         if p + len(extra) > first:
@@ -129,9 +127,9 @@ def _opened(
     ends = [
         min(x - c.lower, c.upper - x)
         for c, x in zip(node.fit.coordinates, node.fit.x, strict=True)
-        if not c.effect
+        if not c.of_candidate
     ]
-    large = search.terms.amplitude(node.at).max(initial=0.0) > LARGE_DISCREPANCY
+    large = search.terms.amplitude(node.at).max(initial=0.0) > constants.LARGE_DISCREPANCY
     if min(ends, default=1.0) >= constants.PRESSED and not large:
         return {}
     values = node.fit.values()

@@ -15,7 +15,7 @@ from soilml.quantities import Z_90
 
 #: Draws of a posterior, hyperparameters that are drawn of a component at most, draws of each at
 #: least, and proposals of each draw.
-DRAWS, HYPER_DRAWS, FEWEST, PROPOSALS = 600, 6, 8, 2
+DRAWS, HYPER_DRAWS, FEWEST, PROPOSALS = 600, 24, 8, 2
 #: Factor on the standard deviations of proposals, which are of Student's t with so many degrees.
 PROPOSAL_WIDTH, PROPOSAL_DEGREES = 1.15, 5.0
 #: Rounds in which proposals outside of the bounds are drawn again, before they are clipped.
@@ -35,13 +35,14 @@ class Component:
 class Draws:
     """Coordinates (k, p) of one component at hyperparameters that were drawn, and their weights.
 
-    The weights of all draws of a posterior sum to one.
+    The weights of all draws of a posterior sum to one. `residual` (k, m) is that of the readings.
     """
 
     node: Explanation
     at: Hyperparameters
     x: Floats
     weight: Floats
+    residual: Floats
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,8 @@ def _proposed(
 def weighted(own: _Proposal, terms: GaussianTerms, y: Floats | InputError) -> Draws:
     """Proposals weighted by their density; equally where the model refuses all of them."""
     fit, x = own.node.fit, own.x
-    equal = Draws(own.node, own.at, x, np.full(len(x), own.weight / len(x)))
+    near = own.node.linear.residual - (x - fit.x) @ fit.derivatives.T
+    equal = Draws(own.node, own.at, x, np.full(len(x), own.weight / len(x)), near)
     if isinstance(y, InputError):
         return equal
     residual = np.asarray(terms.readings.measured - y)
@@ -135,11 +137,12 @@ def weighted(own: _Proposal, terms: GaussianTerms, y: Floats | InputError) -> Dr
     for i, c in enumerate(fit.coordinates):
         if np.isfinite(c.std):
             log = log - 0.5 * (x[:, i] / c.std) ** 2
-        elif c.effect:
+        elif c.of_candidate:
             log = log + log_density_of_size(x[:, i], c.lower < 0.0 < c.upper)
     log = np.where(answered, log - own.log_density, -np.inf)
     weight = np.exp(log - np.logaddexp.reduce(log))
-    return Draws(own.node, own.at, x, own.weight * weight)
+    residual = np.where(answered[:, None], residual, near)
+    return Draws(own.node, own.at, x, own.weight * weight, residual)
 
 
 def marginal(values: Floats, weights: Floats, unit: str, factor: float) -> Marginal:

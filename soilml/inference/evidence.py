@@ -356,7 +356,7 @@ def linear_model(
             precision[i], pull[i] = c.std**-2, x[i] * c.std**-2
             constant[i] = x[i] * pull[i] + 2.0 * np.log(c.std) + LOG_2PI
         else:
-            precision[i] = WEAK_PRECISION if c.effect else UNIFORM_PRECISION
+            precision[i] = WEAK_PRECISION if c.of_candidate else UNIFORM_PRECISION
     deviation = fit.soil_tests.deviation(fit.x)
     rates = np.zeros((deviation.size, len(x)))
     rates[:, : len(fit.x)] = fit.soil_tests.rates(fit.x)

@@ -5,13 +5,14 @@ r"""All that is no effect, as one Gaussian: discrepancy, scatter from run to run
     e_c \sim N(0, s_c^2 D_c R_\rho D_c)
 
 The columns U are eigenfunctions of a smooth discrepancy in slip and log load, of each channel; and
-the change of each reading of each run with a unit of friction angle and of the bearing moduli.
+the change of each reading of each run with a unit of friction angle and of the bearing moduli. For
+the soil, errors that all rows share are further columns (`shared_columns`).
 D has the declared standard deviations, R the correlation of neighbouring samples of a run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -77,6 +78,12 @@ class GaussianTerms:
     usual: Floats
     _kept: dict[tuple[float, bytes], WhitenedColumns] = field(default_factory=dict)
 
+    @staticmethod
+    def of_columns(readings: Readings, columns: Floats) -> GaussianTerms:
+        """Terms of known size alone: columns (m, q) of unit variance, and the noise."""
+        group = np.full(columns.shape[1], FIXED)
+        return GaussianTerms(readings, columns, group, (), np.ones(len(readings.channels)))
+
     @cached_property
     def without_scatter(self) -> Integers:
         """Numbers of the columns that are not of scatter."""
@@ -91,11 +98,11 @@ class GaussianTerms:
             return np.zeros((len(found), s))
         return found.reshape(len(found), -1, s)[np.arange(len(found)), self.run]
 
-    @property
+    @cached_property
     def _of_scatter(self) -> Booleans:
         return np.asarray([*(own == SCATTER for own in self.kinds), False])[self.group]
 
-    @property
+    @cached_property
     def run(self) -> Integers:
         """Run (m,) of each reading."""
         return np.asarray(self.readings.run[self.readings.row])
@@ -121,7 +128,13 @@ class GaussianTerms:
 
     def of_kind(self, kind: str) -> Booleans:
         """Which hyperparameters (groups + channels,) are of a kind."""
-        return np.asarray([*(own == kind for own in self.kinds), *(False,) * self.channels])
+        return self._masks[kind]
+
+    @cached_property
+    def _masks(self) -> dict[str, Booleans]:
+        rest = (False,) * self.channels
+        kinds = (DISCREPANCY, SCATTER)
+        return {k: np.asarray([*(own == k for own in self.kinds), *rest], bool) for k in kinds}
 
     def amplitude(self, at: Hyperparameters) -> Floats:
         """Amplitude of each channel's discrepancy, (channels,), in usual ones."""
@@ -159,7 +172,7 @@ class GaussianTerms:
         log = np.append(at.log[: self.groups], 0.0)  # the last one is that of fixed columns
         square = np.exp(2.0 * log)
         if not at.present:
-            square[: self.groups][[kind == DISCREPANCY for kind in self.kinds]] = 0.0
+            square[: self.groups][self.of_kind(DISCREPANCY)[: self.groups]] = 0.0
         return np.asarray(square[self.group])
 
     def whitened(self, autocorrelation: float, kept: Booleans) -> WhitenedColumns:
@@ -282,7 +295,11 @@ def noise_whitening(
 
 
 def gaussian_terms(
-    readings: Readings, case: Case, scatter: Floats, fixed: Floats | None = None
+    readings: Readings,
+    case: Case,
+    scatter: Floats,
+    fixed: Floats | None = None,
+    inner: Sequence[Floats] = (),
 ) -> GaussianTerms:
     """The terms of readings: a discrepancy of each channel, scatter of each run.
 
@@ -291,6 +308,7 @@ def gaussian_terms(
 
     scatter (m, 2): Change of each reading by one unit of scatter; see `scatter_columns`.
     fixed (m, k): Further columns of unit variance: errors that all rows share.
+    inner: Columns (m, q) of further discrepancies, each with an amplitude of its own.
     """
     process = discrepancy_process(readings, case.discrepancy, least_eigenvalue=LEAST_EIGENVALUE)
     channels = len(readings.channels)
@@ -301,14 +319,18 @@ def gaussian_terms(
         if own is not None and own.shape[1]:
             parts.append(own)
             group.append(np.full(own.shape[1], FIXED))
+    first = channels + len(inner)
+    for i, own in enumerate(inner):
+        parts.append(own)
+        group.append(np.full(own.shape[1], channels + i))
     if np.unique(readings.run[readings.row]).size > 1:
         parts.append(_by_run(readings, scatter))
-        group.append(np.tile(channels + np.arange(scatter.shape[1]), len(readings.runs)))
+        group.append(np.tile(first + np.arange(scatter.shape[1]), len(readings.runs)))
     return GaussianTerms(
         readings=readings,
         columns=np.concatenate(parts, axis=1),
         group=np.concatenate(group).astype(np.int64),
-        kinds=(*(DISCREPANCY,) * channels, *(SCATTER,) * scatter.shape[1]),
+        kinds=(*(DISCREPANCY,) * first, *(SCATTER,) * scatter.shape[1]),
         usual=process.usual,
     )
 

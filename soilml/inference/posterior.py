@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -27,8 +27,6 @@ Names = tuple[str, ...]
 
 #: Largest absolute log odds that are stated; beyond it a probability is 0 or 1 in any sense.
 MOST_LOG_ODDS = 500.0
-#: Probability of a component below which it is not drawn from.
-LEAST_DRAWN = 0.003
 #: Largest change of other channels, in sigma and relative to that of one, that counts as none.
 UNCHANGED = 0.01
 
@@ -36,13 +34,30 @@ UNCHANGED = 0.01
 def infer(
     problem: InferenceProblem, progress: Callable[[float], None] = lambda _: None
 ) -> Posterior:
-    """The posterior of a problem.
+    """The posterior of a problem; of one that was asked before, the same again.
 
     Raises `InputError` where the model cannot be fitted. Where it cannot carry the loads of some
     rows, `Posterior.refused` is the fit that shows which.
     """
-    search = Search(problem, progress).run()
-    return Posterior(search)
+    from threadpoolctl import threadpool_limits
+
+    key = problem.checksum()
+    if key in _known:
+        return _known[key]
+    with threadpool_limits(1 if len(problem.readings) <= ONE_THREAD else None):
+        found = Posterior(Search(problem, progress).run())
+    _known[key] = found
+    while len(_known) > KEPT:
+        _known.pop(next(iter(_known)))
+    return found
+
+
+#: Posteriors of a process that are kept, by the checksum of their problem: `identify`, `gap` and
+#: `pull` of the same rows compute one.
+KEPT = 3
+_known: dict[str, Posterior] = {}
+#: Readings up to which matrices are so small that several threads only wait for each other.
+ONE_THREAD = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -237,7 +252,7 @@ class Posterior:
         """The likeliest fitted hypothesis of exactly these effects."""
         return next((n for n in self.nodes if n.hypothesis.effects == effects), None)
 
-    def components(self, least: float = LEAST_DRAWN) -> list[Component]:
+    def components(self, least: float = constants.LEAST_DRAWN) -> list[Component]:
         """Hypotheses, each with and without a discrepancy, and their probabilities; sum one."""
         found = []
         for node, weight in zip(self.nodes, self._weights[1], strict=False):
@@ -276,6 +291,11 @@ class Posterior:
         predicted = predict_many(requests)
         return [weighted(o, self.terms, y) for o, y in zip(proposed, predicted, strict=True)]
 
+    def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
+        """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
+        prior = constants.SOIL_DISCREPANCY_PRIOR
+        return Posterior(self.search.beside(fixed, inner, prior, constants.LEAST_DRAWN))
+
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
         """Marginals of the soil parameters that are free within the case's priors, by path.
 
@@ -310,5 +330,5 @@ class Posterior:
 def shape_deviation(node: Explanation) -> float:
     """Squared distance of the shapes from the catalogue's laws, in prior variances."""
     fit = node.fit
-    shapes = [i for i, c in enumerate(fit.coordinates) if c.effect and c.is_shape]
+    shapes = [i for i, c in enumerate(fit.coordinates) if c.is_shape]
     return float(np.sum(fit.x[shapes] ** 2 * fit.precision[shapes]))

@@ -75,14 +75,14 @@ def correction_of_prior(
     """
     if np.isfinite(coordinate.std):  # a normal prior is exact
         return 0.0
-    standin = WEAK_PRECISION if coordinate.effect else UNIFORM_PRECISION
+    standin = WEAK_PRECISION if coordinate.of_candidate else UNIFORM_PRECISION
     own, slope = max(precision - standin, LEAST_SHARE * precision), precision * step
     if held:
         inward = 1.0 if x <= coordinate.lower + AT_BOUND else -1.0
         slope = push if push * inward < 0.0 else 0.0
     low, high = coordinate.lower - x, coordinate.upper - x
     laplace = 0.5 * (LOG_2PI - np.log(precision)) + (0.0 if held else 0.5 * precision * step**2)
-    if not coordinate.effect:
+    if not coordinate.of_candidate:
         return -2.0 * float(_log_integral(slope, own, low, high) - laplace)
     peak, std = np.clip(slope / own, low, high), own**-0.5
     if held and slope:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -64,6 +66,13 @@ class InferenceProblem:
     readings: Readings
     effects: Mapping[str, type[Effect]]
     calibration: Mapping[str, float]
+
+    def checksum(self) -> str:
+        """A checksum, within this process, of all that the posterior depends on."""
+        readings = replace(self.readings, notes=(), excluded_channels=())
+        effects = sorted((name, id(effect)) for name, effect in self.effects.items())
+        parts = (self.case, self.soil, readings, effects, self.calibration)
+        return hashlib.sha256(repr(_as_fields(parts)).encode()).hexdigest()
 
     @cached_property
     def penalties(self) -> dict[str, float]:
@@ -138,6 +147,19 @@ class InferenceProblem:
             for name, effect in self.effects.items()
             if not any(exclude_each_other(effect, other) for other in present)
         }
+
+
+def _as_fields(value: Any) -> Any:
+    """A value by its type and fields, whose text tells any two apart."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tolist()
+    if is_dataclass(value) and not isinstance(value, type):
+        return id(type(value)), [_as_fields(getattr(value, f.name)) for f in fields(value)]
+    if isinstance(value, Mapping):
+        return sorted((str(key), _as_fields(own)) for key, own in value.items())
+    if isinstance(value, (list, tuple)):
+        return [_as_fields(own) for own in value]
+    return repr(value)
 
 
 def effect_penalties(effects: Mapping[str, type[Effect]]) -> dict[str, float]:

@@ -29,6 +29,7 @@ from soilml.inference.evidence import linear_model
 from soilml.inference.explanation import Explanation, Prediction, StartedFit
 from soilml.inference.gaussian_terms import (
     DISCREPANCY,
+    FIRST_AMPLITUDE,
     SCATTER,
     GaussianTerms,
     Hyperparameters,
@@ -42,12 +43,6 @@ Booleans = NDArray[np.bool_]
 
 #: Starts of the fit of the soil, as fractions of each prior, besides the case's own values.
 SOIL_STARTS = (0.5, 0.25)
-#: Objective within which of the best first fit of the soil others are optima to keep.
-OTHER_OPTIMUM = 50.0
-#: Nodes from which additions are predicted, the likeliest first.
-EXTENDED = 6
-#: Evidence within which fits without a discrepancy, which may hide their effects, are kept.
-NEAR_HIDDEN = 40.0
 #: Share of the distance from the middle of its prior at which a soil parameter starts again: one at
 #: a bound would stay there.
 INWARD = 0.8
@@ -71,6 +66,7 @@ class Search:
     predicted: dict[Hypothesis, Prediction] = field(default_factory=dict)
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
+    discrepancy_prior: float = constants.DISCREPANCY_PRIOR
     _tried: set[Hypothesis] = field(default_factory=set)
 
     def run(self) -> Search:
@@ -120,7 +116,7 @@ class Search:
         self.terms = gaussian_terms(
             readings, problem.case, scatter_columns(best.fitted(), readings)
         )
-        kept = [f for f in carried if f.objective < best.objective + OTHER_OPTIMUM]
+        kept = [f for f in carried if f.objective < best.objective + constants.OTHER_OPTIMUM]
         first = self.terms.first()
         jobs = [
             StartedFit(SOIL_ALONE, f.start_values(), first, none, f.linearisation) for f in kept
@@ -174,7 +170,34 @@ class Search:
                 jobs.append(StartedFit(h, start, own.at, soil.outliers))
             if len(jobs) == constants.HIDDEN:
                 break
-        self._settle(jobs, float("inf"), NEAR_HIDDEN)
+        self._settle(jobs, float("inf"), constants.NEAR_HIDDEN)
+
+    def beside(self, fixed: Floats, inner: Sequence[Floats], prior: float, least: float) -> Search:
+        """The hypotheses above a probability, fitted beside further Gaussian terms.
+
+        fixed (m, k): Columns of unit variance.
+        inner: Columns (m, q) of discrepancies, each of which has an amplitude of its own.
+        prior: Prior probability that a discrepancy is present.
+        least: Probability below which a hypothesis is left out.
+        """
+        known, first = self.terms, self.terms.channels
+        terms = gaussian_terms(
+            known.readings, self.problem.case, known.scatter_change, fixed, inner
+        )
+        found = Search(self.problem, discrepancy_prior=prior)
+        found.terms = terms
+
+        def at(own: Hyperparameters) -> Hyperparameters:
+            return replace(own, log=np.insert(own.log, first, np.full(len(inner), FIRST_AMPLITUDE)))
+
+        worst = self.lowest - 2.0 * float(np.log(least))
+        jobs = [
+            StartedFit(h, n.fit.start_values(), at(n.at), n.outliers, n.fit.linearisation)
+            for h, n in self.nodes.items()
+            if n.value < worst or h == SOIL_ALONE
+        ]
+        found._settle(jobs, float("inf"))
+        return found
 
     # ---- fits
 
@@ -189,7 +212,7 @@ class Search:
             case = self.problem.case_of(job.hypothesis)
             own = LeastSquaresProblem(case, coordinates, self.problem.readings, whiten)
             first = [job.start.get(c.path, self._first_size(c)) for c in coordinates]
-            zero = [0.0 if c.effect else job.start.get(c.path, 0.5) for c in coordinates]
+            zero = [0.0 if c.of_candidate else job.start.get(c.path, 0.5) for c in coordinates]
             known = job.near
             if known is not None and len(known.x) != len(coordinates):
                 known = None
@@ -198,7 +221,7 @@ class Search:
 
     def _first_size(self, coordinate: Coordinate) -> float:
         """The case's own value of an effect's size, else a size off zero; shapes start at zero."""
-        if not coordinate.effect:
+        if not coordinate.of_candidate:
             return 0.5
         if coordinate.is_shape:
             return 0.0
@@ -215,8 +238,10 @@ class Search:
         beside, without = (
             linear.evidence(linear.best(replace(at, present=present))) for present in (True, False)
         )
-        node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
-        prior = constants.DISCREPANCY_PRIOR
+        prior = self.discrepancy_prior
+        node = Explanation(
+            hypothesis, fit, linear, beside, without, 0.0, outliers, discrepancy_prior=prior
+        )
         log = np.logaddexp(
             np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
         )
@@ -290,7 +315,7 @@ class Search:
         """The fits of the next round; in the first one the best single effects in any case."""
         lowest = self.lowest
         near = sorted(self.nodes.values(), key=lambda node: node.value)
-        near = [node for node in near if node.value < lowest + constants.NEAR][:EXTENDED]
+        near = [node for node in near if node.value < lowest + constants.NEAR][: constants.EXTENDED]
         for node in {id(n): n for n in (*near, self.nodes[SOIL_ALONE])}.values():
             if node.extended:
                 continue

@@ -37,6 +37,8 @@ TABLE_VALUES = Bound(160_000_000, "values", _SPLIT)
 ESTIMATES = Bound(2_000_000, "rows to estimate", "thin it, or choose some with --where")
 #: Numbers of a log: 320 MB, some times over while it is resampled.
 LOG_VALUES = Bound(40_000_000, "values", "import it in parts")
+#: Numbers that are kept of a log that is read in blocks; beyond, one sample in some is read.
+KEPT_VALUES = 20_000_000
 #: Characters of a name; every row of a column takes the memory of the longest.
 MOST_TEXT = 256
 #: Bytes of a column of text in memory, 4 for each character: ten million names of 13 characters.

@@ -9,7 +9,7 @@ import datetime
 import posixpath
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 from xml.etree import ElementTree
 
 from soilml.errors import TableError
-from soilml.io.spreadsheet_size import check_spreadsheet_size
+from soilml.io.bounds import SHEET_BYTES, SHEET_CELLS, TEXT_BYTES
 from soilml.optional_imports import need
 
 ENDINGS = (".xlsx", ".xlsm")
@@ -25,6 +25,7 @@ _SHEET = re.compile(r"(.+\.xls[xm])#([^#]+)", re.IGNORECASE | re.DOTALL)
 _SHOWN = 12  # Most sheets that a message names
 #: A cell in the XML of a sheet that has some attribute, and the place that it states.
 _CELL = rb"""<(?:\w+:)?c(?=\s)%s[^>]*?\sr=["']([A-Z]{1,3})(\d{1,7})["'][^>]*>"""
+_SHARED = re.compile(rb"""<(?:\w+:)?c(?=\s)[^>]*\st=["']s["']""")  # A cell whose text is shared
 _ANY_CELL = re.compile(rb"<(?:\w+:)?c[\s/>]")
 _PLACED = re.compile(_CELL % b"")
 _ERROR = re.compile(
@@ -104,17 +105,43 @@ def sheet_rows(path: Path) -> list[list[str]]:
 @contextmanager
 def _opened(file: Path) -> Iterator[_Book]:
     """A spreadsheet, closed at the end; what fails within is a damaged part of it."""
-    check_spreadsheet_size(file)
     need("python_calamine", "", "logs", what=f"{file}: reading spreadsheets")
     from python_calamine import CalamineWorkbook
 
     try:
-        with zipfile.ZipFile(file) as packed, CalamineWorkbook.from_path(file) as cells_of:
-            yield _Book(file, packed, cells_of, _parts(packed), _percent_styles(packed))
+        with zipfile.ZipFile(file) as packed:
+            # a part is read to its declared size and no further
+            SHEET_BYTES.check(file, sum(part.file_size for part in packed.infolist()))
+            parts = _parts(packed)
+            _check_size(file, packed, parts.values())
+            with CalamineWorkbook.from_path(file) as cells_of:
+                yield _Book(file, packed, cells_of, parts, _percent_styles(packed))
     except (OSError, TableError):
         raise
+    except zipfile.BadZipFile:
+        raise TableError(
+            f"{file} is no .xlsx file: it is damaged, has a password, or is of the older kind .xls;"
+            " open it in a spreadsheet program and save it as .xlsx or CSV"
+        ) from None
     except Exception as error:  # of many kinds, by the part that is damaged
         _damaged(file, error)
+
+
+def _check_size(file: Path, packed: zipfile.ZipFile, sheets: Iterable[str]) -> None:
+    """Raise `TableError` for a sheet that takes more memory than its XML.
+
+    Calamine fills all cells between A1 and the last one, and copies a shared text into each cell
+    that has it: some kB can stand for many GB.
+    """
+    names = [name for name in packed.namelist() if "sharedstrings" in name.lower()]
+    texts = [text for name in names for text in packed.read(name).split(b"</")]
+    longest = max(map(len, texts), default=0)
+    for sheet in sheets:
+        xml = packed.read(sheet)
+        places = [_place(found) for found in _PLACED.finditer(xml)]
+        rows, columns = (1 + max((p[i] for p in places), default=0) for i in (0, 1))
+        SHEET_CELLS.check(file, rows * columns)
+        TEXT_BYTES.check(file, longest * len(_SHARED.findall(xml)))
 
 
 def _damaged(file: Path, error: Exception) -> NoReturn:

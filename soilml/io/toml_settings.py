@@ -79,7 +79,9 @@ class Settings:
     def table(self, key: str) -> Settings:
         """The table [key]; an empty one where there is none."""
         content = self.take(key, dict, f"a table [{key}]", {})
-        return Settings(content, f"{self.where} [{key}]", self.files)
+        nested = self.where.endswith("]") and not self.where.endswith("]]")
+        where = f"{self.where[:-1]}.{key}]" if nested else f"{self.where} [{key}]"
+        return Settings(content, where, self.files)
 
     def tables(self, key: str) -> list[Settings]:
         """The tables [[key]], in order."""

@@ -12,21 +12,11 @@ from soilml.arrays import Floats
 from soilml.io.table import Table
 from soilml.log_import.rows import WheelSeries
 from soilml.quantities import Z_90
-from soilml.report.figure_style import (
-    AFTER,
-    SvgImage,
-    new_figure,
-    report_style,
-    svg_image,
-    take_axes,
-)
+from soilml.report.figure_style import AFTER, BEFORE, LOADS, PRIOR, take_axes
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import FigureBase
 
-#: Colours of loads, from light to heavy.
-_LOADS = ("#0d0887", "#9c179e", "#cc4778", "#e0603f", "#d98300")
 #: Panels of a run: title with unit, quantities, and labels.
 _PANELS = (
     ("speed, m/s", ("rim_speed", "speed"), ("rim", "travel")),
@@ -39,10 +29,15 @@ _PANELS = (
 _COLUMNS = {"slip": "slip", "torque": "torque_Nm", "load": "load_N",
             "drawbar_pull": "drawbar_pull_N", "sinkage": "sinkage_m",
             "vibration": "vibration_m_s2"}  # fmt: skip
-_LINES = (AFTER, "#cc7a00")
+_LINES = (AFTER, BEFORE)
 #: Most points of a line; a longer one is drawn by the extremes of its parts.
 _MOST_POINTS = 700
-_WINDOW, _LEFT_OUT, _HEIGHT = "#dbe9f4", "#eeeeee", 74
+_WINDOW, _LEFT_OUT = AFTER, PRIOR
+
+
+def rows_of_panels(table: Table, radius: float) -> int:
+    """How many panels `plot_rows` draws."""
+    return len(panels_over_slip(table, radius))
 
 
 def plot_rows(table: Table, radius: float, ax: Any = None) -> NDArray[Any]:
@@ -87,53 +82,45 @@ def draw_over_slip(axes: Axes, table: Table, panel: PanelOverSlip) -> None:
     slip_std = table["slip_std"] if "slip_std" in table else np.zeros(len(table))
     for k in range(int(groups.max()) + 1):
         rows = groups == k
-        colour = _LOADS[round(k * (len(_LOADS) - 1) / max(1, groups.max()))]
+        colour = LOADS[round(k * (len(LOADS) - 1) / max(1, groups.max()))]
         axes.errorbar(
             table["slip"][rows], (table[key] / unit)[rows],
             Z_90 * np.nan_to_num(std / unit)[rows], Z_90 * np.nan_to_num(slip_std)[rows],
             fmt="o", ms=4, color=colour, elinewidth=1, label=f"{np.median(loads[rows]):.3g} N",
         )  # fmt: skip
-    axes.axhline(0.0, color="#999999", lw=0.8, zorder=0)
+    axes.axhline(0.0, color=PRIOR, lw=0.8, zorder=0)
     axes.set_xlabel("slip")
     axes.set_title(panel.title)
-    axes.legend(fontsize=9, frameon=False, title="load", title_fontsize=9)
+    axes.legend(title="load", title_fontsize=9)
 
 
 def load_groups(loads: Floats) -> NDArray[np.int64]:
     """Group (rows,) of each load: gaps of more than 10 % divide them, into at most five."""
     order = np.argsort(loads)
     gaps = np.diff(np.log(loads[order]))
-    edges = np.sort(np.argsort(-gaps)[: len(_LOADS) - 1])
+    edges = np.sort(np.argsort(-gaps)[: len(LOADS) - 1])
     edges = edges[gaps[edges] > 0.1]
     groups = np.zeros(loads.size, dtype=np.int64)
     groups[order] = np.searchsorted(edges, np.arange(loads.size), side="left")
     return groups
 
 
-def run_figure(series: WheelSeries, table: Table) -> SvgImage:
-    """The channels of a run over time; windows are shaded, with their means and 90 % intervals."""
-    with report_style():
-        canvas = new_figure(_HEIGHT * len(_panels(series)) + 46)
-        draw_run(canvas, series, table)
-        kept = sum(not s.why for s in series.stretches)
-        return svg_image(canvas, f"run {series.run}: {kept} steady windows")
-
-
 def _panels(series: WheelSeries) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
     return [panel for panel in _PANELS if any(_finite(series, name) for name in panel[1])]
 
 
-def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
-    """Draw the panels of a run into a matplotlib figure."""
-    panels = _panels(series)
-    height = _HEIGHT * len(panels) + 46.0
+def run_panels(series: WheelSeries) -> int:
+    """How many panels the picture of a run has."""
+    return len(_panels(series))
+
+
+def draw_run(series: WheelSeries, table: Table, panels: Any) -> None:
+    """Draw the channels of a run over time into axes, one for each of `run_panels`."""
     rows = table.rows(table["run"] == series.run)
-    for k, (title, names, labels) in enumerate(panels):
-        top = height - 16 - _HEIGHT * k
-        axes = canvas.add_axes((0.13, (top - _HEIGHT + 18) / height, 0.85, (_HEIGHT - 18) / height))
+    for axes, (title, names, labels) in zip(np.ravel(panels), _panels(series), strict=True):
         for s in series.stretches:
             colour = _LEFT_OUT if s.why else _WINDOW  # windows that touch are told apart
-            axes.axvspan(s.start, s.stop, facecolor=colour, edgecolor="white", lw=1, zorder=0)
+            axes.axvspan(s.start, s.stop, facecolor=colour, alpha=0.35, lw=0, zorder=0)
         scale = 1e3 if title.endswith("mm") else 1.0
         shown: list[Floats] = []
         means: list[Floats] = []
@@ -150,14 +137,12 @@ def draw_run(canvas: FigureBase, series: WheelSeries, table: Table) -> None:
             means.append(_draw_means(axes, rows, name, scale))
         _limits(axes, shown, means)
         axes.set_title(title, fontsize=9.5, pad=3)
-        axes.tick_params(labelsize=8.5, labelbottom=k == len(panels) - 1)
+        axes.grid(visible=False)
+        axes.tick_params(labelsize=8.5)
         axes.set_xlim(series.time[0], series.time[-1])
         axes.locator_params(axis="y", nbins=4)
         if axes.get_legend_handles_labels()[0]:
-            axes.legend(
-                fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.93), ncols=2,
-                handlelength=1.2, borderpad=0.0, borderaxespad=0.0,
-            )  # fmt: skip
+            axes.legend(loc="lower right", ncols=2)
     axes.set_xlabel("time, s", fontsize=9.5)
 
 
@@ -211,14 +196,3 @@ def _thinned(time: Floats, values: Floats) -> tuple[Floats, Floats]:
     places = time[: count * width].reshape(count, width)
     x = np.stack([places[:, 0], places[:, width // 2]], axis=1).reshape(-1)
     return x, np.stack([low, high], axis=1).reshape(-1)
-
-
-def slip_figures(table: Table, radius: float) -> list[SvgImage]:
-    """The rows over slip: T / (W r) or torque, drawbar pull over load, sinkage; 90 % intervals."""
-    found = []
-    with report_style():
-        for panel in panels_over_slip(table, radius):
-            canvas = new_figure(250)
-            draw_over_slip(canvas.add_axes((0.14, 0.17, 0.83, 0.72)), table, panel)
-            found.append(svg_image(canvas, f"{panel.title} of {len(table)} rows over slip"))
-    return found

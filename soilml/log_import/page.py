@@ -1,28 +1,23 @@
-"""The page of an import: rows, what was left out and why, what looks odd, and the errors."""
+"""What an import says: rows, what was left out and why, what looks odd, and shared errors."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Iterator
+from functools import partial
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from soilml.log_import.figures import run_figure, slip_figures
-from soilml.log_import.result import ImportedLog
-from soilml.optional_imports import need
+from soilml.log_import.figures import draw_run, plot_rows, rows_of_panels, run_panels
 from soilml.remarks import Remark
-from soilml.report.numbers import format_number, format_with_std
-from soilml.report.page import Provenance, Report, render
+from soilml.report.numbers import format_quantity
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
+
+if TYPE_CHECKING:
+    from soilml.log_import.result import ImportedLog
 
 #: Most runs of which the page has a picture; the others are in the tables.
 MOST_RUNS = 24
-_SHOWN = (
-    ("slip", "slip", 1.0, ""),
-    ("load_N", "load", 1.0, "N"),
-    ("torque_Nm", "torque", 1.0, "N m"),
-    ("drawbar_pull_N", "drawbar pull", 1.0, "N"),
-    ("sinkage_m", "sinkage", 1e3, "mm"),
-)
+_SHOWN = ("run", "time_s", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
 _CONSTANTS = {
     "gain": "calibration, relative",
     "offset": "calibration, offset",
@@ -35,134 +30,114 @@ _CONSTANTS = {
     "behind_front": "place of the centre of mass",
     "height": "height of the centre of mass",
 }
-_UNITS = {"slip": "", "load": "N", "torque": "N m", "drawbar_pull": "N", "sinkage": "m"}
+_UNITS = {"slip": "1", "load": "N", "torque": "N m", "drawbar_pull": "N", "sinkage": "m"}
 
 
-def page(
-    imported: ImportedLog,
-    progress: Callable[[str, int, int], None] | None = None,
-    origin: Provenance | None = None,
-) -> str:
-    """The report as HTML.
-
-    progress: Called with a stage, the pictures done and their number.
-    origin: The command and its files; by default the call of `import_log` in Python.
-    """
-    for library in ("jinja2", "matplotlib"):
-        need(library, "import")
-    if origin is None:
-        origin = Provenance.of(["import", *imported.sources, "--map", imported.map_name], [])
-    shown = imported.series[:MOST_RUNS]
-    pictures = []
-    for i, series in enumerate(shown):
-        if progress is not None:
-            progress("drawing the report", i, len(shown))
-        pictures.append({"series": series, "image": run_figure(series, imported.table)})
-    if progress is not None:
-        progress("drawing the report", len(shown), len(shown))
-    return render(
-        "import_page.html.j2",
-        "soilml.log_import",
-        "import",
-        page=summary(imported),
-        origin=origin,
-        pictures=pictures,
-        runs=len(imported.series),
-        slip=slip_figures(imported.table, imported.radius),
-        header=[(text, unit) for key, text, _, unit in _SHOWN if key in imported.table],
-        rows=_rows(imported),
-        left_out=_left_out(imported),
-        shared=_shared(imported),
-        bias_text=imported.bias_toml(),
-    )
-
-
-def summary(imported: ImportedLog) -> Report:
-    """What every report says: question, verdict, what looks odd, what to do."""
-    rows, runs = len(imported.table), imported.runs
-    odd = (*imported.implausible, *imported.remarks)
-    if imported.implausible:
-        answer, tone = f"The map looks wrong: {odd[0].text}", "bad-data"
-        step = "Correct the map, and import again."
+def report_of_import(found: ImportedLog) -> Report:
+    """The report of an import."""
+    rows, runs = len(found.table), found.runs
+    odd = (*found.implausible, *found.remarks)
+    if found.implausible:
+        verdict, tone = f"The map looks wrong: {odd[0].text}", "bad"
+        step = "correct the map, and import again"
     elif odd:
-        answer, tone = odd[0].text, "suspected"
-        step = "Look at the remarks and the pictures; then identify the soil from the rows."
+        verdict, tone = odd[0].text, "warn"
+        step = "look at the remarks and the pictures; then identify the soil from the rows"
     else:
-        answer, tone = "Nothing looks odd.", "no-gap"
-        step = "Identify the soil from the rows: soilml identify, or soilml gap."
+        verdict, tone = f"{rows} rows were imported, and nothing looks odd.", "good"
+        step = "identify the soil from the rows: soilml identify, or soilml gap"
+    basis = "each row of the table is a steady run"
+    if found.series:
+        basis = f"{_kept_share(found)} of the time is in steady windows"
     return Report(
         kind="import",
-        title=f"Import report: {imported.map_name}",
-        badge=f"{rows} row{'s'[: rows != 1]}",
-        meaning=f"from {runs} run{'s'[: runs != 1]}; "
-        + (
-            f"{_kept_share(imported)} of the time is in steady windows"
-            if imported.series
-            else "each row of the table is a steady run"
-        ),
-        answer=[answer],
-        tone=tone,
-        warnings=odd[1:],
+        verdict=verdict,
+        tables=[*_tables(found)],
+        pictures=[*_pictures(found)],
+        remarks=odd[1:],
         next_steps=[step],
-        notation=[("±", "one standard deviation, of what is independent from row to row.")],
+        details=[("[bias] for the model file", found.bias_toml().splitlines())],
+        status=f"{rows} row{'s'[: rows != 1]}",
+        tone=tone,
+        title=f"Import report: {found.map_name}",
+        basis=f"{runs} run{'s'[: runs != 1]}; {basis}",
+        notation=[("+-", "one standard deviation, of what is independent from row to row.")],
     )
 
 
-def _rows(imported: ImportedLog) -> list[dict[str, Any]]:
-    table = imported.table
-    rows = []
-    for i in range(len(table)):
-        cells = []
-        for key, _, scale, _ in _SHOWN:
-            if key not in table:
-                continue
-            value = scale * float(table[key][i])
-            std = scale * float(table[f"{key}_std"][i]) if f"{key}_std" in table else np.nan
-            cells.append(format_with_std(value, std) if np.isfinite(value) else "–")
-        rows.append(
-            {
-                "run": str(table["run"][i]),
-                "time": f"{table['time_s'][i]:.1f}" if "time_s" in table else "–",
-                "cells": cells,
-            }
-        )
-    return rows
-
-
-def _left_out(imported: ImportedLog) -> list[dict[str, Any]]:
-    """What is left out by run and reason, the longest first."""
+def _tables(found: ImportedLog) -> Iterator[ReportTable]:
+    table = found.table
+    names = [n for n in _SHOWN if n in table]
+    columns = {n: table[n] for own in names for n in (own, f"{own}_std") if n in table}
+    yield ReportTable.of(
+        "Rows", columns, "Means of the steady windows; +- knows the autocorrelation."
+    )
     seconds: dict[tuple[str, Remark | None], list[tuple[float, float]]] = {}
-    for run, s in imported.left_out():
+    for run, s in found.left_out():
         seconds.setdefault((run, s.why), []).append((s.start, s.stop))
-    entries = [
-        {
-            "run": run,
-            "why": why,
-            "seconds": f"{sum(b - a for a, b in spans):.1f}",
-            "spans": ", ".join(f"{a:.1f}–{b:.1f}" for a, b in spans[:4])
-            + (", …" if len(spans) > 4 else ""),
-        }
-        for (run, why), spans in seconds.items()
-    ]
-    return sorted(entries, key=lambda e: -float(e["seconds"]))
+    if seconds:
+        entries = sorted(seconds.items(), key=lambda e: -sum(b - a for a, b in e[1]))
+        spans = [", ".join(f"{a:.1f} to {b:.1f}" for a, b in own[:4]) for _, own in entries]
+        yield ReportTable(
+            "Left out",
+            [
+                Column("run", [run for (run, _), _ in entries]),
+                Column("seconds", [sum(b - a for a, b in own) for _, own in entries], digits=3),
+                Column("where, s", spans),
+                Column("why", [str(why) for (_, why), _ in entries]),
+            ],
+        )
+    if found.shared:
+        shared = sorted(found.shared, key=lambda p: (p.quantity, -p.rms))
+        yield ReportTable(
+            "Errors that all rows share",
+            [
+                Column("uncertain", [_constant(part.constant) for part in shared]),
+                Column("changes the", [part.quantity.replace("_", " ") for part in shared]),
+                Column(
+                    "rms", [p.rms for p in shared], [_UNITS[p.quantity] for p in shared], digits=2
+                ),
+            ],
+            "From the uncertainties of the map. Averaging more rows does not lessen them.",
+        )
 
 
-def _shared(imported: ImportedLog) -> list[dict[str, str]]:
-    found = []
-    for part in sorted(imported.shared, key=lambda p: (p.quantity, -p.rms)):
-        owner, _, name = part.constant.rpartition(".")
-        text = _CONSTANTS.get(name, part.constant)
-        if part.constant == "radius":
-            text = "radius of the wheel"
-        elif owner and owner != "vehicle":
-            text = f"{text} of [{owner}]"
-        quantity = part.quantity.replace("_", " ")
-        size = f"{format_number(part.rms, 2)} {_UNITS[part.quantity]}".strip()
-        found.append({"constant": text, "quantity": quantity, "size": size})
-    return found
+def _constant(name: str) -> str:
+    owner, _, own = name.rpartition(".")
+    if name == "radius":
+        return "radius of the wheel"
+    text = _CONSTANTS.get(own, name)
+    return f"{text} of [{owner}]" if owner and owner != "vehicle" else text
 
 
-def _kept_share(imported: ImportedLog) -> str:
-    total = sum(float(s.time[-1] - s.time[0]) for s in imported.series)
-    kept = sum(w.stop - w.start for s in imported.series for w in s.stretches if not w.why)
-    return f"{100.0 * kept / total:.0f} %" if total else "0 %"
+def _pictures(found: ImportedLog) -> Iterator[Picture]:
+    count = rows_of_panels(found.table, found.radius)
+    yield Picture(
+        "The rows over slip",
+        partial(plot_rows, found.table, found.radius),
+        1,
+        count,
+        (5.0 * count, 3.6),
+        f"{len(found.table)} rows over slip",
+        "Bars are 90 % intervals of each row, from its scatter. Errors that all rows share come in "
+        "addition.",
+    )
+    for series in found.series[:MOST_RUNS]:
+        panels = run_panels(series)
+        notes = "; ".join(note.text for note in series.notes)
+        yield Picture(
+            f"Run {series.run}",
+            partial(draw_run, series, found.table),
+            panels,
+            1,
+            (6.4, 1.05 * panels + 0.6),
+            f"run {series.run}: {sum(not s.why for s in series.stretches)} steady windows",
+            f"Blue: steady windows, each of which became a row; marks: means with 90 % intervals. "
+            f"Grey: left out. {notes}".rstrip(),
+        )
+
+
+def _kept_share(found: ImportedLog) -> str:
+    total = sum(float(s.time[-1] - s.time[0]) for s in found.series)
+    kept = sum(w.stop - w.start for s in found.series for w in s.stretches if not w.why)
+    return format_quantity(kept / total if total else 0.0, "share", digits=2)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.config.measurement_noise import Noise
 from soilml.io.table import Table
@@ -14,10 +13,14 @@ from soilml.log_import.channels.shared_errors import SharedError
 from soilml.log_import.rows import WheelSeries
 from soilml.log_import.windows.steady import Stretch
 from soilml.remarks import Remark
+from soilml.results import Result
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 
-@dataclass(frozen=True)
-class ImportedLog:
+@dataclass(frozen=True, repr=False)
+class ImportedLog(Result):
     """The result of an import.
 
     Attributes
@@ -65,23 +68,22 @@ class ImportedLog:
             )
         lines = [
             "# Errors that all rows share, from the uncertainties of the map. Add this table to",
-            "# the model file, for `soilml identify`, `gap`, `pull` and `estimate --case`; zero",
+            "# the model file, for `soilml identify`, `gap`, `pull` and `estimate --model`; zero",
             "# declares a sensor to be exact.",
             "[bias]",
         ]
         lines += [f"{key} = {_setting(noise)}" for key, noise in self.bias.items()]
         return "\n".join(lines) + "\n"
 
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw the rows over slip with 90 % intervals, a panel for each measured channel.
+    def report(self) -> Report:
+        """Rows over slip, runs over time, what was left out, and what looks odd."""
+        from soilml.log_import.page import report_of_import
 
-        `ax`: axes of matplotlib, one for each of torque, drawbar pull and sinkage that was
-        measured; a new figure where None. Returns the axes, (channels,). Raises `InputError` for
-        another number of axes.
-        """
-        from soilml.log_import.figures import plot_rows
+        return report_of_import(self)
 
-        return plot_rows(self.table, self.radius, ax)
+    def frame_columns(self) -> dict[str, Any]:
+        """The rows, SI units."""
+        return {"row": np.arange(len(self.table)), **self.table.columns}
 
     def as_json(self) -> dict[str, Any]:
         """The content of the JSON file beside the report."""

@@ -1,4 +1,4 @@
-"""One row of the table for each steady window."""
+"""Rows of the table: steady windows of a run, or lines of a table whose rows are steady runs."""
 
 from __future__ import annotations
 
@@ -10,30 +10,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import gear_of
-from soilml.log_import.channels.inputs import Inputs
+from soilml.log_import.channels.inputs import Inputs, channel_constant, combined, our_slip
 from soilml.log_import.channels.runs import Run
-from soilml.log_import.channels.shared_errors import SharedError, shared_errors
-from soilml.log_import.channels.wheel_quantities import constants_of, wheel_quantities
-from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.channels.wheel_quantities import Conversion
+from soilml.log_import.mapping.channel_map import ChannelMap
+from soilml.log_import.mapping.log_map import WheelMap
 from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
 from soilml.log_import.windows.slip_errors import travel_ratio
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Quantities of a row that are means of samples.
+#: Quantities of a row that are means of samples, and all that have a standard deviation.
 AVERAGED = ("torque", "load", "drawbar_pull", "sinkage")
+_UNCERTAIN = ("slip", *AVERAGED)
 #: How many times the usual wandering, and how large a standard error of slip, a window may have.
 _TIMES, _LEAST_ERROR = 6.0, 0.01
 _FEWEST = 4  # Fewest windows that tell what is usual
 #: Wandering of a pull over the load, and of a slip, s^0.5, that no steady window has.
 _MOST_WANDERING = 0.15
 _NO_SCATTER = 1e-9  # Share of a value below which a scatter is that of rounding
-#: Largest slip of a row: at 1 the wheel spins on the spot, and r omega and v say no more.
+#: Largest slip of a window: at 1 the wheel spins on the spot, and r omega and v say no more.
 _MOST_SLIP = 0.995
+_SIZES = ("wheel_radius", "wheel_width")  # Quantities that logs may have as columns of our names
+_OF_SAMPLES = ("wheel_angle", "position")  # Channels that only samples over time can be
 
 
 @dataclass(frozen=True)
@@ -63,63 +66,30 @@ class WheelSeries:
     notes: tuple[Remark, ...] = ()  # What was repaired, tared or doubted in this run
 
 
-def means_of(rows: Sequence[WindowRow]) -> dict[str, float | Floats]:
-    """Means of the channels (rows,) by role, NaN where a row has none."""
-    roles = dict.fromkeys(role for row in rows for role in row.means)
-    return {role: np.asarray([row.means.get(role, np.nan) for row in rows]) for role in roles}
+def by_name(dictionaries: Sequence[Mapping[str, float]]) -> dict[str, Floats]:
+    """Numbers of rows as columns (rows,), NaN where a row has none."""
+    names = dict.fromkeys(name for one in dictionaries for name in one)
+    return {name: np.asarray([one.get(name, np.nan) for one in dictionaries]) for name in names}
 
 
 def values_of(rows: Sequence[WindowRow]) -> dict[str, Floats]:
     """Quantities and slope (rows,) by name, NaN where a row has none."""
-    names = dict.fromkeys(name for row in rows for name in row.values)
-    found = {n: np.asarray([row.values.get(n, np.nan) for row in rows]) for n in names}
-    if any("slope" in row.means for row in rows):
-        found["slope"] = np.asarray([row.means.get("slope", np.nan) for row in rows])
-    return found
-
-
-def plain_constants(log_map: LogMap, wheel: WheelMap) -> dict[str, float]:
-    """The constants of a wheel by name, without their standard deviations."""
-    return {name: c.value for name, c in constants_of(wheel, log_map.vehicle).items()}
-
-
-def quantities_of(
-    means: Mapping[str, float | Floats],
-    log_map: LogMap,
-    wheel: WheelMap,
-    constants: Mapping[str, float],
-) -> dict[str, Floats]:
-    """The quantities of windows from the means of their channels."""
-    found = wheel_quantities(means, wheel, log_map.vehicle, constants)
-    return {name: np.asarray(values, dtype=np.float64) for name, values in found.items()}
-
-
-def shared_errors_of(
-    log_map: LogMap, wheel: WheelMap, rows: Sequence[WindowRow]
-) -> tuple[dict[str, Noise], list[SharedError]]:
-    """The errors that rows of a wheel share by its constants; see `shared_errors`."""
-    if not rows:
-        return {}, []
-    means = means_of(rows)
-    return shared_errors(
-        lambda constants: quantities_of(means, log_map, wheel, constants),
-        constants_of(wheel, log_map.vehicle),
-    )
+    slopes = [{"slope": row.means["slope"]} if "slope" in row.means else {} for row in rows]
+    return by_name([row.values | slope for row, slope in zip(rows, slopes, strict=True)])
 
 
 def window_row(
-    window: Stretch, inputs: Inputs, series: Mapping[str, Floats], log_map: LogMap, wheel: WheelMap
+    window: Stretch, inputs: Inputs, series: Mapping[str, Floats], run: Run, conversion: Conversion
 ) -> WindowRow:
     """The row of a window; `series` are the quantities over time."""
     rows = np.asarray((inputs.time >= window.start) & (inputs.time <= window.stop))
-    constants = plain_constants(log_map, wheel)
     means = {
         role: float(np.nanmean(values[rows])) if np.isfinite(values[rows]).any() else float("nan")
         for role, values in inputs.values.items()
     }
     means |= inputs.constants
-    slip_error = _exact_speeds(means, inputs, rows, wheel, constants)
-    values = {k: float(v) for k, v in quantities_of(means, log_map, wheel, constants).items()}
+    slip_error = _exact_speeds(means, inputs, rows, conversion)
+    values = {k: float(v) for k, v in conversion.of(means).items()}
     std: dict[str, float] = {}
     if "slip" in inputs.values:
         std["slip"] = mean_error(inputs.values["slip"][rows], inputs.step)[1]
@@ -131,85 +101,138 @@ def window_row(
             mean, error, _ = mean_error(series[name][rows], inputs.step)
             if error > 1e-12 * abs(mean):
                 std[name] = error
-    return WindowRow(window, means, values, std)
+    sizes = {name: float(np.nanmedian(v)) for name, v in _sizes(run).items()}
+    return WindowRow(window, means, values | sizes, std)
+
+
+def _sizes(run: Run) -> dict[str, Floats]:
+    """Radius and width of the wheel (n,), where the log has columns of these names."""
+    held = [recording.columns for recording in run.recordings]
+    return {name: own[column(name)] for own in held for name in _SIZES if column(name) in own}
 
 
 def _exact_speeds(
-    means: dict[str, float],
-    inputs: Inputs,
-    rows: NDArray[np.bool_],
-    wheel: WheelMap,
-    constants: Mapping[str, float],
+    means: dict[str, float], inputs: Inputs, rows: NDArray[np.bool_], conversion: Conversion
 ) -> float | None:
     """Replace the mean speeds by slopes of places where there are some; the error of their ratio.
 
     None where slip does not follow from two measured speeds.
     """
-    rim_role = next(
-        (r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in wheel.channels), None
-    )
-    ground_role = next((r for r in ("position", "ground_speed") if r in wheel.channels), None)
-    if rim_role is None or ground_role is None or "slip" in wheel.channels:
+    channels, constants = conversion.wheel.channels, conversion.values
+    rim_role = next((r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in channels), None)
+    ground_role = next((r for r in ("position", "ground_speed") if r in channels), None)
+    if rim_role is None or ground_role is None or "slip" in channels:
         return None
-    places = inputs.places
-    rim_is_place, ground_is_place = rim_role in places, ground_role in places
-    n = int(rows.sum())
     scale = 1.0
     if rim_role != "rim_speed":
         scale = constants["radius"] / constants[f"{rim_role}.gear_ratio"]
-    rate_key = "rim_speed" if rim_role == "rim_speed" else "wheel_speed"
-    rim = places[rim_role][rows] if rim_is_place else _rate(inputs, rate_key, rows, n)
-    ground = (
-        places[ground_role][rows] if ground_is_place else _rate(inputs, "ground_speed", rows, n)
-    )
-    interval = max(inputs.intervals.get(role, 0.0) for role in (rim_role, ground_role))
+    rim_key = "rim_speed" if rim_role == "rim_speed" else "wheel_speed"
+
+    def samples(role: str, key: str) -> Floats:
+        if role in inputs.places:
+            return inputs.places[role][rows]
+        if key in inputs.values:
+            return inputs.values[key][rows]
+        return np.full(int(rows.sum()), inputs.constants[key])
+
     _, error, rim_rate, ground_rate = travel_ratio(
         step=inputs.step,
-        rim=scale * rim,
-        ground=ground,
-        rim_is_place=rim_is_place,
-        ground_is_place=ground_is_place,
-        interval=interval,
+        rim=scale * samples(rim_role, rim_key),
+        ground=samples(ground_role, "ground_speed"),
+        rim_is_place=rim_role in inputs.places,
+        ground_is_place=ground_role in inputs.places,
+        interval=max(inputs.intervals.get(role, 0.0) for role in (rim_role, ground_role)),
     )
     if np.isfinite(rim_rate) and np.isfinite(ground_rate):
-        means[rate_key], means["ground_speed"] = rim_rate / scale, ground_rate
+        means[rim_key], means["ground_speed"] = rim_rate / scale, ground_rate
     return error
 
 
-def _rate(inputs: Inputs, role: str, rows: NDArray[np.bool_], n: int) -> Floats:
-    if role in inputs.values:
-        return inputs.values[role][rows]
-    return np.full(n, inputs.constants[role])
+def propagated(
+    conversion: Conversion, means: Mapping[str, Any], errors: Mapping[str, Any]
+) -> dict[str, Floats]:
+    """Standard deviations (...) of the quantities by those of the channels (...), by role."""
+    values: dict[str, Floats] = conversion.of(means)
+    std: dict[str, Floats] = {}
+    for role, error in errors.items():
+        if not np.any(error > 0.0):
+            continue
+        moved = conversion.of({**means, role: means[role] + np.nan_to_num(error)})
+        for name in _UNCERTAIN:
+            if name in moved and name in values:
+                change = np.nan_to_num(np.abs(moved[name] - values[name]))
+                std[name] = np.hypot(std.get(name, 0.0), change)
+    return std
+
+
+def table_rows(run: Run, conversion: Conversion) -> list[WindowRow]:
+    """The rows of a table in which each row is a steady run, with their standard deviations.
+
+    These are those of the columns `std` of the map, with its `noise` in addition. Raises
+    `InputError` for a channel that needs samples over time.
+    """
+    count = len(run.recordings[0])
+    means: dict[str, Floats] = {}
+    errors: dict[str, Floats] = {}
+    for role, channel in conversion.wheel.channels.items():
+        if role in _OF_SAMPLES or channel.tare is not None:
+            raise InputError(
+                f"[{role}] needs samples over time, and [runs] each_row says that each row is a "
+                "steady run; needed is a speed or [slip], and no tare"
+            )
+        means[role], errors[role] = _readings(run, channel, count)
+    columns = conversion.of(means) | _sizes(run)
+    std = propagated(conversion, means, errors)
+
+    def at(found: Mapping[str, Floats], i: int) -> dict[str, float]:
+        return {k: float(np.broadcast_to(v, (count,))[i]) for k, v in found.items()}
+
+    return [
+        WindowRow(
+            Stretch(run.times[0][i], run.times[0][i]), at(means, i), at(columns, i),
+            {k: v for k, v in at(std, i).items() if v > 0.0},
+        )
+        for i in range(count)
+    ]  # fmt: skip
+
+
+def _readings(run: Run, channel: ChannelMap, count: int) -> tuple[Floats, Floats]:
+    """Readings (rows,) in the units of soilml, and their standard errors, 0 where not known."""
+    if not channel.columns:
+        return np.full(count, channel_constant(run, channel)), np.zeros(count)
+    given = combined(channel, [run.find(address)[1] for address in channel.columns])
+    error = np.asarray(channel.noise.std(given), dtype=np.float64) * np.ones(count)
+    if channel.std_column:
+        stated = channel.std_scale * np.abs(run.find(channel.std_column)[1])
+        stated = stated * np.abs(given) if channel.std_is_share else stated
+        error = np.hypot(error, np.nan_to_num(stated))
+    if channel.role != "slip":
+        return given, error
+    ours = our_slip(given, channel.definition)
+    return ours, np.abs(our_slip(given + error, channel.definition) - ours)
 
 
 def pool_errors(rows: Sequence[WindowRow]) -> None:
     """Draw the errors of the windows of one wheel to their usual size; see `pooled_errors`."""
     lengths = np.asarray([row.window.stop - row.window.start for row in rows])
-    for name in ("slip", *AVERAGED):
+    for name in _UNCERTAIN:
         errors = np.asarray([row.std.get(name, np.nan) for row in rows])
         for row, error in zip(rows, pooled_errors(errors, lengths), strict=True):
             if name in row.std:
                 row.std[name] = float(error)
 
 
-def add_stated_errors(row: WindowRow, inputs: Inputs, log_map: LogMap, wheel: WheelMap) -> None:
+def add_stated_errors(row: WindowRow, inputs: Inputs, conversion: Conversion) -> None:
     """Add the errors of each row that the map states, and those of the tare, in quadrature."""
-    constants = plain_constants(log_map, wheel)
-    for role, channel in wheel.channels.items():
+    errors = {}
+    for role, channel in conversion.wheel.channels.items():
         key = {"wheel_angle": "wheel_speed", "position": "ground_speed"}.get(role, role)
-        if key not in row.means:
-            continue
-        size = float(channel.noise.std(row.means[key]))
-        size = float(np.hypot(size, np.nan_to_num(inputs.tare_error.get(key, 0.0))))
-        if size == 0.0:
-            continue
-        changed = {**row.means, key: row.means[key] + size}
-        moved = quantities_of(changed, log_map, wheel, constants)
-        for name in ("slip", *AVERAGED):
-            if name in moved and np.isfinite(moved[name]) and name in row.values:
-                change = float(moved[name]) - row.values[name]
-                if change:
-                    row.std[name] = float(np.hypot(row.std.get(name, 0.0), change))
+        if key in row.means:
+            tare = float(np.nan_to_num(inputs.tare_error.get(key, 0.0)))
+            errors[key] = float(np.hypot(channel.noise.std(row.means[key]), tare))
+    for name, change in propagated(conversion, row.means, errors).items():
+        if change and name in row.values:
+            row.std[name] = float(np.hypot(row.std.get(name, 0.0), change))
 
 
 def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, int], Remark]:
@@ -230,28 +253,23 @@ def irregular_windows(runs: Sequence[Sequence[WindowRow]]) -> dict[tuple[int, in
             if known.sum() >= _FEWEST:
                 limits = np.full(len(rows), _TIMES * float(np.median(wandering[known])))
             else:
-                one = [
-                    row.values.get("load", np.nan) if name == "drawbar_pull" else 1.0
-                    for row in rows
-                ]
+                loads = [row.values.get("load", np.nan) for row in rows]
+                one = np.asarray(loads if name == "drawbar_pull" else [1.0] * len(rows))
                 limits = _MOST_WANDERING * np.abs(one)
             for k in np.flatnonzero((wandering > limits) & (errors > least)):
-                words = name.replace("_", " ")
-                usual = float(limits[k]) / _TIMES
-                than = "in the middle of the windows"
+                usual, than = float(limits[k]) / _TIMES, "in the middle of the windows"
                 if known.sum() < _FEWEST:
                     usual, than = float(limits[k]), "windows of any rig at most do"
                 text = (
-                    f"it is irregular: the {words} wanders {wandering[k] / usual:.2g} times as "
-                    f"much as {than}, as if someone had touched the rig"
+                    f"it is irregular: the {name.replace('_', ' ')} wanders "
+                    f"{wandering[k] / usual:.2g} times as much as {than}, as if someone had "
+                    "touched the rig"
                 )
                 found[(i, int(k))] = Remark("irregular", text, (name,))
     return found
 
 
-def unusable(
-    row: WindowRow, dead: Mapping[str, str], needed: Sequence[str] = ("slip", "load")
-) -> Remark | None:
+def unusable(row: WindowRow, dead: Mapping[str, str], needed: Sequence[str]) -> Remark | None:
     """Why a window cannot be a row; None where it can. `dead` are the sensors, with the reason."""
     for name in needed:
         if not np.isfinite(row.values.get(name, np.nan)):
@@ -262,29 +280,17 @@ def unusable(
         return Remark("slip-out-of-range", text, ("slip",))
     if row.values["load"] <= 0.0:
         return Remark("load-out-of-range", f"its load is {row.values['load']:.3g} N", ("load",))
-    measured = [row.values.get(n, np.nan) for n in ("torque", "drawbar_pull", "sinkage")]
-    measured.append(row.values.get("vibration", np.nan))
-    if not np.isfinite(measured).any() and dead:
+    measured = ("torque", "drawbar_pull", "sinkage", "vibration")
+    if dead and not any(np.isfinite(row.values.get(name, np.nan)) for name in measured):
         role, why = next(iter(dead.items()))
         return Remark("dead-sensor", f"the sensor of [{role}] is dead: {why}", (role,))
     return None
 
 
-def without_torque(table: Table) -> list[Remark]:
-    """A remark where no row has a torque, without which there is no estimate on board."""
-    if np.isfinite(table[column("torque")]).any():
-        return []
-    text = (
-        "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, and "
-        "identify a torque, a drawbar pull or a sinkage"
-    )
-    return [Remark("no-torque", text, ("torque",))]
-
-
 def rows_as_table(
-    groups: Sequence[tuple[WheelMap, Run, Sequence[WindowRow]]], log_map: LogMap
+    groups: Sequence[tuple[WheelMap, Run, Sequence[WindowRow]]], source: str, timed: bool = True
 ) -> Table:
-    """The table of all windows, in order of runs, wheels and time."""
+    """The table of all rows, in order of runs, wheels and time; without times where not `timed`."""
     lines: list[dict[str, Any]] = []
     for wheel, run, rows in groups:
         for row in rows:
@@ -293,25 +299,26 @@ def rows_as_table(
                 line["wheel"] = wheel.name
             if gear := gear_of(wheel, run):
                 line["gear"] = gear
-            for name in ("slip", "load", "torque", "drawbar_pull", "sinkage", "vibration"):
+            for name in (*_UNCERTAIN, "vibration"):
                 if name in row.values:
                     line[column(name)] = row.values[name]
                     std = row.std.get(name, float("nan"))
                     # a channel that was set has no scatter: its error is not known, and not zero
                     some = std > _NO_SCATTER * max(abs(row.values[name]), _NO_SCATTER)
                     line[f"{column(name)}_std"] = std if some else float("nan")
-            if "speed" in row.values:
-                line[column("speed")] = row.values["speed"]
-            line[column("time")] = (row.window.start + row.window.stop) / 2.0
+            for name in ("speed", *_SIZES):
+                if name in row.values:
+                    line[column(name)] = row.values[name]
+            if timed:
+                line[column("time")] = (row.window.start + row.window.stop) / 2.0
             if wheel.radius is not None and wheel.leg is None:
                 # a model file of another wheel is refused, since slip is that of this radius
-                line[column("wheel_radius")] = wheel.radius.value
+                line.setdefault(column("wheel_radius"), wheel.radius.value)
             line["source"] = run.recordings[0].file.name
             lines.append(line)
-    names = list(dict.fromkeys(name for line in lines for name in line))
     text = ("run", "wheel", "gear", "source")
     columns: dict[str, Any] = {}
-    for name in names:
+    for name in dict.fromkeys(name for line in lines for name in line):
         if name in text:
             columns[name] = np.asarray([line.get(name, "") for line in lines], dtype=np.str_)
         else:
@@ -319,9 +326,5 @@ def rows_as_table(
     always = ("slip", "torque_Nm")  # blank where not measured
     for name in always if lines else ():
         columns.setdefault(name, np.full(len(lines), np.nan))
-    columns = {
-        name: values
-        for name, values in columns.items()
-        if name in (*always, *text) or np.isfinite(values).any()
-    }
-    return Table(columns, log_map.source)
+    kept = {n for n, v in columns.items() if n in (*always, *text) or np.isfinite(v).any()}
+    return Table({name: values for name, values in columns.items() if name in kept}, source)

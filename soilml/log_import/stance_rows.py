@@ -10,10 +10,9 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.log_import.channels.inputs import Inputs
-from soilml.log_import.mapping.log_map import LogMap, WheelMap
-from soilml.log_import.mapping.wheel_leg import WheelLegMap
-from soilml.log_import.mapping.window_settings import LeaveOut
-from soilml.log_import.rows import AVERAGED, WindowRow, plain_constants, quantities_of
+from soilml.log_import.channels.wheel_quantities import Conversion
+from soilml.log_import.mapping.log_map import LeaveOut, WheelLegMap, WheelMap, WindowSettings
+from soilml.log_import.rows import AVERAGED, WindowRow
 from soilml.log_import.windows.mean_errors import mean_error
 from soilml.log_import.windows.stances import (
     Stance,
@@ -104,8 +103,8 @@ def stance_rows(
     inputs: Inputs,
     angle: Floats,
     series: Mapping[str, Floats],
-    log_map: LogMap,
-    wheel: WheelMap,
+    conversion: Conversion,
+    windows: WindowSettings,
     left_out: tuple[LeaveOut, ...] = (),
 ) -> tuple[list[Stretch], list[WindowRow]]:
     """The stances of a run: what is left out with the reason, and the rows of the others.
@@ -115,11 +114,11 @@ def stance_rows(
     slip advances by 2 l sin(pi / legs). Vibration is the largest acceleration of the hub after
     midstance. References: Comin and Saaj 2017, eqs. 10, 11 and section III-C.
     """
-    leg = wheel.leg
+    wheel, leg = conversion.wheel, conversion.wheel.leg
     assert leg is not None
     shaking = inputs.values.get("vibration")
     noise = float("nan") if shaking is None else noise_of(shaking)
-    low, high = log_map.windows.within
+    low, high = windows.within
     out, rows = [], []
     stances = stances_of(inputs.time, angle, leg.spacing)
     late = 0.0 if _turned(inputs, wheel) is not None else _timing_error(stances)
@@ -135,7 +134,7 @@ def stance_rows(
         if stretch.why:
             out.append(stretch)
             continue
-        row = _row(stance, stretch, inputs, series, angle, log_map, wheel)
+        row = _row(stance, stretch, inputs, series, angle, conversion)
         if late and "slip" in row.std:
             row.std["slip"] = float(np.hypot(row.std["slip"], late / (stance.stop - stance.start)))
         after = (inputs.time >= stance.middle) & (inputs.time <= stance.stop)
@@ -167,11 +166,10 @@ def _row(
     inputs: Inputs,
     series: Mapping[str, Floats],
     angle: Floats,
-    log_map: LogMap,
-    wheel: WheelMap,
+    conversion: Conversion,
 ) -> WindowRow:
     """The row of a stance, without its vibration."""
-    leg = wheel.leg
+    wheel, leg = conversion.wheel, conversion.wheel.leg
     assert leg is not None
     turned = np.interp(stance.middle, inputs.time, np.nan_to_num(angle))
     middle = np.abs(angle - turned) <= leg.half_width
@@ -193,8 +191,7 @@ def _row(
         std["slip"] = advance_error / (chord * leg.length.value)
     else:
         means.pop("wheel_speed", None)
-    constants = plain_constants(log_map, wheel)
-    found = {k: float(v) for k, v in quantities_of(means, log_map, wheel, constants).items()}
+    found = {k: float(v) for k, v in conversion.of(means).items()}
     for name in AVERAGED:
         if name in series and np.isfinite(series[name][middle]).any():
             wide = np.abs(angle - turned) <= _WIDER * leg.half_width

@@ -168,7 +168,7 @@ def _parsed_ours(unit: str) -> Any:
     return registry.Quantity(1.0, text)
 
 
-def factor(unit: str, ours: str, where: str) -> float:
+def factor(unit: str, ours: str, where: str = "") -> float:
     """What a number in `unit` is multiplied by to be in `ours`, the unit of soilml.
 
     Raises `InputError`, beginning with `where`, for a text that is not a unit and for a unit of
@@ -176,12 +176,13 @@ def factor(unit: str, ours: str, where: str) -> float:
     """
     if unit == "":
         return 1.0
+    where = f"{where}: " if where else ""
     if ours == "Hz" and spelling(unit) in ("Hz", "kHz", "1/s", "s**-1"):
         return 1e3 if spelling(unit) == "kHz" else 1.0
     quantity = _parsed(unit)
     shown = {"1": "a plain number or %"}.get(ours, ours)
     if quantity is None:
-        raise InputError(f"{where}: unit {unit!r} is not known; needed is one that gives {shown}")
+        raise InputError(f"{where}unit {unit!r} is not known; needed is one that gives {shown}")
     kind = dimension(unit)
     if kind == "1" and ours == "1":
         return float(quantity.to("dimensionless").magnitude)
@@ -191,9 +192,7 @@ def factor(unit: str, ours: str, where: str) -> float:
         hint = _OTHER_KIND.get(ours, "") if {kind, ours} == {"N", "kg"} else ""
         if kind in ("count", "count/s"):
             hint = "counts of an encoder need counts_per_turn, in [wheel_angle] or [wheel_speed]"
-        raise InputError(
-            f"{where}: unit {unit!r} does not give {shown}{'; ' + hint if hint else ''}"
-        )
+        raise InputError(f"{where}unit {unit!r} does not give {shown}{'; ' + hint if hint else ''}")
     text = spelling(unit)
     if text in ("Hz", "kHz") and ours == "rad/s":
         return 6.283185307179586 * (1e3 if text == "kHz" else 1.0)

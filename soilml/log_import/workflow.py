@@ -3,58 +3,36 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
+from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import wheels_by_gear
-from soilml.log_import.channels.inputs import Inputs, wheel_inputs
-from soilml.log_import.channels.runs import Run, runs_of
+from soilml.log_import.channels.runs import as_rows, runs_of, runs_of_rows
 from soilml.log_import.channels.shared_errors import largest_errors
-from soilml.log_import.checks.column_units import differing_units, unit_hints
-from soilml.log_import.checks.map_hints import map_hints
-from soilml.log_import.checks.sensors import (
-    dead_sensors,
-    lifted_at_the_end,
-    untared_load,
-    untared_sensors,
-)
 from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns import liveliest
+from soilml.log_import.guesses.columns import liveliest, words_of
 from soilml.log_import.guesses.other_columns import with_other_columns
-from soilml.log_import.mapping.log_map import LogMap, WheelMap, map_from, read_map
+from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import log_files
 from soilml.log_import.recording import Recording
 from soilml.log_import.result import ImportedLog
-from soilml.log_import.row_import import import_rows
-from soilml.log_import.rows import (
-    WheelSeries,
-    WindowRow,
-    add_stated_errors,
-    irregular_windows,
-    plain_constants,
-    pool_errors,
-    quantities_of,
-    rows_as_table,
-    shared_errors_of,
-    unusable,
-    values_of,
-    window_row,
-    without_torque,
-)
-from soilml.log_import.stance_rows import stance_rows, without_rolling
-from soilml.log_import.windows.steady import Stretch, steady_windows
+from soilml.log_import.rows import rows_as_table
+from soilml.log_import.units import dimension
+from soilml.log_import.wheel_rows import Progress, WheelRows
+from soilml.quantities import column
 from soilml.remarks import Remark
 
 PathLike = str | os.PathLike[str]
 _LOOKED = 8  # Runs among which a lively one is looked for
-Progress = Callable[[str, int, int], None]
+_MOST_LEFT = 5  # Most rows of tables of which is said why they are left out
+#: Words of columns with the size of the wheel of each row.
+_SIZES = {"radius", "diameter", "durchmesser", "radio", "rayon", "raggio", "dia", "diam", "width"}
 
 
 def import_log(
@@ -94,57 +72,80 @@ def import_log(
     MissingLibraryError
         Where a reader's library is not installed.
     """
-    tell = progress or (lambda stage, done, total: None)
+    said = progress or silent
     files = log_files(logs)
-    found = _as_map(log_map)
-    recordings = []
+    if isinstance(log_map, LogMap):
+        found = log_map
+    else:
+        found = map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
+    return import_recordings(read_logs(files, said), found, accept, said)
+
+
+def read_logs(files: Sequence[Path], progress: Progress) -> list[list[Recording]]:
+    """The recordings of each log; the progress counts bytes."""
+    sizes = [file.stat().st_size if file.is_file() else 0 for file in files]
+    total, recordings = sum(sizes), []
     for i, file in enumerate(files):
-        tell("reading logs", i, len(files))
-        recordings.append(read_log(Path(file)))
-    tell("reading logs", len(files), len(files))
-    return import_recordings(recordings, found, accept, tell)
+        before = sum(sizes[:i])
+        progress("reading logs", before, total)
+
+        def told(done: int, before: int = before) -> None:
+            progress("reading logs", before + done, total)
+
+        recordings.append(read_log(file, told))
+    progress("reading logs", total, total)
+    return recordings
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Progress that is not shown."""
 
 
 def import_recordings(
     recordings: Sequence[Sequence[Recording]],
     found: LogMap,
     accept: bool = False,
-    tell: Progress = lambda stage, done, total: None,
+    progress: Progress = silent,
 ) -> ImportedLog:
     """What `import_log` gives, of logs that are read already; raises as it does."""
-    if found.each_row:
-        return import_rows(recordings, found, accept)
-    runs = runs_of(recordings, found)
-    parts_of_wheels = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
-    analyses = [
-        _Wheel(found, wheel, [runs[i] for i in own], tell) for wheel, own in parts_of_wheels
-    ]
+    steady = found.runs.each_row
+    runs = runs_of_rows(recordings, found) if steady else runs_of(recordings, found)
+    parts = [part for w in found.wheels for part in wheels_by_gear(found, w, runs)]
+    wheels = [WheelRows(found, wheel, [runs[i] for i in own], progress) for wheel, own in parts]
     # by run: its wheels, each in the analysis that has its gear, and the run's place there
     by_run = [
-        (run, analysis, own.index(i))
+        (run, wheel, own.index(i))
         for i, run in enumerate(runs)
-        for analysis, (_, own) in zip(analyses, parts_of_wheels, strict=True)
+        for wheel, (_, own) in zip(wheels, parts, strict=True)
         if i in own
     ]
-    wrong = [hint for analysis in analyses for hint in analysis.map_hints()]
+    wrong = []
+    for wheel in wheels:
+        example = as_rows(recordings[0], "") if steady else liveliest(wheel.runs[:_LOOKED])
+        wrong += with_other_columns(wheel.hints(), wheel.wheel, example, steady)
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
-    table = rows_as_table([(a.wheel, run, a.kept[k]) for run, a, k in by_run], found)
+    groups = [(w.wheel, run, w.kept[k]) for run, w, k in by_run]
+    table = rows_as_table(groups, found.source, timed=not steady)
+    remarks = [remark for wheel in wheels for remark in wheel.remarks()]
     if len(table) == 0:
-        raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(analyses)}")
-    bias, parts = largest_errors(
-        [shared_errors_of(found, a.wheel, [row for own in a.kept for row in own]) for a in analyses]
-    )
-    radii = {a.wheel.radius.value if a.wheel.radius else None for a in analyses}
-    radius = radii.pop() if len(radii) == 1 else None
-    remarks = [remark for analysis in analyses for remark in analysis.remarks()]
-    remarks += without_torque(table)
+        if steady:
+            raise InputError(f"{found.source}: no row can be used: {[*remarks, 'empty'][0]}")
+        raise FitError(f"{found.source}: no steady window can be used: {_most_frequent(wheels)}")
+    if steady:
+        remarks = [*remarks[:_MOST_LEFT], *_without_torque(table), *_without_errors(table)]
+    else:
+        remarks += _without_torque(table)
+    remarks += _several_wheels(table, recordings)
     remarks += table_hints(table.columns, table.columns.get("wheel_radius_m"))
+    bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
+    radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
+    radius = radii.pop() if len(radii) == 1 else None
     return ImportedLog(
         table=table,
         bias=bias,
-        shared=tuple(parts),
-        series=tuple(a.series(k) for _, a, k in by_run),
+        shared=tuple(shared),
+        series=() if steady else tuple(wheel.series(k) for _, wheel, k in by_run),
         remarks=tuple(dict.fromkeys(remarks)),
         implausible=tuple(wrong),
         radius=radius or float("nan"),
@@ -153,129 +154,60 @@ def import_recordings(
     )
 
 
-def _as_map(log_map: PathLike | LogMap | Mapping[str, Any]) -> LogMap:
-    if isinstance(log_map, LogMap):
-        return log_map
-    return map_from(log_map) if isinstance(log_map, Mapping) else read_map(log_map)
-
-
-class _Wheel:
-    """One wheel in all runs."""
-
-    def __init__(
-        self, log_map: LogMap, wheel: WheelMap, runs: Sequence[Run], tell: Progress
-    ) -> None:
-        self.log_map, self.wheel, self.runs = log_map, wheel, runs
-        self.inputs = [wheel_inputs(run, wheel) for run in runs]
-        self.dead = dead_sensors(self.inputs)
-        # the slip of stances may be what is asked for
-        self.needs_slip = wheel.leg is None
-        self.quantities: list[dict[str, Floats]] = []
-        self.stretches: list[list[Stretch]] = []
-        self.rows: list[list[WindowRow]] = []
-        stage = f"finding steady windows{' of ' + wheel.name if wheel.name else ''}"
-        for i, run in enumerate(runs):
-            tell(stage, i, len(runs))
-            self._analyse(run, self.inputs[i], self.dead[i])
-        tell(stage, len(runs), len(runs))
-        self._sort_out()
-
-    def _analyse(self, run: Run, inputs: Inputs, dead: Mapping[str, str]) -> None:
-        for role in dead:
-            inputs.values[role] = np.full(inputs.time.size, np.nan)
-        angle = without_rolling(inputs, self.wheel) if self.wheel.leg is not None else None
-        values: dict[str, float | Floats] = {**inputs.values, **inputs.constants}
-        constants = plain_constants(self.log_map, self.wheel)
-        quantities = quantities_of(values, self.log_map, self.wheel, constants)
-        series = {
-            name: np.broadcast_to(values, inputs.time.shape) for name, values in quantities.items()
-        }
-        left_out = tuple(e for e in self.log_map.left_out if e.run in ("", run.name))
-        if angle is not None:
-            out, rows = stance_rows(inputs, angle, series, self.log_map, self.wheel, left_out)
-            self.quantities.append(series)
-            self.stretches.append(out)
-            self.rows.append(rows)
-            return
-        stretches = steady_windows(inputs.time, series, self.log_map.windows, left_out)
-        rows = [
-            window_row(stretch, inputs, quantities, self.log_map, self.wheel)
-            for stretch in stretches
-            if not stretch.why
-        ]
-        self.quantities.append(series)
-        self.stretches.append([s for s in stretches if s.why])
-        self.rows.append(rows)
-
-    def _sort_out(self) -> None:
-        """Leave out windows without slip or load, and irregular ones."""
-        self.kept: list[list[WindowRow]] = []
-        odd = irregular_windows(self.rows)
-        pool_errors([row for i, rows in enumerate(self.rows) for k, row in enumerate(rows)
-                     if (i, k) not in odd])  # fmt: skip
-        for inputs, rows in zip(self.inputs, self.rows, strict=True):
-            for row in rows:
-                add_stated_errors(row, inputs, self.log_map, self.wheel)
-        for i, rows in enumerate(self.rows):
-            kept = []
-            for k, row in enumerate(rows):
-                needed = ("slip", "load") if self.needs_slip else ("load",)
-                why = unusable(row, self.dead[i], needed) or odd.get((i, k))
-                if why:
-                    self.stretches[i].append(replace(row.window, why=why))
-                else:
-                    kept.append(row)
-            self.kept.append(kept)
-
-    def map_hints(self) -> list[Remark]:
-        """What says that the map is wrong."""
-        # all windows, left out or not
-        windows = values_of([row for rows in self.rows for row in rows])
-        hints = unit_hints(self.log_map, self.wheel, self.runs[0])
-        hints += map_hints(self.log_map, self.wheel, windows)
-        return with_other_columns(hints, self.wheel, liveliest(self.runs[:_LOOKED]))
-
-    def remarks(self) -> list[Remark]:
-        """Dead and untared sensors."""
-        of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
-        found = []
-        for run, dead, inputs in zip(self.runs, self.dead, self.inputs, strict=True):
-            if len(dead) > 2 and len(dead) >= len(inputs.values) - 1:
-                text = f"run {run.name}: no sensor{of} says anything: an empty log?"
-                found.append(Remark("empty-log", text, (run.name,)))
-                continue
-            for role, why in dead.items():
-                text = f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
-                found.append(Remark("dead-sensor", text, (role, run.name)))
-        found += untared_sensors(self.wheel, self.inputs)
-        found += untared_load(self.wheel, self.inputs)
-        found += differing_units(self.wheel, self.runs[0])
-        return found + lifted_at_the_end(self.wheel, [run.name for run in self.runs], self.inputs)
-
-    def series(self, i: int) -> WheelSeries:
-        """Quantities and stretches of one run."""
-        run = self.runs[i]
-        windows = [row.window for row in self.kept[i]]
-        notes = (*run.notes, *self.inputs[i].notes)
-        notes += tuple(
-            Remark("dead-sensor", f"[{role}] is dead: {why}", (role,))
-            for role, why in self.dead[i].items()
-        )
-        return WheelSeries(
-            run=f"{run.name}_{self.wheel.name}" if self.wheel.name else run.name,
-            drive=run.name,
-            time=self.inputs[i].time,
-            quantities=self.quantities[i],
-            stretches=tuple(sorted([*self.stretches[i], *windows], key=lambda s: s.start)),
-            notes=notes,
-        )
-
-
-def _most_frequent(analyses: Sequence[_Wheel]) -> str:
+def _most_frequent(wheels: Sequence[WheelRows]) -> str:
     """The reason for which most of the time was left out."""
-    left_out = [s for analysis in analyses for own in analysis.stretches for s in own]
     seconds: dict[Remark | None, float] = {}
-    for s in left_out:
+    for s in (s for wheel in wheels for own in wheel.stretches for s in own):
         seconds[s.why] = seconds.get(s.why, 0.0) + s.stop - s.start
     most = max(seconds, key=lambda why: seconds[why], default=None)
     return most.text if most else "the logs are empty"
+
+
+def _without_torque(table: Table) -> list[Remark]:
+    """A remark where no row has a torque, without which there is no estimate on board."""
+    if np.isfinite(table[column("torque")]).any():
+        return []
+    text = (
+        "no row has a torque: give the map a [torque] or [motor_current]; estimate needs one, and "
+        "identify a torque, a drawbar pull or a sinkage"
+    )
+    return [Remark("no-torque", text, ("torque",))]
+
+
+def _without_errors(table: Table) -> list[Remark]:
+    """A remark on measured quantities that no column gives a standard error of."""
+    bare = [
+        name for name in ("torque", "drawbar_pull", "sinkage")
+        if column(name) in table and np.isfinite(table[column(name)]).any()
+        and f"{column(name)}_std" not in table
+    ]  # fmt: skip
+    if not bare:
+        return []
+    lines = ", ".join(f"{column(name)} = '5 %'" for name in bare)
+    shown = ", ".join(f"[{name}]" for name in bare)
+    text = (
+        f"no standard errors of {shown}: name their columns (std = 'COLUMN'), write noise = '5 %' "
+        f"there, or declare them in the model file, as [noise] {lines}: estimates are no better "
+        "than this number"
+    )
+    return [Remark("no-standard-errors", text, tuple(bare))]
+
+
+def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[Remark]:
+    """A remark on columns that say that the rows are of wheels of several sizes."""
+    if "gear" in table or "wheel" in table:
+        return []
+    sizes: dict[str, set[float]] = {}
+    for recording in (own for log in logs for own in log):
+        for name, values in recording.columns.items():
+            if {*words_of(name)} & _SIZES and dimension(recording.units.get(name, "m")) == "m":
+                sizes.setdefault(name, set()).update(np.unique(values[np.isfinite(values)]))
+    for name, found in sizes.items():
+        if len(found) > 1:
+            text = (
+                f"the column {name!r} says {', '.join(f'{size:g}' for size in sorted(found)[:4])}: "
+                "rows of several wheels. Give each a gear ([wheel] gear_from, [gears.NAME]), or a "
+                "table of its own; one model of one wheel is no model of them all"
+            )
+            return [Remark("several-wheels", text, ("wheel_radius",))]
+    return []

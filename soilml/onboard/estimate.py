@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,9 @@ from soilml.onboard.narrower_prior import LEAST_MASS, box_ends, within_box
 from soilml.onboard.set_contract import Floats
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, Z_90, column
 from soilml.results import LEVEL, EstimatedValue, Result, ends_at
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 #: A mean closer to an end of the prior than so many standard deviations is at the edge.
 EDGE_STDS = 1.5
@@ -255,20 +258,6 @@ class Estimate(Result):
         """Standard deviation of the prior, (q,)."""
         return self.prior.std
 
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw each quantity with its 90 % interval and the range of its prior, in usual units.
-
-        `ax`: axes of matplotlib, one for each quantity; a new figure where None. Returns the axes,
-        (q,). Raises `InputError` for another number of axes.
-        """
-        from soilml.report.parameter_figure import ParameterIntervals
-
-        q = len(self.names)
-        mean, low, high = (v.reshape(-1, q) for v in (self.mean, self.low, self.high))
-        labels = [str(i) for i in range(1, len(mean) + 1)]
-        ends = self.prior.lower, self.prior.upper
-        return ParameterIntervals(self.names, self.units, labels, mean, low, high, *ends).plot(ax)
-
     def within(self, **box: tuple[float, float]) -> Estimate:
         """The estimate where the soil is known to lie in a box within the prior.
 
@@ -356,15 +345,28 @@ class Estimate(Result):
             return f"The readings do not determine {', '.join(vague)}; they determine the rest."
         return "The readings determine all quantities."
 
-    def summary(self) -> str:
-        """The verdict, then each quantity of a single estimate."""
-        if np.size(self.in_range) != 1:
-            return self.verdict
-        found = [
-            f"{name} = {EstimatedValue(mean, std, unit)} (90 %: {low:.4g} to {high:.4g})"
-            for name, unit, mean, std, low, high in self._rows()
-        ]
-        return "\n".join([self.verdict, *found])
+    def report(self) -> Report:
+        """The verdict, each quantity of a single estimate, and intervals beside the prior."""
+        from soilml.report.parameter_figure import ParameterIntervals
+        from soilml.report.report import Report
+        from soilml.report.tables import ReportTable
+
+        q, columns = len(self.names), self.frame_columns()
+        mean, low, high = (v.reshape(-1, q) for v in (self.mean, self.low, self.high))
+        labels = [str(i) for i in range(1, len(mean) + 1)]
+        ends = self.prior.lower, self.prior.upper
+        drawn = ParameterIntervals(self.names, self.units, labels, mean, low, high, *ends)
+        one = "quantity" in columns
+        if one:
+            columns["parameter"] = columns["quantity"]
+        return Report(
+            kind="estimate",
+            verdict=self.verdict,
+            figures=ReportTable.of_parameters("Soil", columns) if one else None,
+            tables=[] if one else [ReportTable.of("Estimates", columns)],
+            pictures=[drawn.picture()],
+            title="Estimate",
+        )
 
     def _rows(self) -> Iterable[tuple[Any, ...]]:
         q = len(self.names)

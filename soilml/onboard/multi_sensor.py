@@ -103,7 +103,7 @@ def fuse_estimates(estimates: Sequence[Estimate], rule: str | None = None) -> Mu
     known = are_comparable([e.errors for e in estimates])
     if rule == CORRELATED and not known:
         raise InputError(
-            "rule is 'correlated', but the files do not carry their errors on common rows: train "
+            "rule is 'correlated', but the files do not state their errors on common rows: train "
             "them from one data file, or give another rule"
         )
     rule = rule or (CORRELATED if known else PRIOR_ONCE)

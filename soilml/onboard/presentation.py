@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,14 +15,12 @@ from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
-from soilml.report.figure_style import picture
-from soilml.report.page import Report, ReportPicture
+from soilml.report.numbers import shown_unit, significant
 from soilml.report.parameter_figure import ParameterIntervals
-from soilml.report.parameter_lines import parameter_lines, parameter_table
-from soilml.report.terminal import shown_unit, significant
+from soilml.report.report import Report
+from soilml.report.tables import ReportTable
 
-#: Most estimates of a page, whose JSON file has every one, and most that are put in sentences.
-MOST_ESTIMATES, _MOST_SENTENCES = 20_000, 4
+MOST_ESTIMATES = 20_000  # Most estimates of a page, whose JSON file has every one
 #: What the fault detector says of a run.
 DISAGREES = (
     "the rows disagree with the exact model, as one in a hundred sound sets does; the interval "
@@ -193,85 +190,44 @@ def estimate_report(
     remarks: Sequence[Remark],
     estimator: Estimator,
     by: str | None,
-    files: tuple[str, str],
+    title: str = "Estimates",
 ) -> Report:
-    """The page of estimates in columns (n,): model file and table that they are of."""
-    names, units, prior = estimator.names, estimator.units, estimator.prior
-    group = by or "row"
-    values, std, low, high = (
+    """The report of estimates in columns (n,), a row of the table or a group each."""
+    names, prior, group = estimator.names, estimator.prior, by or "row"
+    values, low, high = (
         np.stack([np.asarray(columns[column(n) + part], float) for n in names], axis=1)
-        for part in ("", "_std", "_p05", "_p95")
+        for part in ("", "_p05", "_p95")
     )
     labels = np.asarray(columns[by] if by else np.arange(1, len(values) + 1)).astype(np.str_)
     inside = np.nan_to_num(np.asarray(columns["in_range"], float)) > 0.5
     answered = np.isfinite(values).any(axis=1)
-    lines = {
-        str(labels[i]): parameter_lines(
-            names=names,
-            units=units,
-            values=values[i],
-            std=std[i],
-            low=low[i],
-            high=high[i],
-            left=[float(x) if inside[i] else 1.0 for x in std[i] / prior.std],
-        )
-        for i in np.flatnonzero(answered)
-    }
-    if len(lines) <= _MOST_SENTENCES:
-        answer = [
-            f"{group.capitalize()} {name}: {' '.join(x.sentence for x in own)}"
-            for name, own in lines.items()
-        ]
-    else:
-        answer = [
-            f"{len(lines)} estimates, one for each {group}: "
-            + ", ".join(
-                f"{known} determine {line.name}"
-                for line, known in zip(
-                    next(iter(lines.values())),
-                    np.sum([[x.known for x in own] for own in lines.values()], axis=0),
-                    strict=True,
-                )
-            )
-            + "."
-        ]
     outside = int(np.count_nonzero(answered & ~inside))
-    badge = "in range" if outside == 0 else "out of range" if outside == len(lines) else "mixed"
     drawn = ParameterIntervals(
         names=names,
-        units=units,
-        labels=list(lines),
+        units=estimator.units,
+        labels=labels[answered].tolist(),
         values=values[answered],
         low=low[answered],
         high=high[answered],
         prior_low=prior.lower,
         prior_high=prior.upper,
     )
+    status = "in range" if not outside else "mixed" if inside.any() else "out of range"
     return Report(
         kind="estimate",
-        title=f"Estimates of {Path(files[1]).name} by {Path(files[0]).name}",
-        badge=badge,
-        meaning=f"{len(lines) - outside} of {len(labels)} estimates are in the range of the "
-        "training, and explained",
-        answer=answer,
-        tone="named" if outside == 0 else "suspected",
-        pictures=[
-            ReportPicture(
-                "Estimates and 90 % intervals",
-                picture(drawn.plot, len(names), 1, drawn.size, answer[0]),
-                "Grey: the range of the prior.",
-            )
-        ],
-        tables=[parameter_table(lines, group)],
-        warnings=[remark for remark in remarks if remark.code != NEXT_ROW],
+        verdict=verdict(columns, by, remarks),
+        tables=[ReportTable.of("Estimates", columns)],
+        pictures=[drawn.picture()],
+        remarks=[remark for remark in remarks if remark.code != NEXT_ROW],
         next_steps=[remark.text for remark in remarks if remark.code == NEXT_ROW],
+        status=status,
+        tone="warn" if outside else "good",
+        title=title,
+        basis=f"{int(inside.sum())} of {len(labels)} estimates, one for each {group}, are in the "
+        "range of the training",
         notation=[
-            ("±", "one standard deviation of the error that is expected."),
-            (
-                "90 %",
-                "interval that covers the value with that probability, under model and noise.",
-            ),
-            ("left of prior", "width of the estimate over that of the prior."),
+            ("+-", "one standard deviation of the error that is expected."),
+            ("90 %", "interval that covers the value with that probability, by model and noise."),
         ],
     )
 

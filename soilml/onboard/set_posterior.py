@@ -346,7 +346,7 @@ def check_takes_errors(usual: Mapping[str, float], name: str, std: float) -> Non
     """Raise `InputError` for an error that a file of an earlier version takes no account of."""
     if name == MODEL_ERROR_INPUT and name not in usual and std > 0.0:
         raise InputError(
-            f"{name} is {std:g}, but this file takes its model as right; train it again, with "
+            f"{name} is {std:g}, but this file assumes a perfect model; train it again, with "
             "[set_posterior], to have errors of the model taken into account"
         )
     if not usual and std > 0.0:

@@ -163,8 +163,8 @@ class SlipStream:
     def loads(self, slope: float, roll: float = 0.0) -> Floats:
         """Load of each wheel (k,), N, by pitch and roll, rad; roll is positive where left is high.
 
-        Those of equally stiff wheels under a rigid body, as `soilml slip` has them. Not above zero
-        where a wheel leaves the ground.
+        Those of equally stiff wheels under a rigid body, as `soilml drive slip` has them. Not
+        above zero where a wheel leaves the ground.
         """
         attitude = (np.cos(slope) * np.cos(roll), np.sin(slope), np.cos(slope) * np.sin(roll))
         return np.asarray(self.load_of_attitude @ np.asarray(attitude))

@@ -208,7 +208,7 @@ def channel_remarks(estimator: Estimator, readings: dict[str, Any]) -> list[Rema
     elif size:
         text = f"errors of the model are included, {size:g} times the usual ones"
     else:
-        text = "the model is taken as exact, or its errors as those of the case"
+        text = "a perfect model is assumed, or one with the errors that the case states"
     return [*remarks, Remark("model-errors", text, severity="note")]
 
 

@@ -17,33 +17,37 @@ from importlib import resources
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.errors import FitError
 from soilml.onboard.fusion_rules import FusedEstimate, inverse_variance, pairwise
-from soilml.physics.gears import Wheel
+from soilml.physics.gears import Midstance
 from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import pull_efficiency
-from soilml.physics.soils import soil
-from soilml.systems.wheel_legs.slip_models import (
+from soilml.physics.soils import Soil, soil
+from soilml.systems.wheel_legs import (
+    GROUNDS,
     TORQUE_SLIP,
     VIBRATION_SLIP,
-    SlipModelFit,
-    TorqueSlip,
-    VibrationSlip,
-    fit_torque_slip,
-    fit_vibration_slip,
-)
-from soilml.systems.wheel_legs.soil_errors import LINEAR, SIMPLIFIED, SINKAGE
-from soilml.systems.wheel_legs.stances import (
-    GRAVITY,
-    SLIPS,
     SpringLeg,
-    four_soils,
-    midstance_torques,
     vibration_amplitude,
 )
+from soilml.systems.wheel_legs.stride_relations import (
+    GRAVITY,
+    LINEAR,
+    PRESSURE,
+    SIMPLIFIED,
+    SINKAGE,
+    STIFFNESS,
+)
+from soilml.systems.wheel_legs.strides import HEAVY_AT, HEAVY_WHEEL
 
-WIDTH, SLIP = 0.18, 0.2  # Width (m) and slip of the rover's wheel, neither printed
-WHEEL, AT = Model(Wheel(radius=0.15, width=WIDTH)), Operating(slip=SLIP, load=50.0 * GRAVITY)
+WHEEL = Model(HEAVY_WHEEL)
+#: The Load Testing Foot of table III, all of it ahead of the leg: an arc of radius 14.8 cm that
+#: leaves the leg level. In walks (`geometry.FEET`) its radius is 3.9 cm.
+FOOT = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
+#: Load, N: a third of the printed 3.75 kg, which one foot does not carry on two of the four soils.
+LOAD = 12.0
+SLIPS = np.asarray([0.0, 0.125, 0.25, 0.375, 0.5])  # The commanded slips of the source's tests
 #: Springs to which the vibration-slip models are fitted: N/m, rad, and the friction angle.
 STIFFNESSES = np.linspace(3000.0, 6000.0, 7)
 DROPS = np.deg2rad(np.linspace(4.0, 20.0, 9))
@@ -53,34 +57,64 @@ STD = {
     name: tuple(one.scatter[k] for one in (SIMPLIFIED, LINEAR, SINKAGE))
     for k, name in enumerate(("friction", "stiffness"))
 }
+K_A = {"ssc-1": 0.024, "ssc-2": 0.017, "ssc-3": 0.021, "es-3": 0.022}  # Table I
+SIGMA = np.asarray([ground.normal_stiffness for ground in GROUNDS.values()])  # Pa
 
 
 @cache
-def torque_fit() -> SlipModelFit[TorqueSlip]:
-    """The terramechanics form of table IV, on the four soils."""
-    known = four_soils()
-    return fit_torque_slip(
-        midstance_torques(known),
-        SLIPS,
-        np.asarray(known.soil.friction_angle),
-        known.normal_stiffness,
-        "terramechanics",
+def four_soils() -> Soil:
+    """The soils of table I under `FOOT`: K = K_A sqrt(A_s), A_s the sole; cohesion not below 0."""
+    each = [soil(f"comin2017/{n}", shear_modulus=k * FOOT.area**0.5) for n, k in K_A.items()]
+    names = ("cohesion", "friction_angle", "shear_modulus", "kc", "kphi", "n")
+    return Soil(**{name: np.asarray([getattr(s, name) for s in each]) for name in names})
+
+
+def fit_lines(reading: Floats, slip: Floats) -> tuple[Floats, Floats, Floats]:
+    """Regress slip (slips,) on a reading (slips, soils): intercepts, slopes and R^2, (soils,)."""
+    slips = np.broadcast_to(np.asarray(slip, float)[:, None], reading.shape)
+    x, y = reading - reading.mean(axis=0), slips - slips.mean(axis=0)
+    with np.errstate(invalid="ignore"):  # a reading that is equal at all slips has no slope: NaN
+        slope = (x * y).sum(axis=0) / (x * x).sum(axis=0)
+    if np.isnan(slope).any():
+        raise FitError(f"{int(np.isnan(slope).sum())} of {slope.size} soils have no slip model")
+    left = ((y - slope * x) ** 2).sum(axis=0) / (y * y).sum(axis=0)
+    return slips.mean(axis=0) - slope * reading.mean(axis=0), slope, 1.0 - left
+
+
+def _plane(y: Floats, *terms: Floats) -> tuple[Floats, float]:
+    """Coefficients of y = c + p first + q second, and R^2."""
+    columns = np.column_stack([np.ones_like(y), *terms])
+    coefficients, *_ = np.linalg.lstsq(columns, y, rcond=None)
+    residual = y - columns @ coefficients
+    return np.asarray(coefficients, dtype=np.float64), 1.0 - float(
+        residual @ residual / np.sum((y - y.mean()) ** 2)
     )
 
 
+Fit = dict[str, tuple[Floats, float]]  # Coefficients and R^2 of each part
+
+
 @cache
-def vibrations() -> tuple[Floats, Floats, Floats]:
-    """(vibration in m/s^2 (slips, springs), drop of friction, stiffness) of all springs."""
+def torque_fit() -> Fit:
+    """The terramechanics form of table IV, eqs. 18 and 27, on the four soils: (c, b, a), (c, b)."""
+    known = four_soils()
+    at = Operating(slip=SLIPS[:, None], load=LOAD)
+    a, b, _ = fit_lines(np.asarray(Model(FOOT)(known, at).torque), SLIPS)
+    friction = _plane(np.asarray(known.friction_angle), b, a)
+    return {"friction": friction, "stiffness": _plane(SIGMA / PRESSURE, b)}
+
+
+@cache
+def vibration_fit(planar: bool) -> Fit:
+    """Table V, eqs. 24 and 25, fitted to the rotating spring: (c_I, c_mu, c_K), (a_mu, b_mu)."""
     stiffness, drop = (v.ravel() for v in np.meshgrid(STIFFNESSES, DROPS))
     vibration = vibration_amplitude(SpringLeg(stiffness=stiffness), SLIPS[1:, None], FRICTION, drop)
-    return vibration, drop, stiffness
-
-
-@cache
-def vibration_fit(planar: bool) -> SlipModelFit[VibrationSlip]:
-    """Table V fitted to the rotating spring."""
-    vibration, drop, stiffness = vibrations()
-    return fit_vibration_slip(vibration, SLIPS[1:], drop, stiffness, planar)
+    a, b, _ = fit_lines(vibration, SLIPS[1:])
+    springs = (stiffness / STIFFNESS,) if planar else ()
+    return {
+        "intercept": _plane(a, np.rad2deg(drop), *springs),
+        "slope": _plane(b * GRAVITY, np.rad2deg(drop)),
+    }
 
 
 def fused_slip(torque: str, vibration: str) -> FusedEstimate:
@@ -97,20 +131,19 @@ def fused_soil(name: str) -> FusedEstimate:
 @cache
 def efficiency(name: str) -> float:
     """Pull efficiency (%) of a wheel of the 300 kg rover, one of six, on a soil of table I."""
-    return 100.0 * float(pull_efficiency(WHEEL, soil(f"comin2017/{name}"), AT))
+    return 100.0 * float(pull_efficiency(WHEEL, soil(f"comin2017/{name}"), HEAVY_AT))
 
 
 def constant_intercept() -> float:
     """Mean intercept of the empirical model over the four soils of table I."""
-    known = four_soils()
-    angle = np.asarray(known.soil.friction_angle)
-    a, _ = TORQUE_SLIP["empirical"].line(angle, known.normal_stiffness)
+    a, _ = TORQUE_SLIP["empirical"].line(np.asarray(four_soils().friction_angle), SIGMA)
     return float(a.mean())
 
 
-def _torque(part: str, index: int) -> float:
-    coefficients: tuple[float, float, float] = getattr(torque_fit().law, part)
-    return coefficients[index]
+def _coefficient(fit: Callable[[], Fit], part: str, index: int | None = None) -> float:
+    """A coefficient of a fit, or R^2."""
+    coefficients, r2 = fit()[part]
+    return r2 if index is None else float(coefficients[index])
 
 
 def _weight(torque: str, vibration: str) -> float:
@@ -128,16 +161,6 @@ def _soil_weight(name: str, index: int) -> float:
 
 def _soil_gain(name: str, index: int) -> float:
     return float(fused_soil(name).std) - STD[name][index]
-
-
-def _vibration(planar: bool, name: str) -> float:
-    return float(getattr(vibration_fit(planar).law, name))
-
-
-def _goodness(
-    fit: Callable[[], SlipModelFit[TorqueSlip] | SlipModelFit[VibrationSlip]], part: str
-) -> float:
-    return fit().goodness[part]
 
 
 @cache
@@ -171,7 +194,7 @@ def characterised_efficiency(name: str) -> float:
     angle = 1.0 + fused_error(name, "phi", "friction") / 100.0
     stiffness = 1.0 + fused_error(name, "sigma", "stiffness") / 100.0
     found = replace(known, friction_angle=known.friction_angle * angle, kphi=known.kphi * stiffness)
-    return 100.0 * float(pull_efficiency(WHEEL, found, AT))
+    return 100.0 * float(pull_efficiency(WHEEL, found, HEAVY_AT))
 
 
 def _mean_by_others(torque: str) -> float:
@@ -190,24 +213,25 @@ def _mean_by_others(torque: str) -> float:
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
-    "t4_tt_c_tau": partial(_torque, "friction", 0),
-    "t4_tt_b_tau": partial(_torque, "friction", 1),
-    "t4_tt_a_tau": partial(_torque, "friction", 2),
-    "t4_tt_gof_tau": partial(_goodness, torque_fit, "friction"),
-    "t4_tt_c_sigma": partial(_torque, "stiffness", 0),
-    "t4_tt_b_sigma": partial(_torque, "stiffness", 1),
-    "t4_tt_gof_sigma": partial(_goodness, torque_fit, "stiffness"),
+    **{
+        f"t4_tt_{letter}_{what}": partial(_coefficient, torque_fit, part, k)
+        for what, part, letters in (("tau", "friction", "cba"), ("sigma", "stiffness", "cb"))
+        for k, letter in enumerate(letters)
+    },
+    "t4_tt_gof_tau": partial(_coefficient, torque_fit, "friction"),
+    "t4_tt_gof_sigma": partial(_coefficient, torque_fit, "stiffness"),
     "eq19_intercept": constant_intercept,
-    "t5_p_gof": partial(_goodness, partial(vibration_fit, True), "intercept"),
-    "t5_l_gof": partial(_goodness, partial(vibration_fit, False), "intercept"),
-    "t5_gof_b": partial(_goodness, partial(vibration_fit, True), "slope"),
-    "t5_a_mu": partial(_vibration, True, "a_mu"),
-    "t5_b_mu": partial(_vibration, True, "b_mu"),
+    **{
+        f"t5_{letter}_{name}": partial(_coefficient, partial(vibration_fit, planar), "intercept", k)
+        for letter, planar in (("p", True), ("l", False))
+        for name, k in (("c_i", 0), ("c_mu", 1), ("c_k", 2), ("gof", None))
+        if planar or k != 2
+    },
+    **{
+        f"t5_{name}": partial(_coefficient, partial(vibration_fit, True), "slope", k)
+        for name, k in (("a_mu", 0), ("b_mu", 1), ("gof_b", None))
+    },
 }
-for _name, _key in (("c_i", "c_i"), ("c_mu", "c_mu"), ("c_k", "c_k")):
-    COMPUTED[f"t5_p_{_key}"] = partial(_vibration, True, _name)
-for _name in ("c_i", "c_mu"):
-    COMPUTED[f"t5_l_{_name}"] = partial(_vibration, False, _name)
 for _t, _torque_name in zip("tes", TORQUE_SLIP, strict=True):
     for _v, _vibration_name in zip("pl", VIBRATION_SLIP, strict=True):
         _key = f"t6_{_t}{_v}"

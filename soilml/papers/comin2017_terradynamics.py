@@ -9,59 +9,86 @@ from typing import Any
 
 import numpy as np
 
-from soilml.arrays import Array
-from soilml.systems.wheel_legs.gait_metrics import (
-    FeetComparison,
-    GaitMetrics,
-    compare_feet,
-    compare_legs,
-    decreasing_until,
-)
-from soilml.systems.wheel_legs.geometry import WheelLeg
-from soilml.systems.wheel_legs.resistive_force import LinearGround, stress_gains
-from soilml.systems.wheel_legs.sinkage_fit import (
-    SimulatedSinkage,
-    SinkageFit,
-    fit_simulated_sinkage,
-    simulate_sinkage,
-)
+from soilml.arrays import Array, Floats
+from soilml.systems.wheel_legs.gaits import gait_metrics, walk_tables
+from soilml.systems.wheel_legs.geometry import FEET, MAX_LEGS, WheelLeg, wheel_leg
+from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround, stress_gains
+from soilml.systems.wheel_legs.walk import walk
 
-#: Ground for the comparison of numbers of legs: the middle of the paper's range; not printed.
-MIDDLE = LinearGround(stiffness=0.7e6)
-
-
+#: Stiffnesses over which the paper compares feet, alpha_z from 0.4 to 1.0 N/cm^3, and the ground
+#: for the comparison of numbers of legs, the middle of that range, which is not printed; N/m^3.
+STIFFNESSES, MIDDLE = (0.4e6, 0.6e6, 0.8e6, 1.0e6), 0.7e6
 #: What the paper leaves open of legs and body: as assumed, and other readings of it.
 OPEN_CHOICES: dict[str, dict[str, Any]] = {
     "as assumed": {},
     "legs bent forwards": {"leg": replace(WheelLeg().leg, arc=-WheelLeg().leg.arc)},
     "body 5 cm below the hub": {"clearance": 0.05},
 }
+#: Stiffness of a soil poured loose, raked and vibrated, relative to the raked state; the paper
+#: prints the raked state only, the other two are assumed.
+STATES = (0.5, 1.0, 2.0)
 
 
 @cache
-def _legs(choice: str = "as assumed") -> GaitMetrics:
-    return compare_legs(MIDDLE, **OPEN_CHOICES[choice])
+def _legs(name: str, choice: str = "as assumed") -> Array:
+    """A metric of 1 to 6 legs without feet, fig. 5, (6,)."""
+    counts, under = range(1, MAX_LEGS + 1), {"": LinearGround(stiffness=MIDDLE)}
+    return np.asarray(_walks(("none",), tuple(counts), under, choice)[name])
 
 
 @cache
-def _feet(choice: str = "as assumed") -> FeetComparison:
-    return compare_feet(**OPEN_CHOICES[choice])
+def _feet(name: str, choice: str = "as assumed") -> Array:
+    """A metric of the four feet over the stiffnesses, fig. 6, (feet, stiffnesses)."""
+    under = {f"{alpha:g}": LinearGround(stiffness=alpha) for alpha in STIFFNESSES}
+    found = _walks(tuple(FEET), (5,), under, choice)[name]
+    return np.asarray(found).reshape(len(FEET), len(STIFFNESSES))
+
+
+def _walks(feet: Any, legs: Any, under: dict[str, LinearGround], choice: str) -> Any:
+    return walk_tables(feet, legs, under, (float("nan"),), **OPEN_CHOICES[choice]).columns
+
+
+def _lower(values: Array) -> int:
+    """Number of leading entries each of which is lower than the previous one."""
+    falls = np.append(values[1:] < values[:-1], False)
+    return 1 + int(np.argmin(falls))
 
 
 @cache
-def _soils() -> SimulatedSinkage:
-    return simulate_sinkage()
+def _sinkage_fit() -> dict[str, float]:
+    """s_sigma, s_I and s_Z of eq. 29 and their R^2: walks on the four soils in three states.
+
+    The normal stress on the plates is proportional to the depth (eq. 4), without sigma_0.
+    """
+    grounds = [
+        replace(ground, stiffness=share * ground.stiffness, offset=share * ground.offset)
+        for ground in GROUNDS.values()
+        for share in STATES
+    ]
+    walked = gait_metrics(walk(wheel_leg(), [replace(ground, offset=0.0) for ground in grounds]))
+    sunk = walked["sinkage_midstance_m"]
+    read = np.isfinite(sunk)
+    z = sunk[read]
+    sigma = np.asarray([ground.normal_stiffness for ground in grounds])[read]
+    angle = np.asarray([ground.friction_angle for ground in grounds])[read]
+    s_z, s_i = np.polyfit(z, angle, 1)
+    s_sigma = float(np.sum(sigma / z) / np.sum(1.0 / z**2))
+    return {
+        "s_sigma": s_sigma / 100.0,
+        "s_sigma_r2": 1.0 - _left(sigma, s_sigma / z),
+        "s_i": float(s_i),
+        "s_z": float(s_z) / 100.0,
+        "s_phi_r2": 1.0 - _left(angle, s_i + s_z * z),
+    }
 
 
-@cache
-def _fit() -> SinkageFit:
-    return fit_simulated_sinkage(_soils())
+def _left(values: Floats, fit: Floats) -> float:
+    return float(np.sum((values - fit) ** 2) / np.sum((values - values.mean()) ** 2))
 
 
 def _rank(name: str, foot: str, choice: str = "as assumed") -> float:
-    """Rank of a foot by `sinkage` or `slip`, 1 for the lowest; NaN if grounds disagree."""
-    feet = _feet(choice)
-    ranks = 1 + np.argsort(np.argsort(getattr(feet, name), axis=0), axis=0)[feet.feet.index(foot)]
+    """Rank of a foot by a metric, 1 for the lowest; NaN if grounds disagree."""
+    ranks = 1 + np.argsort(np.argsort(_feet(name, choice), axis=0), axis=0)[list(FEET).index(foot)]
     return float(ranks[0]) if np.ptp(ranks) == 0 else float("nan")
 
 
@@ -70,57 +97,61 @@ def _slope_rank(name: str, foot: str, choice: str = "as assumed", errors: float 
 
     `errors` moves its slope by so many standard errors of the line.
     """
-    feet = _feet(choice)
-    slope, error = feet.sensitivity(getattr(feet, name))
-    own = feet.feet.index(foot)
-    slope[own] += errors * error[own]
+    values, x = _feet(name, choice), np.asarray(STIFFNESSES) - np.mean(STIFFNESSES)
+    slope = values @ x / (x @ x)
+    residual = values - values.mean(axis=1, keepdims=True) - slope[:, None] * x
+    own = list(FEET).index(foot)
+    error = np.sqrt((residual[own] @ residual[own]) / (x.size - 2) / (x @ x))
+    slope[own] += errors * error
     return float(1 + np.argsort(np.argsort(slope))[own])
 
 
 def _less_sunk_of_six(choice: str = "as assumed") -> float:
-    return 5 + int(np.argmin(_legs(choice).rms_sinkage[4:]))
+    return 5 + int(np.argmin(_legs("sinkage_rms_m", choice)[4:]))
 
 
 def _slip_to_five(choice: str = "as assumed") -> float:
-    return decreasing_until(_legs(choice).rms_slip[:5]) - 1
+    return _lower(_legs("slip_rms", choice)[:5]) - 1
 
 
-#: Quantity and foot of each rank, by key.
+def _drop() -> float:
+    """Number of legs at which the largest sinkage first drops by 5 % or more."""
+    largest = _legs("sinkage_largest_m")
+    return 2 + int(np.argmax(1.0 - largest[1:] / largest[:-1] >= 0.05))
+
+
+_COLUMNS = {"sinkage": "sinkage_mean_m", "slip": "slip_mean"}
+#: Metric and foot of each rank, by key.
 RANKS = {
-    f"rank_{name}_{foot.lower()}": (name, foot)
-    for name in ("sinkage", "slip")
+    f"rank_{name}_{foot.lower()}": (column, foot)
+    for name, column in _COLUMNS.items()
     for foot in ("none", "CIF")
 }
 SLOPE_RANKS = {
-    f"rank_{name}_slope_{foot.lower()}": (name, foot)
+    f"rank_{name}_slope_{foot.lower()}": (_COLUMNS[name], foot)
     for name, feet in (("sinkage", ("LTF", "CIF")), ("slip", ("none", "LTF", "CIF")))
     for foot in feet
 }
+
+
+def _fitted(key: str) -> float:
+    return _sinkage_fit()[key]
+
 
 #: By key of the CSV file of the same name.
 COMPUTED: dict[str, Callable[[], float]] = {
     "alpha_z_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[1]),
     "alpha_x_flat": lambda: float(stress_gains(0.0, 0.5 * np.pi)[0]),
-    "rms_slip_legs": lambda: decreasing_until(_legs().rms_slip),
+    "rms_slip_legs": lambda: _lower(_legs("slip_rms")),
     "rms_slip_to_five": _slip_to_five,
-    "rms_sinkage_legs": lambda: decreasing_until(-_legs().rms_sinkage),
-    "max_sinkage_drop": lambda: 2 + int(np.argmax(_drop() >= 0.05)),
+    "rms_sinkage_legs": lambda: _lower(-_legs("sinkage_rms_m")),
+    "max_sinkage_drop": _drop,
     "rms_sinkage_six": _less_sunk_of_six,
-    "max_sinkage_six": lambda: 5 + int(np.argmin(_legs().max_sinkage[4:])),
+    "max_sinkage_six": lambda: 5 + int(np.argmin(_legs("sinkage_largest_m")[4:])),
     **{key: partial(_rank, *own) for key, own in RANKS.items()},
     **{key: partial(_slope_rank, *own) for key, own in SLOPE_RANKS.items()},
-    "s_sigma": lambda: _fit().s_sigma / 100.0,
-    "s_sigma_r2": lambda: _fit().stiffness_r2,
-    "s_i": lambda: _fit().s_i,
-    "s_z": lambda: _fit().s_z / 100.0,
-    "s_phi_r2": lambda: _fit().friction_r2,
+    **{key: partial(_fitted, key) for key in ("s_sigma", "s_sigma_r2", "s_i", "s_z", "s_phi_r2")},
 }
-
-
-def _drop() -> Array:
-    """Relative decrease of the maximum sinkage by each additional leg."""
-    largest = _legs().max_sinkage
-    return 1.0 - largest[1:] / largest[:-1]
 
 
 def _alternatives(compute: Callable[..., float], *own: str) -> tuple[Callable[[], float], ...]:

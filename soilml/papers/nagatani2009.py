@@ -8,21 +8,25 @@ from functools import cache, partial
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.physics.effects import StressShift
 from soilml.physics.gears import Wheel
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 from soilml.physics.soils import soil
-from soilml.systems.force_sensor_wheel import (
+from soilml.systems.rim_stress import (
     MohrCoulomb,
     SensingWheel,
     SteadyRun,
     StressProfile,
     balanced_arc,
-    profile_from_readings,
+    bin_stress,
+    deconvolve,
+    find_modulus,
+    force_components,
     simulate_readings,
-    solve_force_balance,
 )
+from soilml.systems.rim_stress.force_balance import pull_under
 
 #: Table I pairs its five slips with the five slopes of section IV.A, in order.
 SLOPES = {0.11: 0.0, 0.18: 2.0, 0.29: 4.0, 0.39: 6.0, 0.80: 8.0}
@@ -38,8 +42,15 @@ def _through_sensors(slip: float) -> tuple[StressProfile, float]:
     """Stress and k_x (m) estimated through the sensors from an arc of 30 degrees with one k_x."""
     at = SteadyRun(slip=slip, weight=WEIGHT, slope=math.radians(SLOPES[slip]))
     true = balanced_arc(math.radians(30.0), at, WHEEL, STRENGTH, float(SAND.shear_modulus))
-    profile = profile_from_readings(simulate_readings(true, WHEEL), WHEEL)
-    return profile, solve_force_balance(profile, at, WHEEL, STRENGTH).shear_modulus
+    profile = deconvolve(bin_stress(simulate_readings(true, WHEEL), WHEEL), WHEEL)
+    soil_ = float(SAND.cohesion), math.tan(SAND.friction_angle)
+    load, slope = WEIGHT * math.cos(float(at.slope)), math.sin(float(at.slope))
+
+    def pull(modulus: Floats) -> Floats:
+        parts = force_components(profile, slip, modulus, float(WHEEL.radius), float(WHEEL.width))
+        return np.asarray(pull_under(parts, load, *soil_))
+
+    return profile, find_modulus(pull, WEIGHT * slope)
 
 
 def _modulus(slip: float) -> float:

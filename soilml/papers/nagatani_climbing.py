@@ -2,7 +2,7 @@
 
 The paper prints no measured force, stress or shear modulus as a number. Its claim, that the pull on
 steep slopes follows from slopes of 0 and 4 degrees, is tested with a rover on a known soil
-(`soilml.systems.climbing.SimulatedRover`) under the same conditions.
+(`soilml.systems.rim_stress.SimulatedRover`) under the same conditions.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from soilml.errors import FitError
 from soilml.quantities import SHEAR
-from soilml.systems.climbing import (
+from soilml.systems.rim_stress import (
     Climb,
     ClimbingAbility,
     SimulatedRover,
@@ -23,7 +23,7 @@ from soilml.systems.climbing import (
     identify_ground,
     modulus_per_climb,
 )
-from soilml.systems.climbing.simulated_rover import SLOPES
+from soilml.systems.rim_stress.simulated_rover import SLOPES
 
 CAMPAIGNS = 9  # Simulated campaigns, of which one is beyond the tolerance
 GENTLE, REPEATS = SLOPES[:2], 4  # Slopes from which the paper predicts, and repetitions of each

@@ -1,13 +1,13 @@
-"""Matplotlib figures as SVG images inside the page."""
+"""Figures of matplotlib in one style: a caller's axes, PNG files, SVG that follows a page."""
 
 from __future__ import annotations
 
-import base64
+import html
 import io
 import os
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,12 +17,18 @@ from soilml.errors import InputError
 from soilml.optional_imports import load_matplotlib, quiet_matplotlib
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from soilml.report.report import Picture
 
 #: Before and after: orange and blue, which colour-blind readers and grey prints distinguish.
 BEFORE, AFTER, UNCHANGED = "#cc7a00", "#005b96", "#4d4d4d"
-#: Width of a figure in pixels.
-WIDTH = 380
+MEASURED, PRIOR, GRID = "#1a1a1a", "#d9d9d9", "#e4e4e4"
+#: Colours of loads from light to heavy (the colour map plasma without its yellow).
+LOADS = ("#0d0887", "#5c01a6", "#9c179e", "#cc4778", "#e0603f", "#d98300")
+#: Colours of figures, and the variables of the page that replace them in its light and dark style.
+VARIABLES = {
+    "#000000": "ink", MEASURED: "ink", "#555555": "soft", "#333333": "soft", GRID: "line",
+    PRIOR: "band", BEFORE: "before", AFTER: "after", UNCHANGED: "lone", "#fefefe": "paper",
+} | {colour: f"load{i}" for i, colour in enumerate(LOADS)}  # fmt: skip
 _STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "soilml",
@@ -34,22 +40,23 @@ _STYLE: dict[str, Any] = {
     "axes.titlesize": 11.5,
     "axes.titleweight": "bold",
     "axes.titlelocation": "left",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "legend.frameon": False,
+    "legend.fontsize": 9.0,
     "xtick.color": "#333333",
     "ytick.color": "#333333",
     "axes.unicode_minus": True,
 }
-
-
 #: Characters of a long label at its beginning and its end, which says what kind of answer it is.
 _HEAD, _TAIL = 20, 35
-
-
-@dataclass(frozen=True)
-class SvgImage:
-    """A figure as a data URI, with its text alternative."""
-
-    image: str
-    alt: str
+_DROPPED = re.compile(
+    r"<\?xml.*?\?>|<!DOCTYPE.*?>|<metadata>.*?</metadata>|<style.*?</style>"
+    r'| xmlns(?::\w+)?="[^"]*"',
+    re.DOTALL,
+)
 
 
 @contextmanager
@@ -66,13 +73,6 @@ def report_style() -> Iterator[None]:
         settings: Any = matplotlib.rcParams
         settings.update(_STYLE)
         yield
-
-
-def new_figure(height: float) -> Figure:
-    """A figure of this height in pixels and the width of the report's columns."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(WIDTH / 72, height / 72))
 
 
 def short_label(text: str) -> str:
@@ -107,18 +107,6 @@ def take_axes(ax: Any, rows: int, columns: int, size: tuple[float, float]) -> ND
     return given.reshape(rows, columns)
 
 
-def picture(
-    draw: Callable[[Any], object], rows: int, columns: int, size: tuple[float, float], alt: str
-) -> SvgImage:
-    """The image of a figure with axes (rows, columns), size in inches, which `draw` fills."""
-    with report_style():
-        from matplotlib.figure import Figure
-
-        figure = Figure(figsize=size, layout="constrained")
-        draw(figure.subplots(rows, columns, squeeze=False))
-        return svg_image(figure, alt)
-
-
 def save_png(
     draw: Callable[[Any], object],
     rows: int,
@@ -126,7 +114,7 @@ def save_png(
     size: tuple[float, float],
     path: str | os.PathLike[str],
 ) -> None:
-    """The same figure as a PNG file."""
+    """A figure with axes (rows, columns), size in inches, which `draw` fills, as a PNG file."""
     with report_style():
         from matplotlib.figure import Figure
 
@@ -135,10 +123,50 @@ def save_png(
         figure.savefig(path, format="png", dpi=110, metadata={"Software": "soilml"})
 
 
-def svg_image(figure: Figure, alt: str) -> SvgImage:
-    """The figure as an image; the same figure gives the same bytes."""
+def svg_images(picture: Picture, prefix: str) -> list[str]:
+    """The elements `svg` of a picture for a page: one for each column of its axes, or of all.
+
+    prefix: Begins their ids, which are unique on a page. Colours of `VARIABLES` become variables of
+    the page's style. The same picture gives the same text.
+    """
+    with report_style():
+        from matplotlib.figure import Figure
+
+        images = 1 if picture.whole else picture.columns
+        size = (picture.size[0] / images, picture.size[1])
+        figures = [Figure(figsize=size, layout="constrained") for _ in range(images)]
+        each = picture.columns // images
+        axes = [figure.subplots(picture.rows, each, squeeze=False) for figure in figures]
+        picture.draw(np.concatenate(axes, axis=1))
+        return [
+            _inline(figure, picture.alt, f"{prefix}{i}")
+            for i, figure in enumerate(figures)
+            if any(panel.axison for panel in figure.axes)
+        ]
+
+
+def _inline(figure: Any, alt: str, prefix: str) -> str:
+    """A figure as an element without styles of its own, which the rules of a page may forbid."""
     text = io.StringIO()
     without = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     figure.savefig(text, format="svg", metadata=without, transparent=True)
-    encoded = base64.b64encode(text.getvalue().encode()).decode()
-    return SvgImage(f"data:image/svg+xml;base64,{encoded}", alt)
+    found = _DROPPED.sub("", text.getvalue()).strip()
+    found = found.replace("xlink:href", "href").replace(' version="1.1"', "")
+    found = re.sub(r'(\bid="|url\(#|href="#)', rf"\g<1>{prefix}-", found)
+    found = re.sub(r' style="([^"]*)"', lambda style: _attributes(style[1]), found)
+    head = f'<svg role="img" aria-label="{html.escape(alt, quote=True)}"'
+    return re.sub(r'^<svg width="[^"]*" height="[^"]*"', head, found, count=1)
+
+
+def _attributes(style: str) -> str:
+    """The declarations of a style as attributes; known colours as variables of the page."""
+    parts = []
+    for name, value in re.findall(r"([\w-]+): *([^;]+)", style):
+        if name == "font":
+            weight = ' font-weight="700"' if re.search(r"\b(700|bold)\b", value) else ""
+            size = re.search(r"([\d.]+)px", value)
+            parts.append(f' font-size="{size[1] if size else 10}"{weight}')
+            continue
+        colour = VARIABLES.get(value.strip())
+        parts.append(f' {name}="{f"var(--{colour})" if colour else value.strip()}"')
+    return "".join(parts)

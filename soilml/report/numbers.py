@@ -1,26 +1,32 @@
-"""Numbers, units and names as reports and tables show them: rounded to what is known of them."""
+"""Numbers, units and names as people read them: kPa, degrees, mm; as many digits as are known.
+
+Texts are plain, as a terminal shows them: `+-`, `deg`, `N/m^(n+2)`; `pretty` is for pages.
+"""
 
 from __future__ import annotations
 
 import math
-from typing import Protocol
+import re
+from collections.abc import Callable
 
-from soilml.quantities import COLUMNS
+from soilml.quantities import COLUMNS, QUANTITIES
 
-_SUPERSCRIPT = str.maketrans("0123456789+-n()", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ  ")
-#: SI unit -> factor and display unit; moduli in N/m^(n+2) get a prefix by their size instead.
-_DISPLAY_UNITS = {
+#: SI unit -> factor and unit that is shown; moduli in N/m^(n+2) get a prefix by their size instead.
+_UNITS = {
     "Pa": (1e-3, "kPa"),
-    "rad": (180.0 / math.pi, "°"),
+    "rad": (180.0 / math.pi, "deg"),
     "m": (1e3, "mm"),
+    "Pa/m": (1e-3, "kPa/m"),
     "N/m^3": (1e-3, "kN/m^3"),
+    "share": (100.0, "%"),
+    "1": (1.0, ""),
+    "-": (1.0, ""),
 }
-_VARIANCE_COMPONENTS = {
-    "friction_angle_std": ("friction angle from run to run, std", 180.0 / math.pi, "°"),
-    "bearing_std": ("bearing strength from run to run, std", 100.0, " %"),
-    "autocorrelation": ("correlation of neighbouring samples", 1.0, ""),
-}
-_SYMBOLS = {"theta_1": "θ₁", "k_phi": "k_φ", "k_c": "k_c", "phi": "φ", "gamma": "γ", "a_0": "a₀"}
+#: A unit at the end of a column's name.
+_UNIT_IN_COLUMN = re.compile(r"_(J_per_m|kg_m3|N_m3|m_s2|m_s|rad_s|Nm|Pa|rad|m2|mm|kg|deg|m|N|s)$")
+_WRITTEN = {"Nm": "N m", "m_s": "m/s", "m_s2": "m/s^2", "N_m3": "N/m^3", "rad_s": "rad/s"}
+_WRITTEN |= {"m2": "m^2", "J_per_m": "J/m", "kg_m3": "kg/m^3"}
+_LEAST, _MOST = 1e-4, 1e7  # Sizes outside which a number is written with a power of ten
 _NAMES = {
     "kc": "cohesive modulus of sinkage",
     "kphi": "frictional modulus of sinkage",
@@ -28,27 +34,58 @@ _NAMES = {
     "a0": "angle of maximum stress",
     "a1": "its growth with slip",
 }
-_SYMBOLS |= {"a_1": "a₁"}
+SIGNIFICANT_DIGITS = 6  # Digits of estimates in files, which are far below any uncertainty
+LEAST_STATED = 0.005  # Probability below which only a bound is stated
+
+_RAISED = str.maketrans("0123456789+-n", "⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ⁿ")
+_SYMBOLS = {"theta_1": "θ₁", "k_phi": "k_φ", "phi": "φ", "gamma": "γ", "a_0": "a₀", "a_1": "a₁"}
+#: What `pretty` replaces, in this order.
+_PRETTY: tuple[tuple[str, Callable[[re.Match[str]], str]], ...] = (
+    (r"\^\(?([-+n\d]+)\)?", lambda found: found[1].translate(_RAISED)),
+    (r"(?<=\d)e(-?)\+?0*(\d+)\b", lambda f: f" × 10{(f[1] + f[2]).translate(_RAISED)}"),
+    (r"(?<=\d) deg\b|\bdeg\b", lambda _: "°"),
+    (r"(?<![\w.)-])-(?=\d)", lambda _: "−"),
+    (r"\+-", lambda _: "±"),
+    (r"->", lambda _: "→"),
+    (rf"(?<![\w.])(?:{'|'.join(_SYMBOLS)})(?![\w.])", lambda found: _SYMBOLS[found[0]]),
+)
 
 
-class Estimated(Protocol):
-    """An estimate in an SI unit, with its standard deviation."""
+def pretty(text: str) -> str:
+    """A text for a page: ±, minus signs, raised exponents and degrees.
 
-    @property
-    def value(self) -> float:
-        """The estimate."""
-
-    @property
-    def std(self) -> float:
-        """Its standard deviation."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of both."""
+    >>> pretty("k_phi = 1.9 +- 0.2 MN/m^(n+2), 1.2e-07 Pa, -3 deg")
+    'k_φ = 1.9 ± 0.2 MN/mⁿ⁺², 1.2 × 10⁻⁷ Pa, −3°'
+    """
+    for pattern, by in _PRETTY:
+        text = re.sub(pattern, by, text)
+    return text
 
 
-#: Significant digits of estimates in files: a millionth of the value is far below any uncertainty.
-SIGNIFICANT_DIGITS = 6
+def shown_unit(unit: str, size: float = 0.0) -> tuple[float, str]:
+    """Factor and unit in which values of this SI unit are shown; moduli by their size.
+
+    >>> shown_unit("Pa"), shown_unit("N/m^(n+2)", 1.5e6)
+    ((0.001, 'kPa'), (1e-06, 'MN/m^(n+2)'))
+    """
+    if unit.startswith("N/m^("):
+        for factor, prefix in ((1e6, "M"), (1e3, "k")):
+            if abs(size) >= factor:
+                return 1.0 / factor, prefix + unit
+    return _UNITS.get(unit, (1.0, unit))
+
+
+def shown_column(name: str) -> tuple[float, str]:
+    """Factor and heading under which a column of a table in SI units is shown.
+
+    >>> shown_column("sinkage_m"), shown_column("drawbar_pull_N"), shown_column("slip")
+    ((1000.0, 'sinkage, mm'), (1.0, 'drawbar pull, N'), (1.0, 'slip'))
+    """
+    found = _UNIT_IN_COLUMN.search(name)
+    if found is None:
+        return 1.0, name.replace("_", " ")
+    factor, unit = _UNITS.get(found[1], (1.0, _WRITTEN.get(found[1], found[1])))
+    return factor, f"{name[: found.start()].replace('_', ' ')}, {unit}"
 
 
 def decimal(value: float, digits: int = 3) -> str:
@@ -59,33 +96,90 @@ def decimal(value: float, digits: int = 3) -> str:
     return f"{value:.{max(0, digits - 1 - exponent)}f}"
 
 
+def significant(x: float, digits: int = 4) -> str:
+    """A number to at most this many significant digits, without trailing zeros; blank for NaN.
+
+    >>> [significant(x) for x in (12345.6, 0.1, 0.0, 2.5e-7)]
+    ['12346', '0.1', '0', '2.5e-07']
+    """
+    if math.isnan(x):
+        return ""
+    if math.isinf(x) or (x != 0.0 and not _LEAST <= abs(x) < _MOST):
+        return f"{x:.{digits}g}"
+    text = decimal(x, digits)
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def round_significant(value: float, digits: int = SIGNIFICANT_DIGITS) -> float:
+    """A number rounded to significant digits.
+
+    >>> round_significant(0.05407576875886196), round_significant(45769539.457, 4)
+    (0.0540758, 45770000.0)
+    """
+    return float(f"{value:.{digits}g}")
+
+
+def rounded(x: float, std: float, digits: int = 4) -> str:
+    """A number to the second significant digit of its standard deviation.
+
+    >>> rounded(1043.21, 118.0), rounded(27.3271, 0.074), rounded(0.5, 0.0)
+    ('1040', '27.327', '0.5')
+    """
+    if not (math.isfinite(x) and math.isfinite(std)) or std <= 0.0:
+        return significant(x, digits)
+    if max(abs(x), std) >= _MOST or max(abs(x), std) < _LEAST:
+        return f"{x:.3g}"
+    decimals = 1 - math.floor(math.log10(std))
+    if decimals > 9:
+        return significant(x, 6)
+    return f"{round(x, decimals) + 0.0:.{max(0, decimals)}f}"
+
+
+def format_quantity(
+    value: float,
+    unit: str = "1",
+    std: float = 0.0,
+    ends: tuple[float, float] | None = None,
+    digits: int = 3,
+) -> str:
+    """A number in an SI unit with what is known of it, in the unit that is shown.
+
+    ends: Ends of its 90 % interval.
+
+    >>> format_quantity(1255.4, "Pa", 794.3, (210.0, 2600.0))
+    '1.26 +- 0.79 kPa (90 %: 0.21 to 2.60)'
+    >>> format_quantity(0.4, "rad")
+    '22.9 deg'
+    """
+    factor, shown = shown_unit(unit, abs(value))
+    width = std if std > 0.0 or ends is None else (ends[1] - ends[0]) / 3.3
+    text = rounded(factor * value, factor * width, digits)
+    if std > 0.0 and math.isfinite(std):
+        text += f" +- {rounded(factor * std, factor * std)}"
+    text = f"{text} {shown}".rstrip() if shown != "%" else f"{text} %"
+    if ends is None or not all(map(math.isfinite, ends)):
+        return text
+    low, high = (rounded(factor * end, factor * width, digits) for end in ends)
+    return f"{text} (90 %: {low} to {high})"
+
+
+def format_band(low: float, middle: float, high: float, unit: str = "1", digits: int = 3) -> str:
+    """A median in an SI unit with the ends of its 90 % band.
+
+    >>> format_band(0.1, 0.2, 0.3, "rad")
+    '11.5 deg (90 %: 5.7 to 17.2)'
+    """
+    return format_quantity(middle, unit, ends=(low, high), digits=digits)
+
+
 def format_residual(x: float, digits: int = 3) -> str:
     """A mean squared residual; one far below that of noise is given as an upper limit."""
-    return "< 0.001" if 0.0 <= x < 1e-3 else format_number(x, digits)
+    return "< 0.001" if 0.0 <= x < 1e-3 else decimal(x, digits)
 
 
 def share_left(fraction: float) -> str:
     """The share of a prior's width that remains: 92% of; all of, from a whole on."""
     return f"{fraction:.0%} of" if round(fraction, 2) < 1.0 else "all of"
-
-
-def format_number(x: float, digits: int = 3) -> str:
-    """A number to this many significant digits: 320, 1.00, 0.0832, 1.2 × 10⁷; a dash for NaN."""
-    if math.isnan(x):
-        return "–"
-    if math.isinf(x):
-        return "∞" if x > 0 else "−∞"
-    if x != 0.0 and not 1e-3 <= abs(x) < 1e6:
-        mantissa, _, exponent = f"{x:.{digits - 1}e}".partition("e")
-        return _minus(f"{mantissa} × 10{_raised(int(exponent))}")
-    return _minus(decimal(x, digits))
-
-
-def format_gain(x: float) -> str:
-    """A difference of objectives: one decimal, none from a thousand on."""
-    if not math.isfinite(x):
-        return format_number(x)
-    return _minus(f"{x:.0f}" if abs(x) >= 999.95 else f"{x + 0.0:.1f}").replace("−0.0", "0.0")
 
 
 def format_log_density(gain: float, std_error: float | None) -> str:
@@ -95,148 +189,7 @@ def format_log_density(gain: float, std_error: float | None) -> str:
 
 def format_p_value(p: float) -> str:
     """A p value, to at most two digits."""
-    text = "p < 0.001" if p < 1e-3 else f"p = {p:.2f}" if p >= 0.1 else f"p = {p:.2g}"
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
-
-
-def format_with_std(value: float, std: float) -> str:
-    """Value ± standard deviation, both to the second significant digit of the latter."""
-    if not (math.isfinite(value) and math.isfinite(std)) or std <= 0.0:
-        return format_number(value, 4)
-    decimals = 1 - math.floor(math.log10(std))
-    if -3 < decimals < 5:
-        places = max(0, decimals)
-        return _minus(f"{value:.{places}f} ± {std:.{places}f}")
-    power = math.floor(math.log10(max(abs(value), std)))
-    inside = (
-        f"{value / 10.0**power:.{decimals + power}f} ± {std / 10.0**power:.{decimals + power}f}"
-    )
-    return _minus(f"({inside}) × 10{_raised(power)}")
-
-
-def format_interval(low: float, high: float, std: float) -> str:
-    """Both ends to the second significant digit of the standard deviation: 0.85 to 1.24."""
-    ends = [format_with_std(end, std).split(" ± ")[0].lstrip("(") for end in (low, high)]
-    power = format_with_std(low, std).rpartition(") ")[2]
-    text = f"{ends[0]} to {ends[1]}"
-    if not power.startswith("×"):
-        return text
-    return f"{format_number(low, 3)} to {format_number(high, 3)}"
-
-
-def format_change(x: float, std: float) -> str:
-    """A change with its sign, to the second significant digit of its standard deviation."""
-    decimals = 1 - math.floor(math.log10(std)) if std > 0.0 and math.isfinite(std) else 3
-    return _minus(f"{x:+.{min(max(0, decimals), 6)}f}") if math.isfinite(x) else format_number(x)
-
-
-def display_unit(unit: str, size: float) -> tuple[float, str]:
-    """Factor and unit in which values of this size are shown."""
-    factor, name = _DISPLAY_UNITS.get(unit, (1.0, unit))
-    if unit.startswith("N/m^("):
-        factor, prefix = next(
-            ((1.0 / f, p) for f, p in ((1e6, "M"), (1e3, "k")) if abs(size) >= f), (1.0, "")
-        )
-        name = prefix + unit
-    return factor, format_unit(name)
-
-
-def format_unit(unit: str) -> str:
-    """A unit with superscript exponents; empty for a dimensionless number."""
-    if unit in ("1", "-", ""):
-        return ""
-    base, caret, exponent = unit.partition("^")
-    return base + (exponent.translate(_SUPERSCRIPT).replace(" ", "") if caret else "")
-
-
-def format_estimate(value: Estimated) -> str:
-    """An estimate ± standard deviation in its display unit."""
-    factor, unit = display_unit(value.unit, value.value)
-    return with_unit(format_with_std(factor * value.value, factor * value.std), unit)
-
-
-def format_quantity(value: float, unit: str) -> str:
-    """A number in an SI unit, in the display unit of its kind."""
-    factor, shown = display_unit(unit, abs(value))
-    return with_unit(format_number(factor * value), shown)
-
-
-def format_in_si(value: Estimated) -> str:
-    """The same in SI units; empty where that is the display unit."""
-    factor, _ = display_unit(value.unit, value.value)
-    if factor == 1.0:
-        return ""
-    return with_unit(format_with_std(value.value, value.std), format_unit(value.unit))
-
-
-def with_unit(number: str, unit: str) -> str:
-    """A number and its unit."""
-    return number + ("" if unit in ("", "°") else "\N{NO-BREAK SPACE}") + unit
-
-
-def channel_name(name: str) -> str:
-    """A channel in words, from its column: `drawbar_pull_N` -> drawbar pull."""
-    return _words(COLUMNS[name].name) if name in COLUMNS else name
-
-
-def channel_unit(name: str) -> tuple[float, str]:
-    """Factor and unit in which a channel is plotted."""
-    unit = COLUMNS[name].unit if name in COLUMNS else ""
-    return display_unit(unit, 1.0)
-
-
-def parameter_name(path: str) -> str:
-    """A parameter in words, with its symbol: `friction_angle` -> friction angle φ."""
-    for quantity in COLUMNS.values():
-        if quantity.name == path:
-            symbol = _SYMBOLS.get(quantity.symbol, quantity.symbol)
-            return f"{_NAMES.get(path, _words(path))} {symbol}".strip()
-    return path
-
-
-def format_range(low: float, high: float, digits: int = 3) -> str:
-    """A range, or a single value where both ends agree."""
-    one, two = (_trimmed(format_number(x, digits)) for x in (low, high))
-    return one if one == two else f"{one} to {two}" if low < 0.0 else f"{one}–{two}"
-
-
-def capitalised(text: str) -> str:
-    """The text as the beginning of a sentence; symbols, files and commands stay."""
-    first = text.split(" ", 1)[0].rstrip(":,;.")
-    word = len(first) > 1 and first.isalpha() and first != "soilml"
-    return text[0].upper() + text[1:] if word or first == "a" else text
-
-
-def format_variance_component(key: str, value: float) -> tuple[str, str]:
-    """Name and size of a variance component."""
-    scale = "noise_scale_"
-    if key.startswith(scale):
-        return (
-            f"noise of {channel_name(key[len(scale) :])}",
-            f"{format_number(value, 2)} × the declared noise",
-        )
-    name, factor, unit = _VARIANCE_COMPONENTS.get(key, (_words(key), 1.0, ""))
-    return name, f"{format_number(factor * value, 2)}{unit}" if value != 0.0 else "none"
-
-
-def _words(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _raised(power: int) -> str:
-    return str(power).translate(_SUPERSCRIPT)
-
-
-def _minus(text: str) -> str:
-    return text.replace("-", "−")
-
-
-def _trimmed(text: str) -> str:
-    return text.rstrip("0").rstrip(".") if "." in text and "×" not in text else text
-
-
-#: Probability below which only a bound is shown.
-LEAST_STATED = 0.005
+    return "p < 0.001" if p < 1e-3 else f"p = {p:.2f}" if p >= 0.1 else f"p = {p:.2g}"
 
 
 def format_probability(p: float) -> str:
@@ -246,10 +199,36 @@ def format_probability(p: float) -> str:
     return "> 0.99" if p > 0.995 else f"{p:.2f}"
 
 
-def significant(value: float, digits: int = SIGNIFICANT_DIGITS) -> float:
-    """A number rounded to significant digits.
+def format_range(low: float, high: float, digits: int = 3) -> str:
+    """A range, or a single value where both ends agree."""
+    one, two = significant(low, digits), significant(high, digits)
+    return one if one == two else f"{one} to {two}"
 
-    >>> significant(0.05407576875886196), significant(45769539.457, 4)
-    (0.0540758, 45770000.0)
-    """
-    return float(f"{value:.{digits}g}")
+
+def with_unit(name: str, unit: str) -> str:
+    """A name and the unit that is shown for it, for axes and headings: torque, N m."""
+    return f"{name}, {unit}" if unit else name
+
+
+def channel_name(name: str) -> str:
+    """A channel in words, from its column: `drawbar_pull_N` -> drawbar pull."""
+    return (COLUMNS[name].name if name in COLUMNS else name).replace("_", " ")
+
+
+def channel_unit(name: str) -> tuple[float, str]:
+    """Factor and unit in which a channel is shown."""
+    return shown_unit(COLUMNS[name].unit) if name in COLUMNS else (1.0, "")
+
+
+def parameter_name(path: str) -> str:
+    """A parameter in words, with its symbol: `friction_angle` -> friction angle phi."""
+    if path not in QUANTITIES:
+        return path
+    return f"{_NAMES.get(path, path.replace('_', ' '))} {QUANTITIES[path].symbol}".strip()
+
+
+def capitalised(text: str) -> str:
+    """The text as the beginning of a sentence; symbols, files and commands stay."""
+    first = text.split(" ", 1)[0].rstrip(":,;.")
+    word = len(first) > 1 and first.isalpha() and first not in ("soilml", "ln")
+    return text[0].upper() + text[1:] if word or first == "a" else text

@@ -1,4 +1,4 @@
-"""The files of a result: one page for all reports, self-contained HTML, and JSON beside it."""
+"""The files of a result: a self-contained HTML page, and JSON beside it with its provenance."""
 
 from __future__ import annotations
 
@@ -9,22 +9,20 @@ import os
 import re
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from soilml.optional_imports import need
-from soilml.remarks import Remark
-from soilml.report import numbers
-from soilml.report.figure_style import SvgImage
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from soilml.report.figure_style import svg_images
+from soilml.report.numbers import capitalised, pretty
+from soilml.report.report import MOST_ROWS, Report
 
 #: Version of the entry `report` in the JSON files: raised where a key changes its meaning or goes.
 FORMAT_VERSION = 3
 _BLOCK = 1 << 20
-MOST_ROWS = 200  # Most rows of a table on a page; the JSON file has all
+#: What is written to a file: its text, or a function of the path.
+Content = str | Callable[[Path], object]
 
 
 @dataclass(frozen=True)
@@ -73,116 +71,99 @@ class Provenance:
         return Provenance(shlex.join(["soilml", *words]), __version__, records)
 
 
-def _plain(text: str) -> str:
-    return text.replace("\N{NO-BREAK SPACE}", " ")
+def page_content(report: Report) -> dict[str, Any]:
+    """What a page shows of a report: texts, cells of tables, and pictures as elements `svg`."""
+    own = [report.figures] if report.figures is not None else []
+    tables = []
+    for table in (*own, *report.tables):
+        heads, rows, words = table.cells()
+        tables.append(
+            {
+                "title": _said(table.title),
+                "note": _said(table.note),
+                "heads": [pretty(cell) for cell in heads],
+                "rows": [[pretty(cell) for cell in row] for row in rows[:MOST_ROWS]],
+                "words": words,
+                "count": len(rows),
+            }
+        )
+    return {
+        "title": report.title,
+        "verdict": pretty(report.verdict),
+        "lines": [pretty(line) for line in report.lines],
+        "next": [_said(step) for step in report.next_steps],
+        "status": report.status,
+        "tone": report.tone,
+        "basis": pretty(report.basis),
+        "pictures": [
+            {
+                "title": _said(picture.title),
+                "caption": pretty(picture.caption),
+                "images": svg_images(picture, f"p{i}"),
+            }
+            for i, picture in enumerate(report.pictures)
+        ],
+        "with_figures": bool(own),
+        "tables": tables,
+        "remarks": [_said(remark.text) for remark in report.remarks],
+        "details": [
+            [_said(head), [_said(text) for text in texts]] for head, texts in report.details
+        ],
+        "notation": [[pretty(term), pretty(text)] for term, text in report.notation],
+    }
 
 
-@dataclass(frozen=True)
-class ReportTable:
-    """A table: caption, header, rows of cells, and how many columns from the left are text."""
-
-    caption: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    text_columns: int = 1
-
-    @property
-    def shown(self) -> Sequence[Sequence[str]]:
-        """The rows that the page shows."""
-        return self.rows[:MOST_ROWS]
-
-
-@dataclass(frozen=True)
-class ReportPicture:
-    """A picture with its title, and what it shows."""
-
-    title: str
-    image: SvgImage
-    caption: str = ""
-
-
-@dataclass(frozen=True)
-class Report:
-    """What a page says.
-
-    kind: The command that made it.
-    title: What was asked, in words.
-    badge, meaning: The verdict in a word or two, and the rest of that sentence.
-    answer: Sentences with units and intervals, the main one first.
-    tone: Colour of the verdict: `named` (blue), `no-gap` (green), `suspected` (yellow) or
-        `bad-data` (red), or another status of the gap analysis.
-    warnings: Flags, abstentions and limits.
-    next_steps: What to do next.
-    notation: Terms of the footer, with their meaning.
-    """
-
-    kind: str
-    title: str
-    badge: str
-    meaning: str
-    answer: Sequence[str]
-    tone: str = "named"
-    pictures: Sequence[ReportPicture] = ()
-    tables: Sequence[ReportTable] = ()
-    warnings: Sequence[Remark] = ()
-    next_steps: Sequence[str] = ()
-    notation: Sequence[tuple[str, str]] = field(default_factory=tuple)
-
-    def as_json(self, origin: Provenance) -> dict[str, Any]:
-        """The entry `report` of the JSON file beside the page."""
-        return {
-            "format": "soilml-report",
-            "version": FORMAT_VERSION,
-            "kind": self.kind,
-            "command": origin.command,
-            "soilml_version": origin.version,
-            "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
-            "answer": [_plain(text) for text in self.answer],
-            "warnings": [replace(w, text=_plain(w.text)).as_json() for w in self.warnings],
-            "next": [_plain(text) for text in self.next_steps],
-        }
+def _said(text: str) -> str:
+    """A text as a sentence of a page."""
+    return pretty(capitalised(text)) if text else ""
 
 
 def page(report: Report, origin: Provenance) -> str:
     """The report as HTML."""
-    return render("report.html.j2", "soilml.report", report.kind, page=report, origin=origin)
+    for library in ("jinja2", "matplotlib"):
+        need(library, report.kind)
+    from jinja2 import Environment, PackageLoader, StrictUndefined
 
-
-def render(template: str, package: str, command: str, **content: Any) -> str:
-    """A template that extends `report.html.j2`, from the folder of its package, as HTML.
-
-    command: The command that is named where jinja2 is missing.
-    content: Variables of the template; `page` is a `Report`, `origin` a `Provenance`.
-    """
-    need("jinja2", command)
-    return _environment(package).get_template(template).render(**content)
-
-
-def _environment(package: str) -> Environment:
-    from jinja2 import ChoiceLoader, Environment, PackageLoader, StrictUndefined
-
-    name, _, folder = package.rpartition(".")
     environment = Environment(
-        loader=ChoiceLoader([PackageLoader(name, folder), PackageLoader("soilml", "report")]),
+        loader=PackageLoader("soilml", "report"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {
-        "figure": numbers.format_number,
-        "chance": numbers.format_p_value,
-        "channel": numbers.channel_name,
-        "gain": numbers.format_gain,
-        "probability": numbers.format_probability,
-        "quantity": numbers.format_quantity,
-        "sentence": lambda text: numbers.capitalised(str(text)),
+    template = environment.get_template("report.html.j2")
+    return template.render(page=page_content(report), origin=origin)
+
+
+def report_entry(report: Report, origin: Provenance) -> dict[str, Any]:
+    """The entry `report` of the JSON file beside the page."""
+    return {
+        "format": "soilml-report",
+        "version": FORMAT_VERSION,
+        "kind": report.kind,
+        "command": origin.command,
+        "soilml_version": origin.version,
+        "files": [{"name": f.name, "bytes": f.size, "sha256": f.sha256} for f in origin.files],
+        "answer": report.answer,
+        "warnings": [remark.as_json() for remark in report.remarks],
+        "next": list(report.next_steps),
     }
-    return environment
 
 
-#: What is written to a file: its text, or a function of the path.
-Content = str | Callable[[Path], object]
+def report_texts(
+    report: Report,
+    origin: Provenance,
+    content: Mapping[str, Any],
+    names: tuple[str, str],
+    folder: Path,
+) -> dict[Path, Content]:
+    """The page and the JSON file, by their paths; `content` is the result in SI units."""
+    html, json_name = names
+    entry = {"report": report_entry(report, origin)}
+    return {
+        folder / html: page(report, origin),
+        folder / json_name: json_text({**content, **entry}),
+    }
 
 
 #: A list of numbers over several lines, up to its end; texts have no line ends of their own.
@@ -208,21 +189,3 @@ def finite_or_null(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
-
-
-def report_texts(
-    report: Report,
-    origin: Provenance,
-    content: Mapping[str, Any],
-    names: tuple[str, str],
-    folder: Path,
-) -> dict[Path, Content]:
-    """The page and the JSON file, by their paths; `content` is the result in SI units."""
-    from soilml.report.page import page
-
-    html, json_name = names
-    entry = {"report": report.as_json(origin)}
-    return {
-        folder / html: page(report, origin),
-        folder / json_name: json_text({**content, **entry}),
-    }

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.report.figure_style import AFTER, short_label, take_axes
-from soilml.report.numbers import display_unit, parameter_name
+from soilml.report.figure_style import AFTER, PRIOR, short_label, take_axes
+from soilml.report.numbers import parameter_name, pretty, shown_unit, with_unit
+from soilml.report.report import Picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-#: Range of the prior; the same grey as in every figure.
-PRIOR = "#d9d9d9"
 MOST_LINES = 12  # Most results that are lines with labels; more are points over their number
 _LONG = 41  # Characters of a label from which on all are small, so that room is left for the panels
 
@@ -62,11 +61,19 @@ class ParameterIntervals:
             self._draw(panel, k)
         return np.asarray(axes)
 
+    def picture(self) -> Picture:
+        """The figure with its caption."""
+        caption = "Grey: the range of the prior." if np.isfinite(self.prior_low).any() else ""
+        text = f"Estimates and 90 % intervals of {', '.join(map(parameter_name, self.names))}"
+        return Picture(
+            "Estimates and 90 % intervals", self.plot, *self.shape, self.size, text, caption
+        )
+
     def _draw(self, panel: Axes, k: int) -> None:
         from matplotlib.ticker import MaxNLocator
 
         scale = [v for v in (*self.values[:, k], self.prior_high[k]) if np.isfinite(v)]
-        factor, unit = display_unit(self.units[k], max(map(abs, scale), default=1.0))
+        factor, unit = shown_unit(self.units[k], max(map(abs, scale), default=1.0))
         value, low, high = (factor * v[:, k] for v in (self.values, self.low, self.high))
         prior = factor * self.prior_low[k], factor * self.prior_high[k]
         many = len(self.labels) > MOST_LINES
@@ -78,7 +85,7 @@ class ParameterIntervals:
             panel.errorbar(place[known], value[known], errors, fmt=".", ms=4, **style)
             if np.isfinite(prior).all():
                 panel.axhspan(*prior, color=PRIOR, lw=0, zorder=0)
-            panel.set_ylabel(unit)
+            panel.set_ylabel(pretty(unit))
             panel.xaxis.set_major_locator(MaxNLocator(integer=True))
             panel.set_xlabel("number of the result" if k == len(self.names) - 1 else "")
         else:
@@ -90,5 +97,4 @@ class ParameterIntervals:
             panel.set_yticks(place if shown else [], shown)
             if max(map(len, shown), default=0) > _LONG:
                 panel.tick_params(axis="y", labelsize=8)
-        title = parameter_name(self.names[k])
-        panel.set_title(f"{title} ({unit})" if unit else title)
+        panel.set_title(pretty(with_unit(parameter_name(self.names[k]), unit)))

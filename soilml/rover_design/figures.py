@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED, take_axes
-from soilml.report.terminal import shown_unit
+from soilml.report.numbers import pretty, shown_unit, with_unit
 from soilml.rover_design.search import RESULTS, Designs
-from soilml.rover_design.study import DIMENSIONS, DesignStudy
-from soilml.rover_design.uncertainty import VarianceShare
+from soilml.rover_design.study import DIMENSIONS
+
+if TYPE_CHECKING:
+    from soilml.rover_design.report import DesignReport
 
 SIZE = (10.0, 7.0)  # Width and height of the figure, inches
 LEVELS = 10  # Levels of the contours
@@ -21,26 +22,7 @@ LEVELS = 10  # Levels of the contours
 UNITS = {"energy": "work of the wheels, J/m", "torque": "torque of a wheel, N m"}
 
 
-class DrawnDesigns(Protocol):
-    """What a picture is drawn of: fields of `soilml.rover_design.report.DesignReport`."""
-
-    @property
-    def study(self) -> DesignStudy: ...
-    @property
-    def designs(self) -> Designs: ...
-    @property
-    def best(self) -> Mapping[str, float]: ...
-    @property
-    def best_dimensions(self) -> Mapping[str, float]: ...
-    @property
-    def front(self) -> NDArray[np.int64]: ...
-    @property
-    def contours(self) -> Designs | None: ...
-    @property
-    def shares(self) -> Sequence[VarianceShare]: ...
-
-
-def plot_designs(report: DrawnDesigns, ax: Any = None) -> NDArray[Any]:
+def plot_designs(report: DesignReport, ax: Any = None) -> NDArray[Any]:
     """Draw four panels: probability, margin at the risk, front, shares of the variance.
 
     The first two are contours over the first two dimensions that vary, with the others as the best
@@ -69,8 +51,7 @@ def plot_designs(report: DrawnDesigns, ax: Any = None) -> NDArray[Any]:
 
 def axis_label(name: str) -> str:
     """A dimension with its unit in a figure or table."""
-    unit = shown_unit(DIMENSIONS[name].unit)[1]
-    return name.replace("_", " ") + (f", {unit}" if unit else "")
+    return pretty(with_unit(name.replace("_", " "), shown_unit(DIMENSIONS[name].unit)[1]))
 
 
 def shown(name: str, values: Floats) -> Floats:
@@ -78,7 +59,7 @@ def shown(name: str, values: Floats) -> Floats:
     return np.asarray(shown_unit(DIMENSIONS[name].unit)[0] * np.asarray(values))
 
 
-def _contours(panel: Any, report: DrawnDesigns, grid: Designs, key: str, title: str) -> None:
+def _contours(panel: Any, report: DesignReport, grid: Designs, key: str, title: str) -> None:
     names = report.study.varied[:2]
     x, y = (shown(name, grid.dimensions[name]) for name in names)
     values = np.where(np.isfinite(grid.results[key]), grid.results[key], np.nan)
@@ -97,7 +78,7 @@ def _contours(panel: Any, report: DrawnDesigns, grid: Designs, key: str, title: 
     panel.set_title(title)
 
 
-def _curve(panel: Any, report: DrawnDesigns, key: str, title: str) -> None:
+def _curve(panel: Any, report: DesignReport, key: str, title: str) -> None:
     (name,) = report.study.varied
     designs = report.designs
     order = np.argsort(designs.dimensions[name])
@@ -113,7 +94,7 @@ def _curve(panel: Any, report: DrawnDesigns, key: str, title: str) -> None:
     panel.set_title(title)
 
 
-def _front(panel: Any, report: DrawnDesigns) -> None:
+def _front(panel: Any, report: DesignReport) -> None:
     least, designs = report.study.goal.least, report.designs
     factor = shown_unit(DIMENSIONS[least].unit)[0] if least in DIMENSIONS else 1.0
     x, y = factor * designs.least_of(least), designs.results["margin_at_risk_N"]
@@ -131,7 +112,7 @@ def _front(panel: Any, report: DrawnDesigns) -> None:
     panel.legend(frameon=False, fontsize=9)
 
 
-def _shares(panel: Any, report: DrawnDesigns) -> None:
+def _shares(panel: Any, report: DesignReport) -> None:
     shares = report.shares[:8][::-1]
     panel.barh(range(len(shares)), [100.0 * one.share for one in shares], 0.35, color=AFTER)
     for number, one in enumerate(shares):

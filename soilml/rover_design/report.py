@@ -5,16 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.config.wheeled_rover import GRAVITY
 from soilml.remarks import Remark
-from soilml.report.terminal import shown_unit, significant
 from soilml.results import Result
-from soilml.rover_design.figures import plot_designs
 from soilml.rover_design.performance import Outcomes, evaluate
 from soilml.rover_design.search import (
     DESIGNS,
@@ -31,7 +29,7 @@ from soilml.rover_design.search import (
     tried,
 )
 from soilml.rover_design.search import at_fractions as dimensions_at
-from soilml.rover_design.study import DIMENSIONS, DesignStudy
+from soilml.rover_design.study import DesignStudy
 from soilml.rover_design.uncertainty import (
     DRAWS,
     PossibleTest,
@@ -40,6 +38,9 @@ from soilml.rover_design.uncertainty import (
     variance_shares,
 )
 from soilml.rover_design.worlds import DrawnWorlds, draw_worlds, soil_of_rows
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 WORLDS = 1000  # Draws of soil and model error under which designs are compared
 SLICE = 144  # Designs of the contours through the best one
@@ -102,13 +103,11 @@ class DesignReport(Result):
     tests: tuple[PossibleTest, ...]
     remarks: tuple[Remark, ...]
 
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw probability, margin at risk, front and shares; see `plot_designs`."""
-        return plot_designs(self, ax)
+    def report(self) -> Report:
+        """The best design, those beside it, and what its margin depends on."""
+        from soilml.rover_design.presentation import report_of_design
 
-    def summary(self) -> str:
-        """What the best design is, with what probability and margin it climbs."""
-        return verdict(self)
+        return report_of_design(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each design that was tried: its dimensions and results, SI units."""
@@ -148,40 +147,6 @@ class DesignReport(Result):
             ],
             "warnings": [remark.as_json() for remark in self.remarks],
         }  # fmt: skip
-
-
-def verdict(report: DesignReport) -> str:
-    """What the best design is, with what probability and margin it climbs, in one line."""
-    goal, best = report.study.goal, report.best
-    named = report.study.varied or ["radius", "width", "lug_height"]
-    sizes = ", ".join(_size(name, report.best_dimensions[name]) for name in named)
-    slope = f"{significant(math.degrees(goal.slope), 3)} deg"
-    margin = (
-        f"margin {number(best['margin_N'])} N ({number(best['margin_N_p05'])} to "
-        f"{number(best['margin_N_p95'])})"
-    )
-    near = abs(best["probability"] - 1.0 + goal.risk) < 0.01
-    chance = f"{100.0 * best['probability']:.{1 if near else 0}f} %"
-    if goal.margin > 0.0 or min(goal.torque_limit, goal.energy_limit) < math.inf:
-        slope += " within its limits"
-    if report.met:
-        return f"{sizes}: climbs {slope} with {chance}, {margin}"
-    return (
-        f"none is sure enough: the likeliest, {sizes}, climbs {slope} with {chance}, not "
-        f"{significant(100.0 * (1.0 - goal.risk), 3)} %, {margin}"
-    )
-
-
-def _size(name: str, value: float) -> str:
-    factor, unit = shown_unit(DIMENSIONS[name].unit)
-    return f"{name.replace('_', ' ')} {significant(factor * value, 3)} {unit}".rstrip()
-
-
-def number(value: float) -> str:
-    """A number to a tenth; words where it is none."""
-    if math.isinf(value):
-        return "not carried"
-    return f"{value:.1f}" if math.isfinite(value) else "-"
 
 
 def design_report(

@@ -7,14 +7,15 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.model_settings import in_si, take_quantity, take_soil
-from soilml.config.wheeled_rover import RoverWheel, WheeledRover, read_gravity
+from soilml.config.model_settings import take_soil
+from soilml.config.wheeled_rover import GravityByName, RoverWheel, WheeledRover, read_gravity
 from soilml.errors import InputError
+from soilml.io.declared_settings import OneOf, in_si, take_declared, take_quantity
 from soilml.io.named_files import NO_FILES, NamedFiles
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.numerics.prior import Prior
@@ -75,13 +76,13 @@ class ClimbingGoal:
     least: What is least among the designs that meet the goal, one of `LEAST`.
     """
 
-    slope: float
-    margin: float = 0.0
-    risk: float = RISK
-    slip_limit: float = SLIP_LIMIT
-    torque_limit: float = math.inf
-    energy_limit: float = math.inf
-    least: str = "energy"
+    slope: Annotated[float, Parameter("rad", 0.0, math.radians(60.0), "climbed straight up")]
+    margin: Annotated[float, Parameter("N", 0.0, 1e9, "pull left")] = 0.0
+    risk: Annotated[float, Parameter("1", 0.001, 0.5, "probability of failing")] = RISK
+    slip_limit: Annotated[float, Parameter("1", 0.01, 0.99, "highest slip")] = SLIP_LIMIT
+    torque_limit: Annotated[float, Parameter("N m", 0.0, 1e9, "most torque")] = math.inf
+    energy_limit: Annotated[float, Parameter("N", 0.0, 1e9, "most work for each metre")] = math.inf
+    least: Annotated[str, OneOf(LEAST)] = "energy"
 
 
 @dataclass(frozen=True)
@@ -159,8 +160,7 @@ def read_study(path: str | os.PathLike[str], files: NamedFiles | None = None) ->
     }
     wheelbase = take_quantity(rover, "wheelbase", "m")
     centre = _take_pair(rover, "centre_of_mass", "[ahead of the middle, above the ground] in m")
-    needed = "earth, moon, mars, or a number in m/s^2"
-    gravity = read_gravity(rover.take("gravity", (int, float, str), needed), rover)
+    gravity = GravityByName().take(rover, "gravity", "")
     rover.finish()
     for name in ("radius", "width", "lug_height"):
         dimensions[name] = _take_dimension(wheel, name)
@@ -178,7 +178,7 @@ def read_study(path: str | os.PathLike[str], files: NamedFiles | None = None) ->
         centre,
         gravity,
         _take_soil(settings.table("soil")),
-        _take_goal(settings.table("goal")),
+        take_declared(ClimbingGoal, settings.table("goal")),
     )
     settings.finish()
     return study
@@ -269,7 +269,7 @@ def _take_soil(settings: Settings) -> SoilQuestion:
         return SoilQuestion(
             {name: replace(entry, spread=spread, assumed=assumed)}, None, prior, tests
         )
-    names = settings.take("names", list, "a list of published soils, see `soilml soils`")
+    names = settings.take("names", list, "a list of published soils, see `soilml show soils`")
     base = Settings({k: v for k, v in settings.content.items() if k != "names"}, settings.where,
                     settings.files)  # fmt: skip
     if not names or not all(isinstance(name, str) for name in names):
@@ -290,31 +290,6 @@ def _published(names: list[str]) -> SoilQuestion:
     for name in names:
         soil(name)  # raises for one that there is not
     return SoilQuestion({name: soil_catalogue()[name] for name in names})
-
-
-def _take_goal(settings: Settings) -> ClimbingGoal:
-    slope = take_quantity(settings, "slope", "rad")
-    if not 0.0 <= slope <= math.radians(60.0):
-        hint = f" (if {slope:g} are degrees, write '{slope:g} deg')" if slope > 1.0 else ""
-        settings.fail(f"slope is {slope:g} rad; needed is 0 to 1.047 rad{hint}")
-    limits = {}
-    for key, unit in (("margin", "N"), ("torque_limit", "N m"), ("energy_limit", "N")):
-        if key in settings:
-            limits[key] = take_quantity(settings, key, unit)
-            if not 0.0 <= limits[key] < 1e9:
-                settings.fail(f"{key} is {limits[key]:g}; needed is a number above zero")
-    for key, default, low, high in (
-        ("risk", RISK, 0.001, 0.5),
-        ("slip_limit", SLIP_LIMIT, 0.01, 0.99),
-    ):
-        limits[key] = take_quantity(settings, key, "1") if key in settings else default
-        if not low <= limits[key] <= high:
-            settings.fail(f"{key} is {limits[key]:g}; needed is {low:g} to {high:g}")
-    least = settings.text("least", "energy")
-    if least not in LEAST:
-        settings.fail(f"least is {least!r}; needed is one of {', '.join(LEAST)}")
-    settings.finish()
-    return ClimbingGoal(slope=slope, least=least, **limits)
 
 
 def _bounded(what: str, value: float, low: float, high: float, unit: str) -> float:

@@ -15,8 +15,6 @@ from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, ModelledErrors, without_errors
-from soilml.identification.averaged import EFFECT, ERRORS, EXACT, LAW, LAW_SIZE, LAWS, SIZES
-from soilml.identification.hypotheses import REACH, SMOOTH
 from soilml.io.read_table import RUNS, read_table
 from soilml.numerics.prior import Prior
 from soilml.numerics.smooth_functions import SmoothFunctions
@@ -31,6 +29,19 @@ from soilml.remarks import Remark
 from soilml.rover_design.study import SoilQuestion
 from soilml.traction.soil_draws import MeasuredSoil, measured_soil, prior_draws
 
+#: Probability that the model is exact: a model is never quite right. Those of errors of all kinds
+#: together, by their scale over the typical ones.
+EXACT, ERRORS = 0.06, {0.1: 0.14, 0.25: 0.14, 0.5: 0.16, 1.0: 0.2, 2.0: 0.02}
+#: Probability that one effect of the catalogue is missing, by the scale of errors beside it, and
+#: the standard deviations of its size, in reference sizes, each as likely.
+EFFECT, SIZES = {0.0: 0.1, 0.25: 0.1}, (1.0, 3.0)
+#: Probability that a law of the soil is a little different, by one of these effects, and the
+#: standard deviation of its size, in reference sizes.
+LAW, LAW_SIZE = 0.08, 0.4
+LAWS = ("shear-softening", "hyperbolic-shear", "curved-envelope")
+#: Amplitude of a typical smooth error as a share of the range of readings, and standard deviations
+#: to which the size of an effect is drawn.
+SMOOTH, REACH = 0.02, 4.0
 #: Range of lambda, the share of a lug's height by which the soil shears further out (Ding et al.
 #: 2011).
 LUG_SHEARING = (0.5, 1.0)
@@ -116,9 +127,9 @@ def draw_worlds(
 ) -> DrawnWorlds:
     r"""Draws of the soil and of the model's errors, before any test of the design.
 
-    The errors are those over which `identify` averages, with its probabilities before the rows: the
-    model exactly as it is, typical errors of several scales with a smooth error of slip and load,
-    another law of the soil, an effect of the catalogue. Errors of sensors are none of a rover's. A
+    The errors are what a model may lack before any row is seen: nothing, typical errors of several
+    scales with a smooth error of slip and load, another law of the soil, an effect of the
+    catalogue. Errors of sensors are none of a rover's. A
     published soil keeps to the ranges that its paper prints, and each of several is as likely.
 
     question: The soils.
@@ -201,7 +212,7 @@ def soil_of_rows(question: SoilQuestion) -> RowsSoil | None:
     if question.rows is None:
         return None
     model, runs = question.rows
-    case = read_case(model, with_bias=True, files=question.named)
+    case = read_case(model, with_bias=True, files=question.named, with_explanations=True)
     if case.gears:
         raise InputError(f"{model} has several gears; needed is one with [gear]")
     return RowsSoil(case, measured_soil(replace(case, rover=None), read_table(runs, RUNS)))

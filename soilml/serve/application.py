@@ -5,28 +5,31 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from tornado.web import Application, StaticFileHandler, stream_request_body
 
 from soilml.errors import InputError
-from soilml.serve.answers import design
-from soilml.serve.answers.chosen_case import choices, model_text
-from soilml.serve.answers.forward import controls, forward
-from soilml.serve.guarded_handler import GuardedHandler, RefusedError, check_parts
+from soilml.serve.chosen_case import choices
+from soilml.serve.forward_curves import controls, forward
+from soilml.serve.guarded_handler import GuardedHandler, RefusedError
+from soilml.serve.job_commands import EFFORTS, KINDS, WITHOUT_FILES
 from soilml.serve.jobs import Jobs
 from soilml.serve.uploads import LARGEST_FILE, Upload, Uploads
-from soilml.serve.worker import KINDS
 
 STATIC = Path(__file__).parent / "static"  # The page's own files
 #: Largest body of a request that is no file, bytes: a model file and a map with room to spare.
 LARGEST_BODY = 2 << 20
-WITHOUT_FILES = ("design",)  # Kinds of jobs that read no dropped file
 _TYPES = {".html": "text/html", ".css": "text/css", ".js": "text/javascript",
           ".svg": "image/svg+xml", ".json": "application/json", ".csv": "text/csv"}  # fmt: skip
-#: A report may style itself, which the page may not; it runs no script and loads nothing.
-REPORT_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; sandbox"
+#: A report may style itself, which the page may not; it runs no script and loads nothing. The page
+#: that shows it in a frame is of the same origin, and measures its height.
+REPORT_POLICY = (
+    "default-src 'none'; style-src 'unsafe-inline'; img-src data:; frame-ancestors 'self'; "
+    "sandbox allow-same-origin"
+)
 
 
 def application(folder: Path, port: int) -> tuple[Application, Jobs]:
@@ -34,14 +37,12 @@ def application(folder: Path, port: int) -> tuple[Application, Jobs]:
     uploads, jobs = Uploads(folder / "files"), Jobs(folder / "jobs")
     # one thread: questions to the model are answered in order, and signals are not delayed
     pool = ThreadPoolExecutor(1)
-    shared = {"uploads": uploads, "jobs": jobs, "pool": pool}
     routes: list[Any] = [(r"/api/choices", Choices)]
-    for name, function in (("controls", controls), ("forward", forward), ("model", model_text),
-                           ("design", design.question)):  # fmt: skip
+    for name, function in (("controls", controls), ("forward", forward)):
         routes.append((rf"/api/{name}", Question, {"function": function, "pool": pool}))
     routes += [
         (r"/api/files", Files, {"uploads": uploads}),
-        (r"/api/jobs", StartJob, shared),
+        (r"/api/jobs", StartJob, {"uploads": uploads, "jobs": jobs}),
         (r"/api/jobs/([0-9a-f]{32})", RunningJob, {"jobs": jobs}),
         (r"/api/jobs/([0-9a-f]{32})/([\w.-]{1,150})", JobFile, {"jobs": jobs}),
         (r"/()", Static, {"path": str(STATIC), "default_filename": "index.html"}),
@@ -80,7 +81,13 @@ class Choices(GuardedHandler):
 
     def get(self) -> None:
         """Answer."""
-        self.answer(choices() | {"largest_file": LARGEST_FILE})
+        study = (
+            resources.files("soilml.rover_design")
+            .joinpath("example.toml")
+            .read_text(encoding="utf-8")
+        )
+        more = {"largest_file": LARGEST_FILE, "efforts": list(EFFORTS), "question": study}
+        self.answer(choices() | more)
 
 
 class Question(GuardedHandler):
@@ -166,26 +173,20 @@ class Files(GuardedHandler):
 class StartJob(GuardedHandler):
     """Starts a job."""
 
-    def initialize(self, uploads: Uploads, jobs: Jobs, pool: ThreadPoolExecutor) -> None:
+    def initialize(self, uploads: Uploads, jobs: Jobs) -> None:
         """Take the stores."""
-        self.uploads, self.jobs, self.pool = uploads, jobs, pool
+        self.uploads, self.jobs = uploads, jobs
 
     async def post(self) -> None:
         """Start it on the files that the request names."""
-        request = self.content(model=dict)
+        request = self.content()
         kind = request.pop("kind", None)
         keys = request.pop("files", None)
-        known = isinstance(kind, str) and kind in KINDS
+        known = isinstance(kind, str) and (kind in KINDS or kind == "look")
         if not known or not isinstance(keys, list) or not (keys or kind in WITHOUT_FILES):
-            raise RefusedError(400, f"needed is a kind ({', '.join(KINDS)}) and a list of files")
+            names = ", ".join(["look", *KINDS])
+            raise RefusedError(400, f"needed is a kind ({names}) and a list of files")
         files = [self._file(key) for key in keys]
-        if kind in ("estimate", "gap") or (kind == "design" and files):
-            chosen = request.get("model") or {}
-            check_parts(chosen)
-            # in the other thread: a model file takes long to read, and others must not wait
-            loop = asyncio.get_running_loop()
-            found = await loop.run_in_executor(self.pool, model_text, chosen)
-            request["model"] = found["text"]
         job = await self.jobs.start(kind, request | {"names": [f.name for f in files]}, files)
         self.answer(job.as_json())
 

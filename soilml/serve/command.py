@@ -14,7 +14,6 @@ from soilml.io.cell_text import read_whole_number
 if TYPE_CHECKING:
     import socket
 
-HELP = "open a live page: forward model, logs, estimates, gaps"
 DESCRIPTION = """\
 Serve a page on this machine alone (http://127.0.0.1:8642/) and open it in the
 browser: the forward model with sliders, the import of logs, estimates of the

@@ -13,7 +13,8 @@ from soilml.report.page import finite_or_null
 #: What the page may load: its own files alone, no inline script or style, no other host.
 POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
-    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    "connect-src 'self'; frame-src 'self'; base-uri 'none'; form-action 'none'; "
+    "frame-ancestors 'none'"
 )
 HEADERS = {
     "Content-Security-Policy": POLICY,
@@ -29,14 +30,13 @@ _READING = ("GET", "HEAD")  # Methods that only read
 #: What a part of a request must be; each may be missing, or null.
 _PARTS: dict[str, type] = {
     "wheel": str,
-    "soil": str,
     "model": str,
     "values": dict,
     "run": str,
     "map": str,
     "sheet": str,
-    "change": dict,
     "question": str,
+    "soil": str,
 }
 _KINDS: dict[type, str] = {str: "a text", dict: "an object"}
 #: What is said with a status that the server's library answers; others below 500 have the first.
@@ -56,9 +56,9 @@ class RefusedError(HTTPError):
         self.text = text
 
 
-def check_parts(request: dict[str, Any], **others: type) -> None:
-    """Refuse a request with a part of another type; `others` replace what a part must be."""
-    for name, kind in (_PARTS | others).items():
+def check_parts(request: dict[str, Any]) -> None:
+    """Refuse a request with a part of another type."""
+    for name, kind in _PARTS.items():
         if not isinstance(request.get(name), kind | None):
             raise RefusedError(400, f"{name}: needed is {_KINDS[kind]}")
 
@@ -97,7 +97,7 @@ class GuardedHandler(RequestHandler):
         ):
             raise RefusedError(415, "a body must be application/json or application/octet-stream")
 
-    def content(self, **others: type) -> dict[str, Any]:
+    def content(self) -> dict[str, Any]:
         """The request's body, a JSON object whose parts are what `check_parts` says."""
         try:
             found = json.loads(self.request.body, parse_int=float)
@@ -106,7 +106,7 @@ class GuardedHandler(RequestHandler):
             found = None
         if not isinstance(found, dict):
             raise RefusedError(400, "the request is no JSON object")
-        check_parts(found, **others)
+        check_parts(found)
         return found
 
     def answer(self, content: Any) -> None:

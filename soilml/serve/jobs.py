@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from soilml.errors import InputError
-from soilml.serve.answers.job_files import READ, WRITTEN
+from soilml.serve.job_commands import READ, WRITTEN
 
 _MOST_JOBS = 24  # Jobs that are remembered; the oldest are forgotten with their files
 #: Longest line of a worker, bytes: an answer with its pictures and tables.

@@ -103,7 +103,7 @@ def plain_name(name: str) -> str:
     ('pass wd.csv', 'file')
     """
     base = re.split(r"[/\\]", name)[-1]
-    kept = re.sub(r"[^\w .()+-]", "_", base).strip(" .")
+    kept = re.sub(r"[^\w .()+-]", "_", base).strip(" .").lstrip("-")
     stem, dot, ending = kept.rpartition(".")
     named = f"{_first_bytes(stem, _LONGEST_NAME)}{dot}{_first_bytes(ending, _LONGEST_ENDING)}"
     return named.strip() or "file"

@@ -28,7 +28,7 @@ BEHIND = 0.8  # Rim speed over the commanded one below which the drives do not k
 FLAGS = {
     "standing": "all wheels stand: there is no slip",
     "wheel-stopped": "a wheel stands or turns against the others: not described, passed over",
-    "not-steady": "the rims speed up or slow down: the force balance does not hold, passed over",
+    "not-steady": "the rims speed up or slow down: the force balance does not apply, passed over",
     "no-soil": "no soil of the prior explains torque and pull, a hard floor does: refused",
     "no-fit": "neither a soil of the prior nor a hard floor explains the torques: do not use them",
     "beyond": "more slip than the table has, or stuck: the slip is a lower limit",
@@ -98,7 +98,7 @@ def read_drive(table: Rows, case: Case) -> DriveRows:
     table = as_table(table)
     rover = case.rover
     if rover is None:
-        raise InputError("the model file has no [rover]; soilml slip needs mass and wheels")
+        raise InputError("the model file has no [rover]; soilml drive slip needs mass and wheels")
     speed = _one_of(table, "rim_speed_m_s", "wheel_speed_rad_s")
     reading = _one_of(table, "torque_Nm", "current_A")
     for name in ("time_s", "wheel", speed, "slope_rad"):
@@ -148,11 +148,13 @@ def _one_of(table: Table, name: str, other: str) -> str:
 
 def _filled(table: Table, name: str) -> None:
     if name not in table:
-        raise TableError(f"{table.source}: column {name} is missing; soilml slip needs it")
+        raise TableError(f"{table.source}: column {name} is missing; soilml drive slip needs it")
     blank = table[name] == "" if name == "wheel" else ~np.isfinite(table[name])
     if blank.any():
         place = table.place(int(np.argmax(blank)))
-        raise TableError(f"{place}, column {name}: the cell is blank; soilml slip needs a value")
+        raise TableError(
+            f"{place}, column {name}: the cell is blank; soilml drive slip needs a value"
+        )
 
 
 def _by_wheel(table: Table, wheels: Sequence[str]) -> NDArray[np.int64]:

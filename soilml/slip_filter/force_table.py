@@ -11,11 +11,11 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.coordinates import select_free
+from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.physics.operating_point import Operating
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import on_a_vehicle
-from soilml.traction.soil_draws import prior_draws
+from soilml.traction.soil_draws import mixed_prior_draws, prior_draws
 
 #: Slips of the table: close where forces rise steeply.
 SLIP = np.asarray([
@@ -68,7 +68,9 @@ def force_table(
     """
     rover = case.rover
     if rover is None:
-        raise InputError("the model file has no [rover]; soilml slip needs mass and wheels")
+        raise InputError("the model file has no [rover]; soilml drive slip needs mass and wheels")
+    if case.explanations and soils is None:
+        case, soils = mixed_prior_draws(case, count)
     draws = soils or prior_draws(select_free(case, None), count, case)
     steps = int(np.ceil(np.log(loads[1] / loads[0]) / np.log(LOAD_RATIO))) + 1
     load = np.geomspace(loads[0] * 0.999, loads[1] * 1.001, max(steps, 2))
@@ -78,7 +80,7 @@ def force_table(
     kinds = list(dict.fromkeys((gears[name], passes[name]) for name in rover.wheels))
     found, radius = [], {}
     for gear, number in kinds:
-        own = on_a_vehicle(case.of_gear(gear) if gear else case)
+        own = without_faults(case.of_gear(gear) if gear else case)
         radius[gear] = float(own.model.gear.radius)
         found.append(_forces(own, draws, load, number, gear, radius[gear]))
     pull, torque = (np.stack(each) for each in zip(*found, strict=True))

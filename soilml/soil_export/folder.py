@@ -14,8 +14,8 @@ from soilml.io.atomic_files import write_files
 from soilml.io.text_tables import csv_text
 from soilml.parameters import unit_text
 from soilml.remarks import Remark
+from soilml.report.numbers import significant
 from soilml.report.page import Content, Provenance, json_text
-from soilml.report.terminal import significant
 from soilml.soil_export.source_soil import SourceSoil, read_source_soil
 from soilml.soil_export.targets import TARGETS, SoilTarget
 

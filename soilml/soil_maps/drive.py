@@ -55,7 +55,8 @@ def read_map_drive(table: Rows, case: Case) -> MapDrive:
     for name in NEEDED:
         if name not in table:
             raise TableError(
-                f"{table.source}: column {name} is missing; soilml map needs {', '.join(NEEDED)}"
+                f"{table.source}: column {name} is missing; soilml drive map needs "
+                f"{', '.join(NEEDED)}"
             )
     for name in ("x_m", "y_m"):
         blank = ~np.isfinite(table[name])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES
 from soilml.report.figure_style import take_axes
+from soilml.report.numbers import format_log_density, pretty, shown_column
 from soilml.report.page import json_text
-from soilml.report.terminal import shown_column, significant
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.soil_maps.raster import geotiff, nav2_files
 from soilml.soil_maps.workflow import SoilMap, parameter_moments
 
@@ -24,77 +26,81 @@ WIDE, TALL, TALL_FROM = (2, 2, (11.0, 8.5)), (1, 4, (14.0, 5.5)), 1.3
 FILES = ("map.tif", "headings.tif", "costmap.yaml", "costmap.pgm", "map.json", "map.png")
 
 
-def map_verdict(found: SoilMap) -> str:
-    """What was driven, where the soil changes, and over what length it varies."""
+def report_of_map(found: SoilMap, title: str = "Map of the soil") -> Report:
+    """The report of a map: where the soil changes, the soil of each patch, slopes, the score."""
     drive, soils = found.drive, found.soils
     span = drive.station.max() - drive.station.min()
-    wheels = len(np.unique(drive.wheel))
     changes = ", ".join(f"{s:.1f}" for s in found.changes)
+    verdict = f"No sharp change of the soil was found along {span:.3g} m."
+    if changes:
+        verdict = f"The soil changes at {changes} m of the path, which is {span:.3g} m long."
     lines = [
-        f"{len(drive.station)} rows of {wheels} wheel{'s' * (wheels > 1)} over {span:.3g} m, "
-        f"{len(soils.station)} stretches; {int(found.known.sum())} cells of {found.grid.cell:g} m",
-        f"the soil changes at {changes} m of the path" if changes else "no sharp change of soil",
-        f"within a patch it varies over about {found.field.length:.2g} m"
+        f"Within a patch it varies over about {found.field.length:.2g} m."
         if found.field.local > 0.05 and np.isfinite(found.field.length)
-        else "within a patch no variation is found",
+        else "Within a patch no variation is found."
     ]
-    return "\n".join(lines)
+    if (held := found.held_out) is not None:
+        gains = [
+            f"{format_log_density(*held.gain(name))} above {name}"
+            for name in ("tracker", "one soil")
+        ]
+        lines.append(f"Log density of the torque of rows held out: {', '.join(gains)}.")
+    rows, columns, size = map_panels(found)
+    wheels = len(np.unique(drive.wheel))
+    return Report(
+        kind="map",
+        verdict=verdict,
+        lines=lines,
+        tables=[_patches(found), *([_slopes(found)] if found.ability is not None else [])],
+        pictures=[
+            Picture(
+                "Map", partial(plot_map, found), rows, columns, size, verdict,
+                "White: the path. Crosses: changes of the soil.", whole=columns > 2,
+            )
+        ],
+        remarks=list(found.remarks()),
+        title=title,
+        basis=f"{len(drive.station)} rows of {wheels} wheel{'s' * (wheels > 1)}, "
+        f"{len(soils.station)} stretches; {int(found.known.sum())} cells of {found.grid.cell:g} m",
+    )  # fmt: skip
 
 
-def map_text(found: SoilMap) -> str:
-    """The verdict in few lines, the soil of each patch, the score and the remarks."""
-    soils = found.soils
-    names = [QUANTITIES[c.path].column for c in soils.free]
-    lines = [map_verdict(found), ""]
-    factors = [shown_column(name) for name in names]
-    rows = []
+def _patches(found: SoilMap) -> ReportTable:
+    """The soil of each patch."""
+    soils, ends, moments = found.soils, [], []
     for patch in np.unique(soils.patch):
         own = soils.patch == patch
-        score, covariance = found.field.at(soils.place[own])
-        mean, std = parameter_moments(soils, score, covariance)
-        ends = f"{soils.station[own].min():.1f} to {soils.station[own].max():.1f}"
-        cells = [
-            f"{significant(f * m, 3)} +- {significant(f * s, 2)}"
-            for (f, _), m, s in zip(factors, mean.mean(axis=0), std.mean(axis=0), strict=True)
-        ]
-        rows.append((ends, *cells))
-    header = ("patch, m", *(name for _, name in factors))
-    lines.append(format_table(header, rows, text_columns=len(header)))
-    if found.ability is not None:
-        lines += ["", _slopes(found)]
-    if found.held_out is not None:
-        scores = ", ".join(f"{name} {value:.2f}" for name, value in found.held_out.mean.items())
-        lines += [
-            "",
-            f"{found.held_out.rows} rows held out on {_pieces(found)} stretches, log density of "
-            f"the torque of a row: {scores}",
-        ]
-        for name in ("tracker", "one soil"):
-            gain, error = found.held_out.gain(name)
-            lines.append(f"map over {name}: {gain:+.2f} +- {error:.2f}")
-    return "\n".join([*lines, *(f"! {remark}" for remark in found.remarks())])
+        mean, std = parameter_moments(soils, *found.field.at(soils.place[own]))
+        moments.append((mean.mean(axis=0), std.mean(axis=0)))
+        ends.append(f"{soils.station[own].min():.1f} to {soils.station[own].max():.1f}")
+    columns = [Column("patch, m", ends)]
+    for i, coordinate in enumerate(soils.free):
+        values, errors = ([float(own[k][i]) for own in moments] for k in (0, 1))
+        name = coordinate.path.replace("_", " ")
+        columns.append(Column(name, values, QUANTITIES[coordinate.path].unit, errors))
+    return ReportTable("Soil of each patch", columns)
 
 
-def _pieces(found: SoilMap) -> int:
-    assert found.held_out is not None
-    return len(found.held_out.pieces["map"])
-
-
-def _slopes(found: SoilMap) -> str:
-    """A line for each slope: cells by the probability of climbing, mean slip and energy."""
-    ability, rows = found.ability, []
+def _slopes(found: SoilMap) -> ReportTable:
+    """A row for each slope: cells by the probability of climbing, mean slip and energy."""
+    ability = found.ability
     assert ability is not None
-    for j, slope in enumerate(np.rad2deg(ability.slope)):
-        climbed = ability.climbed[:, j]
-        known = np.isfinite(ability.slip[:, j])
-        slip, energy = (
-            significant(float(values[known, j].mean()), 2) if known.any() else ""
-            for values in (ability.slip, ability.energy)
-        )
-        shares = [f"{100 * np.mean(climbed > p):.0f} %" for p in (0.5, 0.9)]
-        rows.append((f"{slope:g}", *shares, slip, energy))
-    header = ("slope_deg", "cells above 50 %", "above 90 %", "mean slip", "energy_J/m")
-    return "probability of climbing\n" + format_table(header, rows)
+    means = []
+    for values in (ability.slip, ability.energy):
+        known = np.isfinite(values)
+        total = np.where(known, values, 0.0).sum(axis=0)
+        means.append((total / np.where(known.any(axis=0), known.sum(axis=0), np.nan)).tolist())
+    likely = [np.mean(ability.climbed > p, axis=0).tolist() for p in (0.5, 0.9)]
+    return ReportTable(
+        "Probability of climbing",
+        [
+            Column("slope", ability.slope.tolist(), "rad", digits=3),
+            Column("cells above 50 %", likely[0], "share", digits=3),
+            Column("above 90 %", likely[1], "share", digits=3),
+            Column("mean slip", means[0], digits=2),
+            Column("work", means[1], "J/m", digits=2),
+        ],
+    )
 
 
 def map_json(found: SoilMap) -> dict[str, Any]:
@@ -159,13 +165,7 @@ def plot_map(found: SoilMap, ax: Any = None) -> NDArray[Any]:
     shown: list[tuple[str, Floats, tuple[float | None, float | None]]] = []
     for i in (1, 0)[: 1 if found.ability is not None else 2]:
         factor, name = shown_column(QUANTITIES[found.soils.free[i].path].column)
-        shown.append(
-            (
-                name.rpartition("_")[0].replace("_", " ") + f", {name.rpartition('_')[2]}",
-                factor * mean[:, i],
-                (None, None),
-            )
-        )
+        shown.append((pretty(name), factor * mean[:, i], (None, None)))
         shown.append(("its standard deviation", factor * std[:, i], (None, None)))
     if found.ability is not None and (occupied := found.occupied) is not None:
         which = f"{np.rad2deg(found.ability.slope[-1]):g} deg"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +33,9 @@ from soilml.soil_maps.local_soils import (
     with_exact_sensors,
 )
 from soilml.soil_maps.raster import Elevation, MapGrid
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 MODEL = "any_wheel"  # Released file that is taken where none is named
 CELL, REACH = 0.5, 2.0  # m
@@ -122,11 +125,11 @@ class SoilMap(Result):
             found |= {f"pitch_{name}_rad": self.pitch[:, j]} | _bands_of(self.by_heading, j, name)
         return {name: self.grid.spread(values, self.known) for name, values in found.items()}
 
-    def summary(self) -> str:
-        """The verdict in three lines."""
-        from soilml.soil_maps.presentation import map_verdict
+    def report(self) -> Report:
+        """Where the soil changes, the soil of each patch, slopes, and how well it predicts."""
+        from soilml.soil_maps.presentation import report_of_map
 
-        return map_verdict(self)
+        return report_of_map(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each known cell: its middle in m, and the soil with standard deviations."""
@@ -138,12 +141,6 @@ class SoilMap(Result):
             name = QUANTITIES[coordinate.path].column
             columns |= {name: mean[:, i], f"{name}_std": std[:, i]}
         return columns
-
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw the map; see `soilml.soil_maps.presentation.plot_map`."""
-        from soilml.soil_maps.presentation import plot_map
-
-        return plot_map(self, ax)
 
     def remarks(self) -> Iterator[Remark]:
         """What to know of the map, by code."""
@@ -224,7 +221,7 @@ def soil_map(
     TableError, FitError
         As `read_map_drive`, `follow` and `local_soils` do.
     """
-    case, (low, high) = as_case(case), SIZES
+    case, (low, high) = as_case(case, with_explanations=False), SIZES
     if not (low <= cell <= high and low <= reach <= high):
         raise InputError(
             f"cell is {cell:g} m and reach {reach:g} m; needed are {low:g} to {high:g} m"

@@ -41,11 +41,15 @@ class DrawnErrors:
         return np.asarray((functions * self.weights[key][draw]).sum(axis=1))
 
     def amplitude(self, channel: str) -> float:
-        """Largest standard deviation of a channel's error before any reading; 0 without one."""
-        grid = np.meshgrid(np.linspace(*self.slip, 25), np.geomspace(*self.load, 25))
+        """Largest standard deviation of the draws of a channel's error; 0 without one."""
+        grid = np.meshgrid(np.linspace(*self.slip, 9), np.geomspace(*self.load, 9))
         at = [values.ravel() for values in grid]
-        own = [f.at(*at) for (name, _), f in self.functions.items() if name == channel]
-        return max((float(np.sqrt((f**2).sum(axis=1).max())) for f in own), default=0.0)
+        found = [
+            np.sqrt(((f.at(*at) @ self.weights[name, gear].T) ** 2).mean(axis=1).max())
+            for (name, gear), f in self.functions.items()
+            if name == channel
+        ]
+        return float(max(found, default=0.0))
 
     def of_draws(self, index: NDArray[np.int64]) -> DrawnErrors:
         """The errors of some of the draws."""

@@ -10,10 +10,10 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
-from soilml.io.text_tables import format_table
 from soilml.numerics.quantiles import quantile_band
 from soilml.physics.soils.gravity_law import CHANGED, SCHOOLS, GravityChange
 from soilml.remarks import Remark
+from soilml.report.tables import Column, ReportTable
 from soilml.traction.draws import SoilDraws
 
 
@@ -51,16 +51,13 @@ class LawComparison:
 
     by_law: Mapping[str, Answers]
 
-    def text(self) -> str:
+    def table(self) -> ReportTable:
         """A row for each law: median and 90 % band of each answer."""
-        names = list(next(iter(self.by_law.values())))
-        header = ["law of gravity", *(part for name in names for part in (name, "p05", "p95"))]
-        rows = []
-        for law, answers in self.by_law.items():
-            bands = [quantile_band(draws) for draws in answers.values()]
-            cells = [f"{float(v):.1f}" for b in bands for v in (b.middle, b.lower, b.upper)]
-            rows.append([law, *cells])
-        return format_table(header, rows, text_columns=1)
+        columns = [Column("law of gravity", list(self.by_law))]
+        for name in next(iter(self.by_law.values())):
+            bands = [quantile_band(answers[name]) for answers in self.by_law.values()]
+            columns.append(Column.of_bands(name.replace("_", " "), bands))
+        return ReportTable("By law of gravity", columns)
 
     def remark(self) -> Remark:
         """How much of the width of the first answer's band is due to the doubt of the law."""

@@ -1,59 +1,35 @@
-"""Pull and slope as text, as columns, and as a page."""
+"""Pull and slope as columns, and what is said and shown of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from math import pi
-from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
-from soilml.io.text_tables import format_table
-from soilml.numerics.quantiles import QuantileBand, quantile_band
+from soilml.numerics.quantiles import quantile_band
 from soilml.physics.pull_efficiency import traffic_class
 from soilml.quantities import NOT_IDENTIFIED_ABOVE
 from soilml.remarks import Remark
-from soilml.report import numbers
-from soilml.report.figure_style import picture
-from soilml.report.page import Report, ReportPicture, ReportTable
-from soilml.report.terminal import significant
-from soilml.traction.by_load import LoadPrediction
+from soilml.report.column_figure import column_picture
+from soilml.report.numbers import format_band, format_quantity, format_range, significant
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
+from soilml.traction.by_load import SAME_LOAD, LoadPrediction
 from soilml.traction.pull_and_slope import Traction
-from soilml.traction.report import ROWS, PullReport, figure_size
+from soilml.traction.report import PullReport
 
-#: The printed curve has every second slip.
-PRINTED_STEP = 2
-DEGREES = 180.0 / pi
-
-
-class Plotted(Protocol):
-    """A result that draws itself."""
-
-    def plot(self, ax: Any = None) -> Any:
-        """Draw into axes."""
+STEP = 2  # Tables show every second slip
+_NOTATION = (
+    ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
+    ("tractive efficiency", "power at the drawbar over that of the drive."),
+    ("pull efficiency", "share of the thrust that is left as pull; class by 35, 50, 65 %."),
+)
 
 
-Result = TypeVar("Result", bound=Plotted)
-
-
-@dataclass(frozen=True)
-class Presentation(Generic[Result]):
-    """What one kind of result is written as."""
-
-    columns: Callable[[Result], Mapping[str, Any]]  # The CSV table of a result, in SI units
-    text: Callable[[Result], str]  # Tables and warnings for a terminal
-    warnings: Callable[[Result], Sequence[Remark]]  # The warnings alone
-    # The page of results by group, the column of the groups, model file and table
-    page: Callable[[Mapping[str, Result], str | None, tuple[str, str]], Report]
-    # Rows and columns of axes that `plot` takes, and the size of the figure, inches
-    panels: Callable[[Result], tuple[int, int, tuple[float, float]]]
-
-
-def pull_columns(report: PullReport) -> dict[str, Any]:
+def pull_columns(found: PullReport) -> dict[str, Any]:
     """A row for each load and slip, in SI units; what belongs to a load stands in all its rows."""
-    parts = [_columns(one) for one in report.by_load]
+    parts = [_columns(one) for one in found.by_load]
     return {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
 
 
@@ -87,9 +63,9 @@ def _classes(known: Traction) -> dict[str, Any]:
     """The traffic class of the median pull efficiency at each slip, and the soils that share it."""
     middle = quantile_band(known.pull_efficiency).middle
     usual, each = traffic_class(middle), traffic_class(known.pull_efficiency)
-    told = np.isfinite(middle)
-    probability = np.where(told, (each == usual).mean(axis=0), np.nan)
-    return {"traffic_class": np.where(told, usual, ""), "traffic_class_probability": probability}
+    finite = np.isfinite(middle)
+    probability = np.where(finite, (each == usual).mean(axis=0), np.nan)
+    return {"traffic_class": np.where(finite, usual, ""), "traffic_class_probability": probability}
 
 
 def band_columns(name: str, draws: Any) -> dict[str, Any]:
@@ -98,213 +74,122 @@ def band_columns(name: str, draws: Any) -> dict[str, Any]:
     return {name: band.middle, f"{name}_p05": band.lower, f"{name}_p95": band.upper}
 
 
-def pull_warnings(report: PullReport) -> list[Remark]:
-    """Warnings of each load, then those of the whole result."""
-    by_load = [(f"{one.posterior.load:.4g} N: ", one.warnings) for one in report.by_load]
-    own = [remark.under(head) for head, remarks in by_load for remark in remarks]
-    return [*own, *report.warnings]
-
-
-def pull_text(report: PullReport) -> str:
-    """A table for each load, the largest pull, the steepest slope, and the warnings."""
-    slips, loads = report.measured_range.slip, report.measured_range.load
-    head = (
-        f"{report.rows} row{'s'[: report.rows > 1]} at slips {slips[0]:.2g} to {slips[1]:.2g}, "
-        f"loads {loads[0]:.4g} to {loads[1]:.4g} N"
+def report_of_pull(found: PullReport, title: str = "Drawbar pull and slope") -> Report:
+    """The report of a prediction for one gear."""
+    loads = found.by_load
+    slips = format_range(*found.measured_range.slip, digits=2)
+    columns = pull_columns(found)
+    shown = np.arange(len(columns["slip"]))
+    shown = shown[_every_second(found)]
+    names = ["load_N", "slip", "drawbar_pull_N", "slope_rad"]
+    use = ["load_N", "slip", "tractive_efficiency", "pull_efficiency", "traffic_class"]
+    use += ["traffic_class_probability"]
+    tables = [_by_load(found)]
+    for head, of in (("Pull and slope", names), ("Efficiency", use)):
+        if head == "Efficiency" and all(one.posterior.most_efficient is None for one in loads):
+            continue
+        wanted = [
+            n for n in columns if n in of or n.removesuffix("_p05").removesuffix("_p95") in of
+        ]
+        tables.append(ReportTable.of(head, {n: np.asarray(columns[n])[shown] for n in wanted}))
+    tables += [one.laws.table() for one in loads if one.laws is not None]
+    vague = [share > NOT_IDENTIFIED_ABOVE for one in loads for share in one.remaining_fraction]
+    sentences = [_sentence(one) for one in loads]
+    under: dict[Remark, list[str]] = {}
+    for one in loads:
+        for remark in one.warnings:
+            under.setdefault(remark, []).append(significant(one.posterior.load))
+    remarks = [remark.under(f"{', '.join(names)} N: ") for remark, names in under.items()]
+    return Report(
+        kind="pull",
+        verdict=sentences[0],
+        lines=[*sentences[1:], *(_efficiency(loads[0].posterior) if len(loads) == 1 else ())],
+        tables=tables,
+        pictures=[_picture(found)],
+        remarks=[*remarks, *found.warnings],
+        next_steps=["measure a row at another load and slip: soilml plan next finds the best one"],
+        status="not known" if all(vague) else "partly known" if any(vague) else "predicted",
+        tone="warn" if any(vague) else "good",
+        title=title,
+        basis=f"{found.rows} row{'s'[: found.rows != 1]} at slips {slips}",
+        notation=_NOTATION,
     )
-    parts = [head, *(_load_text(one) for one in report.by_load)]
-    parts += [one.laws.text() for one in report.by_load if one.laws is not None]
-    return "\n\n".join([*parts, "\n".join(f"! {text}" for text in report.warnings)])
 
 
-def _load_text(one: LoadPrediction) -> str:
-    known, prior, (no_pull, no_slope) = one.posterior, one.prior, _not_known(one)
-    header = (
-        "slip", "pull_N", "p05", "p95", "pull/load", "slope_deg", "p05", "p95",
-        "prior_p05_N", "prior_p95_N",
-    )  # fmt: skip
-    lines = [
-        (slip, *pull, f"{middle / known.load:.2f}", *slope, *before)
-        for (slip, pull, slope, before), middle in zip(
-            _curve(one), _printed(quantile_band(known.pull).middle), strict=True
+def _every_second(found: PullReport) -> Any:
+    """Which rows of the columns tables show, (rows,)."""
+    kept = [np.arange(len(one.posterior.slip)) % STEP == STEP - 1 for one in found.by_load]
+    return np.concatenate(kept)
+
+
+def _sentence(one: LoadPrediction) -> str:
+    """Largest pull and steepest slope under a load, with 90 % bands where the rows tell them."""
+    known = one.posterior
+    unknown = {"N": "an unknown force", "rad": "an unknown slope"}
+    said = [
+        unknown[unit] if share > NOT_IDENTIFIED_ABOVE else format_band(*_ends(draws), unit)
+        for draws, unit, share in zip(
+            (known.largest_pull, known.steepest_slope), unknown, one.remaining_fraction, strict=True
         )
     ]
-    pulled = _value(quantile_band(known.largest_pull), 1.0, no_pull)
-    climbed = _value(quantile_band(known.steepest_slope), DEGREES, no_slope)
-    best = [
-        f"largest pull    {pulled} N, at slip {_slips(quantile_band(known.best_slip))}; "
-        f"before the rows {_range(quantile_band(prior.largest_pull), 1.0)} N",
-        f"steepest slope  {climbed} deg, at slip {_slips(quantile_band(known.steepest_slip))}; "
-        f"before the rows {_range(quantile_band(prior.steepest_slope), DEGREES)} deg",
-    ]
-    doubts = [f"! {text}" for text in one.warnings]
-    table = format_table(header, lines, text_columns=0)
-    return "\n".join([f"load {known.load:.4g} N", table, *best, *_efficiency(known), *doubts])
+    return f"At {significant(known.load)} N the wheel pulls {said[0]} at most and climbs {said[1]}."
 
 
-def load_sentence(one: LoadPrediction) -> str:
-    """Largest pull and steepest slope under a load, with 90 % bands."""
-    known, (no_pull, no_slope) = one.posterior, _not_known(one)
-    pulled = _value(quantile_band(known.largest_pull), 1.0, no_pull)
-    climbed = _value(quantile_band(known.steepest_slope), DEGREES, no_slope)
-    return f"At {known.load:.4g} N the wheel pulls {pulled} N at most and climbs {climbed} deg."
+def _ends(draws: Any) -> tuple[float, float, float]:
+    band = quantile_band(draws)
+    return float(band.lower), float(band.middle), float(band.upper)
 
 
-def _efficiency(known: Traction) -> list[str]:
+def _efficiency(known: Traction) -> Iterator[str]:
     """Both efficiencies, and the class, where the drive is used best."""
     i = known.most_efficient
     if i is None:
-        return []
-    both = [quantile_band(v[:, i]) for v in (known.tractive_efficiency, known.pull_efficiency)]
-    tractive, pull = (f"{b.middle:.2f} ({b.lower:.2f} to {b.upper:.2f})" for b in both)
-    classes = _classes(known)
-    share = f"{classes['traffic_class_probability'][i]:.0%}"
-    return [
-        f"efficiency      tractive {tractive} at slip {known.slip[i]:.2g}, its best; pull {pull}",
-        f"traffic class   {classes['traffic_class'][i]} there, as on {share} of the soils",
-    ]
+        return
+    tractive, pull = (
+        format_band(*_ends(v[:, i]), digits=2)
+        for v in (known.tractive_efficiency, known.pull_efficiency)
+    )
+    where = f"{known.slip[i]:.2g}"
+    yield f"Tractive efficiency is best at slip {where}: {tractive}; pull efficiency {pull}."
+    found = _classes(known)
+    share = format_quantity(float(found["traffic_class_probability"][i]), "share", digits=2)
+    yield f"Traffic class there: {found['traffic_class'][i]}, on {share} of the soils."
 
 
-def _not_known(one: LoadPrediction) -> list[bool]:
-    """Whether pull and slope are no better known than before the rows."""
-    return [share > NOT_IDENTIFIED_ABOVE for share in one.remaining_fraction]
-
-
-def _printed(values: Any) -> Any:
-    """Every second one of the values along the curve."""
-    return values[PRINTED_STEP - 1 :: PRINTED_STEP]
-
-
-def _curve(one: LoadPrediction) -> Iterator[tuple[str, list[str], list[str], list[str]]]:
-    """Slip; middle and ends of pull (N) and of slope (degrees); ends of the prior's pull."""
-    known = one.posterior
-    pull, slope, before = map(quantile_band, (known.pull, known.slope, one.prior.pull))
-    parts = [known.slip, pull.middle, pull.lower, pull.upper]
-    parts += [DEGREES * v for v in (slope.middle, slope.lower, slope.upper)]
-    for slip, *values in zip(*map(_printed, [*parts, before.lower, before.upper]), strict=True):
-        cells = [f"{value:.1f}" for value in values]
-        yield f"{slip:.3g}", cells[:3], cells[3:6], cells[6:]
-
-
-def _value(found: QuantileBand, factor: float, unknown: bool = False, unit: str = "") -> str:
-    middle = "not known" if unknown else f"{factor * float(found.middle):.1f}{unit}"
-    return f"{middle} ({_range(found, factor)})"
-
-
-def _range(found: QuantileBand, factor: float) -> str:
-    return f"{factor * float(found.lower):.1f} to {factor * float(found.upper):.1f}"
-
-
-def _slips(found: QuantileBand) -> str:
-    low, middle, high = (f"{float(v):.2g}" for v in (found.lower, found.middle, found.upper))
-    return middle if low == high else f"{middle} ({low} to {high})"
-
-
-def pull_page(found: Mapping[str, PullReport], by: str | None, files: tuple[str, str]) -> Report:
-    """The page of `pull` for one gear: predictions by group; model file and table."""
-    answer, rows, use, known = [], [], [], []
-    for name, report in found.items():
-        for one in report.by_load:
-            head = f"{by} {name}, " if by else ""
-            pulled = _value(quantile_band(one.posterior.largest_pull), 1.0, unit=" N")
-            climbed = _value(quantile_band(one.posterior.steepest_slope), DEGREES, unit="°")
-            no_pull, no_slope = (
-                "is not known better than before the rows" if vague else "is"
-                for vague in _not_known(one)
-            )
-            known += [not any(_not_known(one))]
-            answer.append(
-                f"{numbers.capitalised(head)}{significant(one.posterior.load)} N: the largest pull "
-                f"{no_pull} {pulled}, the steepest slope {no_slope} {climbed}."
-            )
-            use += [([name] if by else []) + row for row in _efficiency_rows(one.posterior)]
-            rows += [([name] if by else []) + row for row in _page_rows(one)]
-    header = ["load, N", "slip", "pull, N", "90 %", "slope, °", "90 %", "pull before, N (90 %)"]
-    first = next(iter(found.values()))
-    images = [
-        ReportPicture(
-            f"Pull and slope over slip{f', {by} {name}' if by else ''}",
-            picture(report.plot, ROWS, len(report.by_load), figure_size(report), answer[0]),
-            "Lines: medians. Bands: 90 % of the soils that the rows allow (blue) and of those of "
-            "the prior (grey). Dashed: pull efficiency, with the ends of its classes (dotted).",
-        )
-        for name, report in list(found.items())[:MOST_PICTURES]
-    ]
-    warnings = [
-        remark.under(f"{by} {name}: ") if by else remark
-        for name, report in found.items()
-        for remark in pull_warnings(report)
-    ]
-    count = sum(report.rows for report in found.values())
-    badge = "predicted" if all(known) else "partly known" if any(known) else "not known"
-    return Report(
-        kind="pull",
-        title=f"Drawbar pull and slope on the soil of {Path(files[1]).name}",
-        badge=badge,
-        meaning=f"from {count} row{'s'[: count != 1]} at slips {first.measured_range.slip[0]:.2g} "
-        f"to {first.measured_range.slip[1]:.2g}, by the model {Path(files[0]).name}",
-        answer=answer[:MOST_SENTENCES],
-        tone="named" if all(known) else "suspected",
-        pictures=images,
-        tables=[
-            ReportTable(caption, [*([by] if by else []), *names], cells, 1 + bool(by))
-            for caption, names, cells in (
-                ("Pull and slope", header, rows),
-                ("Efficiency", EFFICIENCIES, use),
-            )
-            if cells
-        ],
-        warnings=warnings,
-        next_steps=[
-            "Drive a row at another load and slip: soilml plan next says which narrows it most."
-        ],
-        notation=[
-            ("90 %", "from the 5 % to the 95 % quantile; medians before them."),
-            ("tractive efficiency", "power at the drawbar over that of the drive."),
-            ("pull efficiency", "share of the thrust that is left as pull; class by 35, 50, 65 %."),
+def _by_load(found: PullReport) -> ReportTable:
+    known = [one.posterior for one in found.by_load]
+    pulls = [quantile_band(one.prior.largest_pull) for one in found.by_load]
+    return ReportTable(
+        "By load",
+        [
+            Column("load", [one.load for one in known], "N"),
+            Column.of_bands("largest pull", [quantile_band(k.largest_pull) for k in known], "N"),
+            Column.of_bands(
+                "steepest slope", [quantile_band(k.steepest_slope) for k in known], "rad"
+            ),
+            Column.of_bands("at slip", [quantile_band(k.best_slip) for k in known], digits=2),
+            Column.of_bands("pull before the rows", pulls, "N"),
         ],
     )
 
 
-EFFICIENCIES = (
-    *("load, N", "slip", "tractive efficiency", "90 %", "pull efficiency", "90 %"),
-    *("traffic class", "of the soils"),
-)
-
-
-def _efficiency_rows(known: Traction) -> list[list[str]]:
-    """Both efficiencies and the class at each printed slip; none for a leg."""
-    if known.most_efficient is None:
-        return []
-    classes = _classes(known)
-    both = [quantile_band(v) for v in (known.tractive_efficiency, known.pull_efficiency)]
-    rows = []
-    for i in range(PRINTED_STEP - 1, len(known.slip), PRINTED_STEP):
-        cells = [significant(known.load), f"{known.slip[i]:.3g}"]
-        for band in both:
-            cells += [f"{band.middle[i]:.2f}", f"{band.lower[i]:.2f} to {band.upper[i]:.2f}"]
-        share = f"{classes['traffic_class_probability'][i]:.0%}"
-        rows.append([c.replace("-", "−") for c in cells] + [classes["traffic_class"][i], share])
-    return rows
-
-
-#: Most pictures and sentences of a page; the table has the rest.
-MOST_PICTURES, MOST_SENTENCES = 6, 6
-
-
-def _page_rows(one: LoadPrediction) -> list[list[str]]:
-    load, rows = significant(one.posterior.load), []
-    for slip, pull, slope, before in _curve(one):
-        ends = [" to ".join(values) for values in (pull[1:], slope[1:], before)]
-        cells = [load, slip, pull[0], ends[0], slope[0], ends[1], ends[2]]
-        rows.append([cell.replace("-", "−") for cell in cells])
-    return rows
-
-
-PRESENTATION = Presentation(
-    columns=pull_columns,
-    text=pull_text,
-    warnings=pull_warnings,
-    page=pull_page,
-    panels=lambda report: (ROWS, len(report.by_load), figure_size(report)),
-)
+def _picture(found: PullReport) -> Picture:
+    slip, load, pull = found.measured_pull
+    columns = pull_columns(found)
+    if len(found.by_load) == 1:
+        near = np.abs(load / found.by_load[0].posterior.load - 1.0) < SAME_LOAD
+        slip, pull = slip[near], pull[near]
+    else:
+        columns = {name: values for name, values in columns.items() if "_prior" not in name}
+    panels = [("drawbar_pull_N",), ("slope_rad",), ("tractive_efficiency", "pull_efficiency")]
+    slips = format_range(*found.measured_range.slip, digits=2)
+    return column_picture(
+        columns,
+        "slip",
+        panels,
+        ("load_N",) if len(found.by_load) > 1 else (),
+        title="Pull, slope and efficiency over slip",
+        caption="Lines: medians. Bands: 90 % of the soils that the rows allow; grey: of the prior. "
+        f"Points: measured pull. Slips {slips} were measured.",
+        measured={"slip": slip, "drawbar_pull_N": pull},
+    )

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
+from soilml.fitting.mixtures import EXCLUDED_KINDS, without_faults
 from soilml.numerics.quantiles import quantile_band
 from soilml.numerics.root_finding import rising_root
 from soilml.physics.contact import Force
-from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import has_thrust, pull_efficiency, tractive_efficiency
 from soilml.remarks import Remark
@@ -21,8 +21,6 @@ from soilml.traction.draws import SoilDraws
 
 #: Upper end of the slopes searched, rad (86 degrees); steeper ones are clipped to it.
 LARGEST_SLOPE = 1.5
-#: Kinds of effects of the test rig and its sensors, which do not act on a vehicle.
-EXCLUDED_KINDS = ("rig", "sensor")
 
 
 @dataclass(frozen=True)
@@ -96,14 +94,8 @@ class Traction:
         return np.where(np.isfinite(values).any(axis=1), slip, np.nan)
 
 
-def on_a_vehicle(case: Case) -> Case:
-    """The case without the effects of the test rig and its sensors."""
-    own = tuple(e for e in case.model.effects if e.about.kind not in EXCLUDED_KINDS)
-    return replace(case, model=Model(case.model.gear, own))
-
-
 def excluded_effects(case: Case) -> list[Remark]:
-    """A remark on the effects that `on_a_vehicle` leaves out, if there are any."""
+    """A remark on the effects that `without_faults` leaves out, if there are any."""
     names = [e.name for e in case.model.effects if e.about.kind in EXCLUDED_KINDS]
     text = f"effects of rig and sensors are excluded: {', '.join(names)}"
     return [Remark("effects-excluded", text, tuple(names), "note")] if names else []
@@ -145,7 +137,7 @@ def predict_traction(
     Wong, Theory of Ground Vehicles, chapter 3; the efficiencies as in
     `soilml.physics.pull_efficiency`, without the error of the model's torque.
     """
-    case = on_a_vehicle(case)
+    case = without_faults(case)
     count = len(draws.values)
     rows, columns = (grid.ravel() for grid in np.indices((count, len(slip))))
 

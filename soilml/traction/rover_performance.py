@@ -10,11 +10,11 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.mixtures import without_faults
 from soilml.fitting.operating_points import wheel_gears, wheel_passes
 from soilml.numerics.root_finding import rising_root
 from soilml.physics.operating_point import Operating
 from soilml.traction.draws import SoilDraws
-from soilml.traction.pull_and_slope import on_a_vehicle
 
 SAME_LOAD = 1e-9  # Loads (N) that agree to this share are those of one wheel, solved once
 LARGEST_SLOPE = np.deg2rad(60.0)  # Steepest slope that is looked at, rad (60 degrees)
@@ -94,7 +94,7 @@ def _forces(
     speed: float | None,
     gear: str,
 ) -> tuple[Floats, ...]:
-    case = on_a_vehicle(case)
+    case = without_faults(case)
     draw, column = (grid.ravel() for grid in np.indices((len(load), len(slip))))
     at = Operating(
         slip=slip[column], load=load[draw], pass_number=float(number), speed=speed, slip_angle=0.0

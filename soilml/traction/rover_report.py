@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
@@ -17,12 +16,10 @@ from soilml.config.wheeled_rover import GRAVITY
 from soilml.errors import InputError
 from soilml.fitting.operating_points import with_rover_columns
 from soilml.io.read_table import Rows, as_table
-from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.onboard.estimator import Estimator
 from soilml.physics.soils.gravity_law import GravityChange
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.figure_style import take_axes
 from soilml.results import Result
 from soilml.traction.by_load import LOAD_FACTOR, SLIP_MARGIN, MeasuredRange, slip_grid
 from soilml.traction.draws import DrawnErrors, SoilDraws
@@ -32,16 +29,16 @@ from soilml.traction.gravity import (
     draws_at_gravity,
     gravity_remark,
 )
-from soilml.traction.model_errors import draw_model_errors
 from soilml.traction.pull_and_slope import excluded_effects
-from soilml.traction.report import POSTERIOR, PRIOR
 from soilml.traction.rover_performance import LARGEST_SLOPE, RoverPerformance, rover_performance
 from soilml.traction.soil_draws import measured_soil, prior_draws
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 SLOPES = np.deg2rad([0.0, 5.0, 10.0, 15.0, 20.0])  # Slopes that are looked at by default, rad
 #: Gravity, m/s^2, and relative difference from it, from which on it is not the Earth's.
 EARTH, OTHER_GRAVITY = GRAVITY["earth"], 0.02
-SIZE = (10.0, 6.4)  # Width and height of the figure, inches
 
 
 @dataclass(frozen=True, repr=False)
@@ -55,18 +52,11 @@ class RoverReport(Result):
     warnings: tuple[Remark, ...]
     laws: LawComparison | None = None  # By each law of gravity, where that is in doubt
 
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw slip, margin and energy against the slope, and the steepest slope.
+    def report(self) -> Report:
+        """The steepest slope, slip and work by slope, wheels, and what limits them."""
+        from soilml.traction.rover_presentation import report_of_rover
 
-        `ax`: four axes of matplotlib; a new figure where None. Returns the axes, (2, 2). Raises
-        `InputError` for another number of axes.
-        """
-        return plot_rover(self, ax)
-
-    def summary(self) -> str:
-        """The steepest slope with its 90 % band."""
-        low, middle, high = np.rad2deg(np.nanquantile(self.performance.steepest_slope, QUANTILES))
-        return f"The rover climbs {middle:.1f} deg (90 %: {low:.1f} to {high:.1f} deg)."
+        return report_of_rover(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each slope: medians and ends of 90 % bands, SI units."""
@@ -112,7 +102,7 @@ def rover_report(
         slopes = SLOPES[tipping >= SLOPES]
     table = with_rover_columns(case, as_table(table))
     soil = measured_soil(case, table, free, estimator, exact_model)
-    table = table.rows(table.answered)
+    case, table = soil.case, table.rows(table.answered)
     if gravity is not None:
         case = with_gravity(case, gravity.target)
     measured = MeasuredRange.of(table["slip"], table["load_N"])
@@ -122,7 +112,7 @@ def rover_report(
     draws, prior = soil.draws, prior_draws(soil.unknown, case=case)
     assert case.rover is not None
     loads = np.ravel(case.rover.loads(slopes)).tolist()
-    errors = draw_model_errors(case, table, draws, slip, loads, noise_scale=soil.noise_scale)
+    errors = soil.errors(slip, loads, ("drawbar_pull", "torque", "sinkage"))
     if errors is not None:
         draws, prior = replace(draws, errors=errors[0]), replace(prior, errors=errors[1])
     laws = None
@@ -209,38 +199,3 @@ def _warnings(
         "no side slope",
         severity="note",
     )
-
-
-def plot_rover(report: RoverReport, ax: Any = None) -> NDArray[Any]:
-    """Draw slip, margin and energy against the slope, and the steepest slope; see `take_axes`."""
-    found = report.performance
-    panels = take_axes(ax, 2, 2, SIZE)
-    degrees = np.rad2deg(found.slope)
-    _band(panels[0, 0], degrees, found.slip, "slip needed")
-    _band(panels[0, 1], degrees, found.margin, "margin of pull, N")
-    panels[0, 1].axhline(0.0, color="#888888", lw=0.8)
-    _band(panels[1, 0], degrees, found.energy, "work of the wheels, J/m")
-    for panel in panels.flat[:3]:
-        panel.set_xlabel("slope, degrees")
-    last = panels[1, 1]
-    known = [np.rad2deg(v[np.isfinite(v)]) for v in (report.prior_steepest, found.steepest_slope)]
-    bins = np.histogram_bin_edges(np.concatenate(known), 40) if any(map(len, known)) else 10
-    for values, color, label in zip(
-        known, (PRIOR, POSTERIOR), ("before the rows", "after"), strict=True
-    ):
-        if len(values):
-            last.hist(values, bins, density=True, color=color, alpha=0.8, label=label)
-    last.set_xlabel("steepest slope, degrees")
-    last.set_yticks([])
-    last.legend(frameon=False)
-    return panels
-
-
-def _band(panel: Any, x: Floats, draws: Floats, label: str) -> None:
-    """Median and 90 % band; slopes that fewer than half of the draws climb have no value."""
-    enough = np.mean(np.isfinite(draws), axis=0) >= 0.5
-    band = quantile_band(draws[:, enough])
-    panel.fill_between(x[enough], band.lower, band.upper, color=POSTERIOR, alpha=0.25, lw=0)
-    panel.plot(x[enough], band.middle, "o-", color=POSTERIOR, ms=4)
-    panel.set_xlim(x[0], max(x[-1], x[0] + 1e-9))
-    panel.set_ylabel(label)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,13 +17,13 @@ from soilml.config.compatibility import (
     recipe_case,
     value_differences,
 )
+from soilml.config.explanations import one_of
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
 from soilml.fitting.misfit import excess_residuals_remark
+from soilml.fitting.mixtures import with_all_effects
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.averaged import AveragedSamples, stated_explanations
-from soilml.identification.averaged_fit import beyond_all_explanations, soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.fit import ignored_soil_tests
 from soilml.identification.model_error_inputs import (
@@ -30,7 +31,12 @@ from soilml.identification.model_error_inputs import (
     readings_with_model_error,
     with_stated_model_error,
 )
-from soilml.identification.posterior import PosteriorSamples, posterior_samples, prior_fractions
+from soilml.identification.posterior import (
+    PosteriorSamples,
+    check_declared,
+    posterior_samples,
+    prior_fractions,
+)
 from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
@@ -39,14 +45,15 @@ from soilml.numerics.resampling import systematic_resampling
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark
-from soilml.report.numbers import format_probability
-from soilml.traction.draws import SoilDraws
+from soilml.traction.draws import DrawnErrors, SoilDraws
+from soilml.traction.mixture_draws import posterior_draws_of
+from soilml.traction.model_errors import draw_model_errors
 
 #: Where the soil of rows is drawn without a remainder that was learned from them.
 DRAWN_WITHOUT = Remark(
     "same-rows",
-    "[remainder] was learned from rows of this table, which would count twice: the soil is drawn "
-    "without it, and the bands contain it",
+    "[remainder] was learned from rows of this table, which would count twice: it is left out, and "
+    "drawn anew from the rows",
     severity="note",
 )
 #: Number of draws: the probability below a 5 % quantile of as many has a standard error of 1.1 %.
@@ -69,6 +76,28 @@ def prior_draws(
 ) -> SoilDraws:
     """Draws of the priors by Latin hypercube; tests of the case's soil take part."""
     return _soil_draws(free, prior_fractions(free, count, np.random.default_rng(0), case))
+
+
+def mixed_prior_draws(case: Case, count: int) -> tuple[Case, SoilDraws]:
+    """Draws of the priors of all explanations by their weights, and the case that has them all."""
+    each = [case.of_explanation(one) for one in case.explanations]
+    weights = np.asarray([one.weight for one in case.explanations])
+    place = systematic_resampling(weights / weights.sum(), count, 0.5)
+    whole = with_all_effects(case, each)
+    paths = list(dict.fromkeys(path for own in each for path in own.numbers))
+    paths = [path for path in paths if not path.startswith(("gear.", "gears."))]
+    values = np.tile([float(whole.numbers[path]) for path in paths], (count, 1))
+    for i, own in enumerate(each):
+        rows = np.flatnonzero(place == i)
+        known = {
+            path: np.asarray(float(own.numbers[path])) for path in paths if path in own.numbers
+        }
+        if len(rows) and own.prior:
+            drawn = prior_draws(select_free(own, None), len(rows), own)
+            known |= {path: drawn.values[:, k] for k, path in enumerate(drawn.names)}
+        for path, value in known.items():
+            values[rows, paths.index(path)] = value
+    return whole, SoilDraws(tuple(paths), values)
 
 
 def _soil_draws(free: Sequence[Coordinate], u: Floats) -> SoilDraws:
@@ -110,17 +139,27 @@ def estimated_draws(
     return SoilDraws(tuple(f.path for f in free), low + width * found.u[rows])
 
 
+#: Errors given the rows, and before them, by slips, loads (N) and channels asked for.
+ErrorsAt = Callable[
+    [Floats, Sequence[float], Sequence[str]], tuple[DrawnErrors, DrawnErrors] | None
+]
+
+
 @dataclass(frozen=True)
 class MeasuredSoil:
-    """Draws of the soil, the parameters that were unknown, and warnings.
+    """What predicts on the soil of measured rows.
 
-    `noise_scale` is the factor on the declared noise; None for the estimate of a trained file.
+    case: The case whose parameters the draws give; of several explanations, with all their effects.
+    draws: Draws of these parameters.
+    unknown: The parameters that were unknown.
+    errors: What draws the errors of the model beside them.
     """
 
+    case: Case
     draws: SoilDraws
     unknown: Sequence[Coordinate]
     warnings: tuple[Remark, ...]
-    noise_scale: float | None
+    errors: ErrorsAt
 
 
 def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSoil:
@@ -160,7 +199,9 @@ def estimated_soil(estimator: Estimator, case: Case, table: Table) -> MeasuredSo
         )
         warnings.append(Remark("out-of-range", text))
     draws = estimated_draws(free, estimate.mean, estimate.covariance)
-    return MeasuredSoil(draws, free, tuple(warnings), None)
+    case = case.without_explanations()
+    errors = partial(_declared_errors, case, table, draws, None)
+    return MeasuredSoil(case, draws, free, tuple(warnings), errors)
 
 
 def _check_case(estimator: Estimator, case: Case) -> list[Remark]:
@@ -190,39 +231,55 @@ def measured_soil(
 ) -> MeasuredSoil:
     """The soil of the rows of a table; raises as `pull_report` does.
 
-    With `exact_model`, model and sensors are exactly as the case has them. Else a remainder that
-    was learned from these rows is left out, as by `identify`; predictions contain it.
+    With `exact_model`, model and sensors are exactly as the case has them. Else draws are of one
+    posterior over effects, soil and smooth error; what was learned from these rows is left out.
     """
     if estimator is not None:
         check_wheel_size(case, table)
         return estimated_soil(estimator, case, table.rows(table.answered))
-    learned = case.remainder
-    if not exact_model:
-        case = case.without_remainder_of(table)
+    if exact_model:
+        return _exact_soil(case, table, free)
+    learned, case = case.remainder, case.without_learned_discrepancy()
+    case = case.without_remainder_of(table)
     unknown = select_free(case, free)
     readings = usable_readings(case, table)
-    readings = condensed(case, readings, unknown)
-    samples = soil_samples(case, readings, unknown, exact_model)
-    draws = _soil_draws(unknown, samples.sample.u[samples.equally_weighted(DRAWS)])
-    twice = case.remainder is not learned
-    warnings = [*([DRAWN_WITHOUT] if twice else []), *readings.notes]
+    check_declared(readings)
+    found = posterior_draws_of(case, readings, unknown, DRAWS)
+    warnings = [*([DRAWN_WITHOUT] if case.remainder is not learned else []), *readings.notes]
     if readings.channels == ("torque",):
         text = "torque alone hardly reveals errors of the model: measure pull or sinkage too"
         warnings.append(Remark("torque-alone", text, ("torque_Nm",)))
+    warnings += found.remarks()
+    return MeasuredSoil(found.case, found.soil, unknown, tuple(warnings), found.errors)
+
+
+def _exact_soil(case: Case, table: Table, free: Sequence[str] | None) -> MeasuredSoil:
+    """The soil with model and sensors exactly as the case has them."""
+    case = one_of(case, "the case")
+    unknown = select_free(case, free)
+    readings = condensed(case, usable_readings(case, table), unknown)
+    check_declared(readings)
+    samples = posterior_samples(case, readings, unknown)
+    draws = _soil_draws(unknown, samples.sample.u[samples.equally_weighted(DRAWS)])
+    warnings = [*readings.notes]
     if samples.noise_inflated:
         consequence = "bands are widened and may be biased"
-        if isinstance(samples, AveragedSamples):
-            warnings.append(beyond_all_explanations(samples.noise_scale, consequence))
-        else:
-            warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
-    known = [] if twice or not isinstance(samples, AveragedSamples) else samples.explanations
-    if known and not any(e.exact for e in known):
-        first = stated_explanations(known)[0]
-        likeliest = str(first) if first.effect else "errors of sensors and model"
-        text = (
-            f"the model misfits these rows, which are likelier with {likeliest} "
-            f"(probability {format_probability(first.probability)}), which the bands leave out: "
-            "run soilml gap"
-        )
-        warnings.append(Remark("against-model", text, (first.effect,) if first.effect else ()))
-    return MeasuredSoil(draws, unknown, tuple(warnings), samples.noise_scale)
+        warnings.append(excess_residuals_remark(samples.noise_scale, case, consequence))
+    answered = table.rows(table.answered)
+    errors = partial(_declared_errors, case, answered, draws, samples.noise_scale)
+    return MeasuredSoil(case, draws, unknown, tuple(warnings), errors)
+
+
+def _declared_errors(
+    case: Case,
+    table: Table,
+    draws: SoilDraws,
+    noise_scale: float | None,
+    slip: Floats,
+    load: Sequence[float],
+    channels: Sequence[str],
+) -> tuple[DrawnErrors, DrawnErrors] | None:
+    """Errors that [discrepancy] or [remainder] states."""
+    return draw_model_errors(
+        case, table, draws, slip, load, channels=channels, noise_scale=noise_scale
+    )

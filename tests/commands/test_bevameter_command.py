@@ -32,9 +32,10 @@ def tables(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_both_tables_in_either_order_give_a_model_file_that_identify_takes(tables, capsys):
     words = ["bevameter", "shear.csv", "plates.csv", "--model", "model.toml"]
-    assert main([*words, "--out", "soil.toml", "--json", "soil.json", "--picture", "soil.png"]) == 0
+    assert main([*words, "--out", "soil.json"]) == 0
+    assert main([*words, "--out", "soil.toml", "--picture", "soil.png"]) == 0
     printed = capsys.readouterr().out
-    assert "95 % at another place" in printed and "! no plate test was repeated" in printed
+    assert "95 % elsewhere" in printed and "! no plate test was repeated" in printed
     case = read_case("soil.toml")
     assert case.soil.cohesion == pytest.approx(500.0, rel=0.1)
     assert case.soil.n == pytest.approx(1.0, rel=0.02)

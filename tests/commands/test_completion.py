@@ -12,21 +12,21 @@ TYPED = {
     "soilml pu": "pull",
     "soilml identify --met": "--method",
     "soilml identify m.toml --method p": "posterior",
-    "soilml soils wong1989/dry": "wong1989/dry_sand",
-    "soilml effects slip-s": "slip-scale slip-sinkage",
+    "soilml show soils wong1989/dry": "wong1989/dry_sand",
+    "soilml show effects slip-s": "slip-scale slip-sinkage",
     "soilml estimate wheel_l": "wheel_linear wheel_lssvm",
     "soilml pull m.toml r.csv --gravity m": "moon mars",
     "soilml estimate wheel r.csv --rule co": "correlated covariance-intersection",
-    "soilml completion f": "fish",
+    "soilml setup completion f": "fish",
     "soilml identify mo": "model.toml",
     "soilml gap model.toml r.csv --ignore-extra --out mo": "model.toml",
-    "soilml soils nothing-begins-so": "",
+    "soilml show soils nothing-begins-so": "",
 }
 #: What prints the candidates of some words that are typed.
 ASK = {
-    "bash": "source <(soilml completion bash); ask() { COMP_WORDS=($1);"
+    "bash": "source <(soilml setup completion bash); ask() { COMP_WORDS=($1);"
     " COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _shtab_soilml; echo ${COMPREPLY[@]}; }; ",
-    "fish": "soilml completion fish | source;"
+    "fish": "soilml setup completion fish | source;"
     " function ask; echo (complete -C $argv[1] | string split -f 1 \\t); end; ",
 }
 

@@ -1,4 +1,4 @@
-"""`soilml design`: JSON, tables, picture and page; faults are one line and status 2."""
+"""`soilml plan wheels`: JSON, tables, picture and page; faults are one line and status 2."""
 
 import json
 

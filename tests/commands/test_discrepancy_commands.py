@@ -84,7 +84,7 @@ def test_an_estimate_has_the_mean_and_the_error_of_a_remainder(folder, capsys):
         row["torque_Nm"] = float(row["torque_Nm"]) + added
     lines = [",".join(str(v) for v in row.values()) for row in rows]
     Path("shifted.csv").write_text("\n".join([",".join(rows[0]), *lines]))
-    command = ("--by", "run", "--case")
+    command = ("--by", "run", "--model")
     plain = spoken(
         capsys, "estimate", ANY_WHEEL, "runs.csv", *command, "plain.toml", "--exact-model"
     )

@@ -44,3 +44,42 @@ def test_examples_replace_nothing_and_name_each_other(tmp_path, monkeypatch, cap
     assert main(["example", "campain", "x"]) == 2
     said = capsys.readouterr().err
     assert "did you mean 'campaign'" in said and all(name in said for name in EXAMPLES)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("sensor-wheel", "3 of 3 other runs"),
+        ("climb", "The rover climbs 13."),
+        ("wheel-leg", "SSC-1"),
+        ("track", "The model fits these rows"),
+    ],
+)
+def test_the_chain_of_a_paper_runs_on_its_example(name, said, tmp_path, monkeypatch, capsys):
+    """The command that is printed, with its picture where it draws one; the truth is found."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["example", name, "."]) == 0
+    command = capsys.readouterr().out.partition("Next: soilml ")[2].replace("./", "").split()
+    picture = [] if name == "climb" else ["--picture", "x.png"]
+    assert main([*command, *picture, "--format", "table"]) == 0
+    assert said in capsys.readouterr().out
+    assert name == "climb" or (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_log_of_a_track_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["example", "track", "."]) == 0
+    capsys.readouterr()
+    command = ["paper", "track", "model.toml", "log.csv", "--mass", "130"]
+    rows = (tmp_path / "log.csv").read_text().splitlines()
+    (tmp_path / "short.csv").write_text("\n".join(rows[:60]) + "\n")
+    for words, expected in (
+        (command, "give their spacing"),
+        ([*command, "--spacing", "0.6", "--grousers", "1,2"], "needed are pitch, tip, f_g and j_k"),
+        ([*command[:3], "short.csv", *command[4:], "--spacing", "0.6"], "run pull_1: signal has"),
+    ):
+        assert main([*words, "--out", "x.csv"]) == 2
+        said = capsys.readouterr().err.strip().splitlines()[-1]
+        assert expected in said
+        assert not (tmp_path / "x.csv").exists()

@@ -9,8 +9,9 @@ import pytest
 from conftest import THREE_CHANNEL_MODEL
 
 from soilml.cli import main
-from soilml.cli.main import COMMANDS, parser
-from soilml.cli.options import NumberFrom, number, slip_limit, whole_number
+from soilml.cli.main import parser
+from soilml.cli.option_values import NumberFrom, number, slip_limit, whole_number
+from soilml.cli.options import leaves
 from soilml.serve.command import port_number
 
 HOSTILE = ["nan", "inf", "-inf", "0", "-1", "1e-9", "1e9", "-1e9", "1e400", "x", ""]
@@ -26,24 +27,18 @@ OF_TEXT = {
         "--height",
     ],
     "simulate": ["--slip", "--load"],
-    "advise": ["--slips", "--loads", "--gravity", "--tested-at", "--radii"],
+    "plan next": ["--slip", "--load", "--gravity", "--tested-at", "--radius"],
     "pull": ["--load", "--slope", "--gravity", "--tested-at"],
-    "walk": ["--legs", "--stiffness", "--slip"],
+    "paper walk": ["--legs", "--stiffness", "--slip"],
 }
 
 
 def options():
-    """Command, words before, and each option of it that takes a value."""
-    for command in COMMANDS:
-        kinds = [a for a in parser(command)._actions if hasattr(a, "choices") and a.choices]
-        stack = [(command, kinds[0].choices[command])]
-        while stack:
-            words, own = stack.pop()
-            for action in own._actions:
-                if isinstance(action, argparse._SubParsersAction):
-                    stack += [(f"{words} {name}", p) for name, p in action.choices.items()]
-                elif action.option_strings and action.nargs != 0:
-                    yield words, action
+    """Each option of each command that takes a value."""
+    for command, own in leaves(parser()):
+        for action in own._actions:
+            if action.option_strings and action.nargs != 0:
+                yield command, action
 
 
 NUMBERS = [
@@ -92,13 +87,13 @@ WORDS = {
     "init": ["init", "new.toml", "--radius", "0.15", "--width", "0.12", "--soil",
              "wong1989/dry_sand", "--mass", "12"],
     "simulate": ["simulate", "m.toml", "--slip", "0.2", "--load", "60"],
-    "advise": ["advise", "m.toml", "r.csv", "--exact-model"],
+    "plan next": ["plan", "next", "m.toml", "r.csv", "--exact-model"],
     "pull": ["pull", "m.toml", "r.csv", "--load", "60", "--exact-model"],
-    "walk": ["walk"],
+    "paper walk": ["paper", "walk"],
 }  # fmt: skip
-CHEAP = [(c, o) for c in ("init", "simulate", "walk") for o in OF_TEXT[c]]
-CHEAP += [(w, a.option_strings[0]) for w, a in NUMBERS if w in ("simulate", "walk")]
-LONG = [(c, o) for c in ("advise", "pull") for o in OF_TEXT[c]]
+CHEAP = [(c, o) for c in ("init", "simulate", "paper walk") for o in OF_TEXT[c]]
+CHEAP += [(w, a.option_strings[0]) for w, a in NUMBERS if w in ("simulate", "paper walk")]
+LONG = [(c, o) for c in ("plan next", "pull") for o in OF_TEXT[c]]
 
 
 def run(words, folder, monkeypatch, capsys):
@@ -121,7 +116,7 @@ def test_a_command_answers_or_refuses_whatever_number_it_is_given(
     command, option, folder, monkeypatch, capsys
 ):
     few = ["nan", "-1", "1e9", "x"]  # of commands that take long
-    for text in few if command in ("walk", "advise", "pull") else HOSTILE:
+    for text in few if command in ("paper walk", "plan next", "pull") else HOSTILE:
         words = [*WORDS[command]]
         if option in words:
             words[words.index(option) + 1] = text

@@ -55,8 +55,8 @@ def test_columns_and_noise_of_slip_and_load_widen_the_estimate(
     file = str(whole_file)
     plain = widths(capsys, file, "runs.csv")
     assert np.prod(widths(capsys, file, "noisy.csv") / plain) > 1.3
-    declared = widths(capsys, file, "runs.csv", "--case", "noisy.toml")
-    exact = widths(capsys, file, "runs.csv", "--case", "exact.toml")
+    declared = widths(capsys, file, "runs.csv", "--model", "noisy.toml")
+    exact = widths(capsys, file, "runs.csv", "--model", "exact.toml")
     assert np.prod(declared / exact) > 1.1
 
 

@@ -1,4 +1,4 @@
-"""`soilml init`, `soilml models` and `soilml doctor`, and released files by their short names."""
+"""`soilml init`, `soilml show models` and `soilml setup check`, and short names of files."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""`soilml slip`: files, flags, and one line for bad input."""
+"""`soilml drive slip`: files, flags, and one line for bad input."""
 
 import csv
 import io
@@ -29,9 +29,10 @@ def drive(tmp_path, monkeypatch):
 
 
 def test_table_json_and_picture_have_each_row(drive, capsys):
-    outputs = ["--out", "slip.csv", "--json", "slip.json", "--picture", "slip.png"]
-    assert main(["slip", "drive.csv", "--rover", ROVER, *outputs]) == 0
-    assert "8 rows of 4 wheels" in capsys.readouterr().out
+    words = ["drive", "slip", ROVER, "drive.csv"]
+    assert main([*words, "--out", "slip.json"]) == 0
+    assert main([*words, "--out", "slip.csv", "--picture", "slip.png"]) == 0
+    assert "8 of 8 rows have a slip" in capsys.readouterr().out
     rows = list(csv.DictReader(io.StringIO(Path("slip.csv").read_text())))
     assert len(rows) == 8
     for row in rows:
@@ -47,10 +48,10 @@ def test_table_json_and_picture_have_each_row(drive, capsys):
 def test_bad_input_is_one_line_and_writes_nothing(drive, capsys):
     text = Path("drive.csv").read_text()
     Path("drive.csv").write_text(text.replace("slope_rad", "slope_deg"))
-    assert main(["slip", "drive.csv", "--rover", ROVER, "--out", "slip.csv"]) == 2
+    assert main(["drive", "slip", ROVER, "drive.csv", "--out", "slip.csv"]) == 2
     assert capsys.readouterr().err.count("\n") == 1
     assert not Path("slip.csv").exists()
     Path("drive.csv").write_text(text)
     Path("bad.toml").write_text(Path(ROVER).read_text().replace("pull_std", "pul_std"))
-    assert main(["slip", "drive.csv", "--rover", "bad.toml"]) == 2
+    assert main(["drive", "slip", "bad.toml", "drive.csv"]) == 2
     assert "did you mean 'pull_std'" in capsys.readouterr().err

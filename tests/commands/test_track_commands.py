@@ -62,22 +62,6 @@ def test_the_shares_carry_the_load_and_moments_sink_the_tail(folder, capsys):
     assert (folder / "t.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.parametrize(
-    ("options", "expected"),
-    [
-        (["--hitch", "0.1"], "add --balance"),
-        (["--balance", "--behind", "-0.2"], "no trim balances the moments"),
-        (["--balance", "--slip", "0:0.5:3000"], "at most 2000 are possible with --balance"),
-        (["--balance", "--hitch", "x"], "needed is a number"),
-    ],
-)
-def test_bad_requests_are_refused_in_one_line(options, expected, folder, capsys):
-    command = ["simulate", "m.toml", "--slip", "0.1", "--load", "638", *options, "--out", "o.csv"]
-    assert main(command) == 2
-    assert expected in capsys.readouterr().err.strip().splitlines()[-1]
-    assert not (folder / "o.csv").exists()
-
-
 @pytest.fixture
 def groups(folder):
     """Four groups of eight pulls, and twelve further rows."""

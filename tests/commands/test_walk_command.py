@@ -17,7 +17,7 @@ def rows_of(text):
 
 def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, capsys):
     picture = tmp_path / "feet.png"
-    command = ["walk", "--foot", "LTF,CIF", "--stiffness", f"{SOFT},0.7e6,{FIRM}"]
+    command = ["paper", "walk", "--foot", "LTF,CIF", "--stiffness", f"{SOFT},0.7e6,{FIRM}"]
     assert main([*command, "--picture", str(picture)]) == 0
     found = rows_of(capsys.readouterr().out)
     assert [(row["foot"], float(row["stiffness_N_m3"])) for row in found] == [
@@ -47,6 +47,6 @@ def test_a_row_for_each_combination_and_firm_ground_carries_better(tmp_path, cap
 )
 def test_bad_requests_are_refused_in_one_line(options, expected, tmp_path, capsys):
     out, picture = tmp_path / "walks.csv", tmp_path / "walks.png"
-    assert main(["walk", *options, "--out", str(out), "--picture", str(picture)]) == 2
+    assert main(["paper", "walk", *options, "--out", str(out), "--picture", str(picture)]) == 2
     assert expected in capsys.readouterr().err.strip().splitlines()[-1]
     assert not out.exists() and not picture.exists()

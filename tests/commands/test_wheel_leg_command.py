@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.systems.wheel_legs import PRINTED_SINKAGE, TORQUE_SLIP, VIBRATION_SLIP
-from soilml.systems.wheel_legs.slip_models import soil_spring
+from soilml.systems.wheel_legs import TORQUE_SLIP, VIBRATION_SLIP, soil_of_sinkage
 
 HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
 
@@ -29,30 +28,43 @@ def strides(tmp_path):
 
 
 def test_each_sensor_and_the_fused_soil(strides, capsys):
-    assert main(["wheel-leg", str(strides), "--by", "run", "--torque-model", "empirical"]) == 0
+    assert (
+        main(["paper", "wheel-leg", str(strides), "--by", "run", "--torque-model", "empirical"])
+        == 0
+    )
     found = {(row["run"], row["sensor"]): row for row in rows_of(capsys.readouterr().out)}
     assert set(found) == {("a", "torque"), ("a", "sinkage"), ("a", "fused"), ("b", "sinkage")}
     torque, sinkage, fused = (found["a", name] for name in ("torque", "sinkage", "fused"))
     assert float(torque["friction_angle_rad"]) == pytest.approx(np.deg2rad(40.0), abs=1e-6)
     assert float(torque["normal_stiffness_Pa"]) == pytest.approx(11300.0, rel=1e-6)
-    expected = PRINTED_SINKAGE(0.01)
-    assert float(sinkage["friction_angle_rad"]) == pytest.approx(float(expected.friction_angle))
+    expected = soil_of_sinkage(0.01).mean[0]
+    assert float(sinkage["friction_angle_rad"]) == pytest.approx(expected)
     weight = 9.0**2 / (9.0**2 + 14.0**2)  # eq. 30, with the scatter of table VIII
     mean = [float(row["friction_angle_rad"]) for row in (torque, sinkage)]
     assert float(fused["friction_angle_rad"]) == pytest.approx(
         weight * mean[0] + (1.0 - weight) * mean[1]
     )
+    assert torque["pull_efficiency"] == "" and float(fused["kphi_SI"]) > 0.0
+    assert fused["traffic_class"] in ("non-trafficable", "unsafe", "safe", "trafficable")
+    assert float(fused["pull_efficiency_p05"]) < float(fused["pull_efficiency"])
 
 
 def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
     angle, stiffness = np.deg2rad(42.77), 13100.0 + 10500.0  # SSC-2 of table I
     a, b = TORQUE_SLIP["empirical"].line(angle, stiffness)
-    drop, spring = soil_spring(angle, stiffness)
-    c, d = VIBRATION_SLIP["planar"].line(drop, spring)
+    c, d = VIBRATION_SLIP["planar"].line(angle, stiffness)
     lines = [f"a,{s},{(s - a) / b},{(s - c) / d},\n" for s in (0.1, 0.3)]
     file, picture = tmp_path / "strides.csv", tmp_path / "slip.png"
     file.write_text(HEAD + "".join(lines) + f"b,,,{(0.4 - c) / d},\n")
-    command = ["wheel-leg", str(file), "--torque-model", "empirical", "--vibration-model", "planar"]
+    command = [
+        "paper",
+        "wheel-leg",
+        str(file),
+        "--torque-model",
+        "empirical",
+        "--vibration-model",
+        "planar",
+    ]
     assert main([*command, "--known", "ssc-2", "--picture", str(picture)]) == 0
     found = rows_of(capsys.readouterr().out)
     for row, slip in zip(found, (0.1, 0.3, 0.4), strict=True):
@@ -75,6 +87,8 @@ def test_slip_on_a_known_soil_is_that_of_the_printed_lines(tmp_path, capsys):
         ("run,slip,torque_Nm\na,0.2,\n", [], "nothing was measured"),
         ("run,slip,sinkage_m\na,0.2,-0.01\n", [], "a midstance sinkage must be above 0 m"),
         ("run,slip,torque_Nm\na,0.2,1.1\n", ["--torque-std", "-1"], "needed is 0 to 1e+06 N m"),
+        ("run,slip,torque_Nm\na,0.2,1.1\n", ["--assume", "x=1"], "needed are n, cohesion"),
+        ("run,slip,torque_Nm\na,0.2,1.1\n", ["--wheel", "0.1"], "needed are radius, width and"),
         ("run,torque_Nm\na,1.1\n", ["--known", "mud"], "needed is one of SSC-1, SSC-2"),
         ("run,torque_Nm\na,1.1\n", ["--known", "95,2e4"], "needed is one of SSC-1, SSC-2"),
         ("run,torque_Nm\na,1.1\n", ["--known", "es-3", "--by", "run"], "--by asks for a soil"),
@@ -85,7 +99,7 @@ def test_bad_strides_are_refused_in_one_line(text, options, expected, tmp_path, 
     file = tmp_path / "strides.csv"
     file.write_text(text)
     out = tmp_path / "soil.csv"
-    assert main(["wheel-leg", str(file), *options, "--out", str(out)]) == 2
+    assert main(["paper", "wheel-leg", str(file), *options, "--out", str(out)]) == 2
     said = capsys.readouterr().err.strip().splitlines()
     assert expected in said[-1]
     assert not out.exists()

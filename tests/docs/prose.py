@@ -12,7 +12,7 @@ _CODE = re.compile(r"`[^`\n]*`")
 _LINK = re.compile(r"!?\[([^\]]*)\]\([^)\s]*\)")
 _SKIPPED = re.compile(r"^(\||#|:::|:\w+:|\$\$|<|---|===|!\[)")
 _ITEM = re.compile(r"^\s*(?:[-*+]|\d+\.)\s+")
-_END = re.compile(r"(?<=[.!?])[*_\")]*\s+(?=[A-Z`*_\"(\[\d])")
+_END = re.compile(r"(?<=[.!?])[*_\")]*\s+(?=[A-Z`*_\"(\[\d$])")
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,7 @@
 """The language of the pages: sentences of bounded length."""
 
+import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -15,6 +17,17 @@ PAGES = sorted(
     if page not in CARDS and page.name != "CHANGELOG.md" and "decisions" not in page.parts
 )
 MOST_WORDS = 30
+#: Words of this house in the place of the field's: what a reader of English has to guess.
+HOUSE_WORDS = re.compile(
+    r"\b(takes?|taken|took) (the |its )?(model|sensors?|stress) as\b"
+    r"|\btak(es?|en) as (right|given)\b|\btells? of\b|\btold by\b|\b(leaves?|left) open\b"
+    r"|\bspeaks? against\b|\bas usual\b"
+    r"|\b(files?|states?|rows?|model|fit|batch) (does not |do not )?carr(y|ies)\b(?! the load)"
+    r"|\b(does not|do not) hold\b",
+    re.IGNORECASE,
+)
+#: Texts that trained files have in their cards, which a training writes.
+WRITTEN = ("training/export/any_wheel_file.py", "training/export/model_card.py")
 
 
 def name_of(page):
@@ -25,6 +38,34 @@ def name_of(page):
 def test_sentences_are_short(page):
     found = [s for s in sentences(page.read_text()) if s.words > MOST_WORDS]
     assert not found, "\n".join(f"{name_of(page)}:{s.line}: {s.words}: {s.text}" for s in found)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
+def test_pages_use_the_words_of_the_field(page):
+    found = [s.text for s in sentences(page.read_text()) if HOUSE_WORDS.search(s.plain)]
+    assert not found
+
+
+def texts(file):
+    """Strings of a module that are no docstrings."""
+    tree = ast.parse(file.read_text())
+    nodes = [n for n in ast.walk(tree) if isinstance(n, ast.Constant) and isinstance(n.value, str)]
+    bodies = (n.body for n in ast.walk(tree) if isinstance(getattr(n, "body", None), list))
+    first = (body[0] for body in bodies if body and isinstance(body[0], ast.Expr))
+    docstrings = {id(statement.value) for statement in first}
+    return [node.value for node in nodes if id(node) not in docstrings]
+
+
+def test_messages_use_the_words_of_the_field():
+    found = [
+        (name_of(file), text)
+        for package in ("soilml", "datagen", "training")
+        for file in sorted((ROOT / package).rglob("*.py"))
+        if name_of(file) not in WRITTEN
+        for text in texts(file)
+        if HOUSE_WORDS.search(text)
+    ]
+    assert not found
 
 
 PAGE = """---

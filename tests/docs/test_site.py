@@ -12,7 +12,8 @@ import pytest
 
 import soilml
 from soilml.cli import main
-from soilml.cli.main import COMMANDS, GROUPS, parser
+from soilml.cli.main import COMMANDS, parser
+from soilml.cli.old_spellings import present_words
 from soilml.quantities import QUANTITIES
 
 ROOT = Path(__file__).parents[2]
@@ -52,11 +53,9 @@ def test_notebooks_have_cells_that_parse_and_commands_that_exist(page):
     for cell in notebooks.cells(page):
         ast.parse(notebooks.COMMAND.sub("pass", cell))
     for line in notebooks.commands(page):
-        program, command, *words = shlex.split(line)
-        assert program == "soilml"
-        if command in GROUPS:
-            command, words = GROUPS[command][words[0]], words[1:]
-        parser(command).parse_args([command, *words])
+        program, *words = shlex.split(line)
+        assert program == "soilml" and present_words(words) == words, line
+        parser(words).parse_args(words)
 
 
 @pytest.fixture
@@ -111,9 +110,7 @@ def test_every_command_has_its_help_on_the_page():
     assert command_listing.MARK in (ROOT / f"{command_listing.PAGE}.md").read_text()
     texts = command_listing.helps()
     assert set(texts) == set(COMMANDS)
-    words = {own: f"{group} {word}" for group, of in GROUPS.items() for word, own in of.items()}
-    for name, text in texts.items():
-        assert text.startswith(f"usage: soilml {words.get(name, name)} ")
+    assert all(text.startswith(f"usage: soilml {name} ") for name, text in texts.items())
 
 
 def test_every_message_belongs_to_one_group_of_the_page():

@@ -96,9 +96,9 @@ def test_a_chapter_is_complete(chapter):
 
 def test_the_terminal_shows_computed_numbers_and_the_others_by_reason(monkeypatch, capsys):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    assert main(["papers", "nagatani2009"]) == 0
+    assert main(["paper", "numbers", "nagatani2009"]) == 0
     short = capsys.readouterr()
-    assert main(["papers", "nagatani2009", "--all"]) == 0
+    assert main(["paper", "numbers", "nagatani2009", "--all"]) == 0
     every = capsys.readouterr()
     rows = [row for row in ROWS if row.paper == "nagatani2009"]
     # a long text goes on in the next line of its column

@@ -10,7 +10,6 @@ from soilml.onboard.multi_sensor import fuse_estimates
 from training.dataset import read_dataset
 from training.export.model_card import model_card
 from training.export.model_file import export_model
-from training.few_rows import folds
 from training.spec import read_spec
 from training.train import train
 
@@ -35,17 +34,6 @@ def strides(path, soils, rows, seed, soil_std=0.05):
 def trained_on(path, name="slip_torque"):
     spec = read_spec(name)
     return train(spec, read_dataset(path, spec.features, spec.targets))
-
-
-def test_folds_leave_out_whole_runs_and_rows_of_a_single_run(tmp_path):
-    spec = read_spec("slip_torque")
-    four = read_dataset(strides(tmp_path / "a.csv", 4, 6, 0), spec.features, spec.targets)
-    parts = folds(four, 0)
-    assert len(parts) == 4
-    assert all(len(np.unique(four.run[out])) == 1 and out.sum() == 6 for out in parts)
-    one = read_dataset(strides(tmp_path / "b.csv", 1, 30, 0), spec.features, spec.targets)
-    parts = folds(one, 0)
-    assert len(parts) == 20 and np.sum(parts, axis=0).tolist() == [1] * 30
 
 
 @pytest.mark.parametrize(("soils", "rows"), [(20, 1), (60, 1), (4, 15)])
@@ -74,7 +62,7 @@ def test_files_of_few_rows_are_exported_and_fused_by_their_correlation(tmp_path)
         trained = trained_on(path, name)
         metadata = export_model(trained, tmp_path / f"{name}.onnx", path)
         card = model_card(trained, metadata, name)
-        assert "campaign of few rows" in card and "all for training" in card
+        assert "campaign of few rows" in card and "60, all for training" in card
         files.append(Estimator.load(tmp_path / f"{name}.onnx"))
     assert [len(f.pooling.held_out.rows) for f in files] == [60, 60]
     readings = files[0](torque=2.1, load=25.0), files[1](vibration=4.0, load=25.0)

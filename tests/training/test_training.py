@@ -1,15 +1,15 @@
-"""Training: split, calibration, specs, cards and plots."""
+"""Training: rows left out, calibration, specs, cards and plots."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from soilml.errors import InputError, TableError
-from soilml.onboard.estimate import PriorSummary
-from training.calibration.recalibration import covariance_matrices, recalibrate
-from training.calibration.row_pooling import calibrate_pooling, run_conditions
-from training.dataset import read_dataset, split_by_run
+from training.dataset import read_dataset
 from training.regressors.linear_gaussian import LinearGaussian
 from training.spec import read_spec
+from training.train import train
 
 FEATURES = ("slip", "torque/load", "load")
 TARGETS = ("cohesion", "friction_angle", "shear_modulus")
@@ -21,35 +21,36 @@ def data(small_data):
 
 
 @pytest.mark.slow
-def test_pooling_is_calibrated_on_held_out_runs(data):
-    parts = split_by_run(data, seed=0)
-    member = recalibrate(
-        LinearGaussian().fit(parts.train.features, parts.train.targets), parts.validation
-    )
-    prior = PriorSummary(
-        data.targets.mean(axis=0), data.targets.std(axis=0), data.lower, data.upper
-    )
-    mean, std = member.predict(parts.calibration.features)
-    covariance = covariance_matrices(std, member.correlation)
-    conditions = run_conditions(parts.train)
-    assert conditions.names == ("slip", "load")
-    calibration = calibrate_pooling(mean, covariance, parts.calibration, prior, conditions)
-    steady, one_slip, one_load, free = calibration.patterns
+def test_every_row_trains_and_is_estimated_by_a_fit_that_has_not_seen_its_run(data):
+    """Estimates of rows left out are as good as those of rows of another seed, and no better."""
+    spec = read_spec("linear")
+    trained = train(spec, data)
+    member = LinearGaussian().fit(data.features, data.targets)
+    expected = np.clip(member.predict(data.features), data.lower, data.upper)
+    np.testing.assert_allclose(trained.predict(data.features)[0], expected)
+    left = trained.left_out
+    seen = np.sqrt(np.mean((member.predict(data.features) - data.targets) ** 2, axis=0))
+    unseen = np.sqrt(np.mean((left.mean - data.targets) ** 2, axis=0))
+    assert (unseen > seen).all() and (unseen < 1.02 * seen).all()
+    wrong = replace(data, targets=np.where(data.run[:, None] == 0, data.upper, data.targets))
+    other = train(spec, wrong).left_out
+    out = data.run == 0
+    # its own targets do not change the estimates of a run, but they change those of others
+    np.testing.assert_allclose(other.mean[out], left.mean[out], rtol=1e-9)
+    assert (other.mean[~out] != left.mean[~out]).any()
+
+
+@pytest.mark.slow
+def test_pooling_is_calibrated_by_pattern_and_number_of_rows(data):
+    trained = train(read_spec("linear"), data)
+    assert trained.pooling.conditions.names == ("slip", "load")
+    steady, one_slip, one_load, free = trained.pooling.patterns
     np.testing.assert_allclose(free.rows, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32], rtol=0.12)
     assert (free.information[1:] <= free.information[0]).all()
-    for pattern in (
-        steady,
-        one_slip,
-        one_load,
-    ):  # none in the data: pooling does not reduce the uncertainty
+    # none in the data: pooling does not reduce the uncertainty
+    for pattern in (steady, one_slip, one_load):
         assert pattern.rows.tolist() == [1.0]
         assert np.exp(pattern.interpolate(32)[0]) == pytest.approx(1 / 32)
-    alone = parts.calibration.rows(parts.calibration.run_length == 1)
-    mean, std = member.predict(alone.features)
-    unknown = calibrate_pooling(
-        mean, covariance_matrices(std, member.correlation), alone, prior, conditions
-    )
-    assert all(np.exp(p.interpolate(32)[0]) == pytest.approx(1 / 32) for p in unknown.patterns)
 
 
 def test_train_writes_model_card_and_picture(small_model):

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from soilml.errors import InputError
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.remarks import Remark
-from soilml.report.numbers import format_number
+from soilml.report.numbers import decimal
+from soilml.results import Result
 from training.adaptation.judgement import ChannelScore, Judgement
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 #: Status of an adaptation, and its meaning.
 ADAPTATION_STATUSES = {
@@ -21,8 +25,8 @@ ADAPTATION_STATUSES = {
 }
 
 
-@dataclass(frozen=True)
-class AdaptReport:
+@dataclass(frozen=True, repr=False)
+class AdaptReport(Result):
     """The result of `adapt`.
 
     Attributes
@@ -63,7 +67,7 @@ class AdaptReport:
             return f"A file was trained and not judged, with {' + '.join(self.effects)}."
         if self.judgement is None:
             return f"The old file stays: {self.gap_sentence}"
-        ratio = format_number(self.judgement.ratio, 2)
+        ratio = decimal(self.judgement.ratio, 2)
         if self.status == "adapted":
             return (
                 f"The adapted file predicts kept-back runs with {ratio} of the error of the old "
@@ -74,18 +78,32 @@ class AdaptReport:
             "error."
         )
 
-    def plot(self, ax: Any = None) -> Any:
-        """Draw the later rows of the runs that were kept back, as measured and as predicted.
+    def report(self) -> Report:
+        """Whether the file is better, by how much, and what to do."""
+        from training.adaptation.page import report_of_adaptation
 
-        `ax`: axes of matplotlib, two for each row of panels: a panel for each channel and one of
-        the errors; a new figure where None. Returns the axes. Raises `InputError` where no file was
-        judged, and for another number of axes.
+        return report_of_adaptation(self)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each channel and number of first rows: errors and log scores of both files.
+
+        Raises `InputError` where no file was judged.
         """
-        from training.adaptation.page import plot_judgement
-
         if self.judgement is None:
-            raise InputError("no file was judged, so that nothing can be drawn")
-        return plot_judgement(self.judgement, ax)
+            raise InputError("no file was judged, so that there are no figures")
+        rows = [
+            (key, k, before, after)
+            for k in self.judgement.lengths
+            for key, (before, after) in self.judgement.figures(k).items()
+        ]
+        return {
+            "predicted": [row[0] for row in rows],
+            "first_rows": [row[1] for row in rows],
+            "error_before": [row[2].error for row in rows],
+            "error_after": [row[3].error for row in rows],
+            "log_score_before": [row[2].log_score for row in rows],
+            "log_score_after": [row[3].log_score for row in rows],
+        }
 
     def as_json(self) -> dict[str, Any]:
         """The content of adapt.json; soil in SI units, errors over the range of a channel."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,24 +11,23 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import FitError, InputError
 from soilml.fitting.coordinates import Coordinate, select_free
-from soilml.fitting.covariance import sensor_columns
-from soilml.fitting.misfit import misfit_limit
+from soilml.fitting.error_columns import error_columns, stacked
+from soilml.fitting.misfit import fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, declared_errors, usual_errors
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.averaged import ERRORS, EXACT, with_noise_of_fit
 from soilml.identification.condensing import condensed
-from soilml.identification.hypotheses import ErrorHypothesis, fit_hypothesis
-from soilml.identification.soil_density import SoilDensity
+from soilml.inference.conditional import Conditional, conditional
+from soilml.inference.evidence import linear_model, of_priors
+from soilml.inference.gaussian_terms import GaussianTerms
 from soilml.io.table import Table
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_INPUTS
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 
 #: A model that is all but right: errors of bearing, contact and channels are a seventh of the usual
 #: ones. Those of the laws are what they are in most models, because readings on one soil do not
-#: tell them from another soil. Its probability before any row is that which `identify` gives errors
-#: of that size and less.
-CHECKED = ErrorScale(EXACT + ERRORS[0.1], bearing=0.15, channels=0.15, laws=0.6)
+#: tell them from another soil. One model in five is so right before any row is seen.
+CHECKED = ErrorScale(0.2, bearing=0.15, channels=0.15, laws=0.6)
 
 #: Share of the prior that no campaign rules out: errors on other soils than its own.
 OPEN = 0.05
@@ -44,30 +43,33 @@ DRIFT = {
 }
 
 
-@dataclass(frozen=True)
-class BoardErrors(ErrorHypothesis):
-    """Errors as a file for the board has them: usual ones of sensors, scaled ones of the model.
+def board_errors(
+    case: Case, readings: Readings, free: Sequence[Coordinate], scale: ErrorScale
+) -> dict[str, float]:
+    """Standard deviations of errors as a file for the board has them, by name.
 
-    `factors` are those of the errors of the model, by name.
+    Usual ones of sensors, and scaled ones of the model; those of laws act as another soil does.
+    """
+    factors: Mapping[str, float] = dict(
+        zip(MODEL_ERROR_COLUMNS, scale.of_columns.tolist(), strict=True)
+    )
+    usual = usual_errors(case, readings.row_load, [c.path for c in free])
+    scaled = {n: s * (factors[n] if n in USUAL_MODEL_ERRORS else 1.0) for n, s in usual.items()}
+    return {n: s for n, s in scaled.items() if s > 0.0}
+
+
+@dataclass(frozen=True, eq=False)
+class _ScaleFit:
+    """Rows fitted beside errors of one scale: evidence, and the errors of sensors given the rows.
+
+    log_evidence: Up to a constant that all scales share.
+    errors: Standard deviations of the errors beside which it was made, by name.
+    squares: By the name of each sensor error, its expected square in variances of its prior.
     """
 
-    factors: Mapping[str, float] = field(default_factory=dict)
-
-    @staticmethod
-    def of(scale: ErrorScale) -> BoardErrors:
-        """The errors of a scale; those of laws act as another soil does."""
-        factors = dict(zip(MODEL_ERROR_COLUMNS, scale.of_columns.tolist(), strict=True))
-        return BoardErrors(scale.probability, factors=factors)
-
-    def errors_of(
-        self, case: Case, readings: Readings, free: Sequence[Coordinate]
-    ) -> dict[str, float]:
-        """Standard deviations of the errors that all rows share."""
-        usual = usual_errors(case, readings.row_load, [c.path for c in free])
-        return {
-            name: std * (self.factors[name] if name in USUAL_MODEL_ERRORS else 1.0)
-            for name, std in usual.items()
-        }
+    log_evidence: float
+    errors: Mapping[str, float]
+    squares: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErr
     )
 
 
-def _posterior(fits: Sequence[SoilDensity | None], prior: Floats) -> Floats:
+def _posterior(fits: Sequence[_ScaleFit | None], prior: Floats) -> Floats:
     """Probabilities of the scales given these fits; the prior of the usual ones without a fit."""
     logs = np.log(prior) + [-np.inf if fit is None else fit.log_evidence for fit in fits]
     if not np.isfinite(logs).any():
@@ -147,66 +149,62 @@ def _posterior(fits: Sequence[SoilDensity | None], prior: Floats) -> Floats:
     return np.asarray((1.0 - OPEN) * weights / weights.sum() + OPEN * prior)
 
 
-def _fits(case: Case, rows: Table, scales: Sequence[ErrorScale]) -> list[SoilDensity | None]:
-    """Densities of the soil with errors of each scale.
+def _fits(case: Case, rows: Table, scales: Sequence[ErrorScale]) -> list[_ScaleFit | None]:
+    """Fits beside errors of each scale.
 
     None where a scale leaves a significant misfit, for which the evidence, linearised in the
     errors, means nothing, and where no fit succeeds.
     """
-    found: list[SoilDensity | None] = [None] * len(scales)
+    found: list[_ScaleFit | None] = [None] * len(scales)
     try:
         free = select_free(case, None)
         readings = condensed(case, usable_readings(case, rows), free)
-        readings, start = with_noise_of_fit(case, readings, free)
+        weighted, optimum = fit_under_declared_noise(case, readings, free)
+        if readings.undeclared:
+            readings = replace(readings, std=weighted.readings.std)
     except (FitError, InputError):
         return found
-    freedom = max(readings.reading_count - len(free), 1)
     for k, scale in enumerate(scales):
-        density = fit_hypothesis(BoardErrors.of(scale), case, readings, free, {}, start)
-        if density is None:
+        errors = board_errors(case, readings, free, scale)
+        try:
+            found[k] = _fit(case, replace(readings, shared_errors=errors), free, optimum.x)
+        except (FitError, InputError):
             continue
-        start = density.optimum.values()
-        if (density.squares + readings.squares_within) / freedom <= misfit_limit(freedom):
-            found[k] = density
     return found
 
 
+def _fit(
+    case: Case, readings: Readings, free: Sequence[Coordinate], start: Floats
+) -> _ScaleFit | None:
+    """The fit beside the shared errors of the readings; None where it leaves a misfit."""
+    weighted, optimum = fit_under_declared_noise(case, readings, free, start)
+    freedom = max(readings.reading_count - len(free), 1)
+    if (optimum.cost + readings.squares_within) / freedom > misfit_limit(freedom):
+        return None
+    own = weighted.readings
+    columns = error_columns(optimum.fitted(), own, readings.shared_errors)
+    terms = GaussianTerms.of_columns(own, stacked(columns, len(own)))
+    at, kept = terms.first(), np.zeros(len(own), bool)
+    model = linear_model(terms, optimum, kept)
+    evaluated = model.evaluate(at)
+    value = evaluated.value + of_priors(model, evaluated)
+    given: Conditional = conditional(model, at)
+    squares = given.mean**2 + np.diag(given.covariance)
+    of_columns = dict(zip(columns, map(float, squares), strict=False))
+    return _ScaleFit(-0.5 * value, readings.shared_errors, of_columns)
+
+
 def _sensor_errors(
-    case: Case, fits: Sequence[SoilDensity | None], probabilities: Floats
+    case: Case, fits: Sequence[_ScaleFit | None], probabilities: Floats
 ) -> dict[str, float]:
     """Standard deviations of the errors of sensors, by name; see `supported_errors`."""
-    supported = [fit for fit in fits if fit is not None]
-    if not supported:
-        return {}
-    readings = supported[0].optimum.problem.readings
-    usual = usual_errors(case, readings.row_load, [c.path for c in supported[0].free])
+    usual = {n: s for fit in fits if fit is not None for n, s in fit.errors.items()}
     found = {}
     for name in SENSOR_ERROR_INPUTS:
         if name not in usual or name in declared_errors(case):
             continue
-        squares = [1.0 if fit is None else _mean_square(fit, name, usual[name]) for fit in fits]
+        squares = [1.0 if fit is None else fit.squares.get(name, 1.0) for fit in fits]
         size = np.sqrt(min(1.0, float(probabilities @ squares) + DRIFT[name] ** 2))
         if size < 1.0:
             found[name] = float(f"{size * usual[name]:.3g}")
     return found
-
-
-def _mean_square(fit: SoilDensity, name: str, std: float) -> float:
-    """Expected square of an error of a sensor given the rows, in squares of its prior's `std`."""
-    column = _column_of(fit, name, std)
-    if column is None:
-        return 1.0
-    white = fit.whiten @ column
-    beside = white - fit.jacobian @ np.linalg.solve(fit.precision, fit.jacobian.T @ white)
-    return float(beside @ fit.residual) ** 2 + 1.0 - float(beside @ white)
-
-
-def _column_of(fit: SoilDensity, name: str, std: float) -> Floats | None:
-    """Change (m,) of the readings by a standard deviation of an error; None without its channel."""
-    for k, coordinate in enumerate(fit.others):
-        if coordinate.path.endswith(f".{name}"):
-            return np.asarray(fit.other_columns[:, k])
-    optimum = fit.optimum
-    alone = replace(optimum.problem.readings, shared_errors={name: std})
-    columns = sensor_columns(alone, optimum.prediction[None, :])
-    return None if columns is None else np.asarray(columns[0, :, 0])

@@ -12,11 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from soilml.config.case import Case, read_case
+from soilml.config.explanations import likeliest_with_effects
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
 from soilml.gap import gap
 from soilml.gap.evidence.holdout_split import RUNS_PER_HELD_OUT
-from soilml.gap.presentation import gap_files
+from soilml.gap.report.report import gap_files
 from soilml.gap.verdict.decision import OUTSIDE_PRIORS
 from soilml.identification.model_error_inputs import with_exact_model
 from soilml.identification.trained_estimator import estimators_for_case, with_sensors_of
@@ -27,7 +28,7 @@ from soilml.io.text_tables import csv_text
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.table_estimates import sensor_errors_shown
 from soilml.remarks import Remark
-from soilml.report.page import Provenance, json_text, page
+from soilml.report.page import Provenance, json_text, page, report_entry
 from training.adaptation.board_file import FileNames, make_file
 from training.adaptation.campaign import (
     DrivenRange,
@@ -41,7 +42,6 @@ from training.adaptation.campaign import (
     within_carried_loads,
 )
 from training.adaptation.judgement import BoardCandidate, Judgement, check_lengths, judge
-from training.adaptation.page import adapt_page
 from training.adaptation.result import AdaptReport
 from training.adaptation.steps import ResumableSteps
 from training.adaptation.supported_errors import SupportedErrors, supported_errors
@@ -277,7 +277,9 @@ def _read_gap(folder: Path, case: Case, suspected: bool) -> AnalysedCampaign:
     """The gap of a campaign from its files, and whether it supports a change."""
     content = json.loads((folder / "gap.json").read_text(encoding="utf-8"))
     status = content["status"]
-    found = read_case(folder / "model.toml", with_bias=True)
+    found = likeliest_with_effects(
+        read_case(folder / "model.toml", with_bias=True, with_explanations=True)
+    )
     known = {effect.name for effect in case.model.effects}
     effects = tuple(e.name for e in found.model.effects if e.name not in known)
     refusal = None
@@ -326,7 +328,7 @@ def _errors_remark(errors: SupportedErrors) -> Remark:
 def _exact_remark() -> Remark:
     """A note on the answer by which the old file is judged."""
     text = (
-        "the old file is judged with its model taken as right (model_error 0), as which it "
+        "the old file is judged assuming a perfect model (model_error 0), with which it "
         "predicts the runs kept back better than with its own errors of the model"
     )
     return Remark("old-model-right", text, severity="note")
@@ -356,8 +358,8 @@ def _finish(
     report = replace(report, files=(*made, *parts, *GAP_FILES[:4]))
     if origin is None:
         origin = Provenance.of(["adapt"], [])
-    shown = adapt_page(report)
-    content = report.as_json() | {"report": shown.as_json(origin)}
+    shown = report.report()
+    content = report.as_json() | {"report": report_entry(shown, origin)}
     stale = [n for n in (*adapted, *before, *SPLIT_FILES) if n not in (*made, *parts)]
     write_files(
         {

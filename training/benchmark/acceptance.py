@@ -12,7 +12,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.quantities import QUANTITIES, SHEAR
-from soilml.report.terminal import shown_unit
+from soilml.report.numbers import shown_unit
 from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import NOMINAL, PairedResult
 

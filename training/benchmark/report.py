@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
-from soilml.io.text_tables import format_table
 from soilml.quantities import QUANTITIES, SHEAR
 from soilml.remarks import Remark
-from soilml.report.figure_style import picture, take_axes
-from soilml.report.page import Report, ReportPicture, ReportTable
+from soilml.report.figure_style import PRIOR, take_axes
+from soilml.report.report import MOST_LINES, Picture, Report
+from soilml.report.tables import Column, ReportTable
 from training.benchmark.acceptance import (
     COHESION_RANGE,
     COVERAGE_RANGE,
@@ -25,11 +25,6 @@ from training.benchmark.acceptance import (
 )
 from training.benchmark.methods import MethodKind
 from training.benchmark.paired_results import PairedResult
-
-
-def format_number(value: float, form: str) -> str:
-    """The number in a format; NaN gives a blank cell."""
-    return "" if math.isnan(value) else format(value, form)
 
 
 def columns_of_rows(rows: Iterable[Mapping[str, Any]]) -> dict[str, list[Any]]:
@@ -75,10 +70,8 @@ def plot_benchmark(results: Sequence[PairedResult], ax: Any = None) -> NDArray[A
             error.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
             error.yaxis.set_minor_formatter(NullFormatter())
             error.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
-            error.grid(alpha=0.3, which="both")
             coverage.axhspan(*COVERAGE_RANGE, color="C2", alpha=0.2, lw=0)
             coverage.set_ylim(0.28, 1.02)
-            coverage.grid(alpha=0.3)
             title = f"{TITLES[k]}, {'one load' if loads == 1 else 'three loads'}"
             error.set_title(title, fontsize=10)
             coverage.set_title(title, fontsize=10)
@@ -93,9 +86,8 @@ def plot_benchmark(results: Sequence[PairedResult], ax: Any = None) -> NDArray[A
         a.set_xlabel("rows per set (18: 6 slips x 3 loads)")
     for a in axes[:3].flat:
         a.set_xticks(range(len(sizes)), [""] * len(sizes))
-    handles, labels = axes[0][0].get_legend_handles_labels()
-    figure = axes[0][0].figure
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=9)
+    for panel in axes[0]:
+        panel.legend(ncols=2, fontsize=7)
     return axes
 
 
@@ -108,7 +100,7 @@ def _styles(kinds: dict[str, MethodKind]) -> dict[str, dict[str, Any]]:
             styles[method] = {"color": "k", "lw": 4.5, "alpha": 0.85, "zorder": 1}
             continue
         if kind is MethodKind.PRIOR:
-            styles[method] = {"color": "0.6", "lw": 2, "ls": ":"}
+            styles[method] = {"color": PRIOR, "lw": 2, "ls": ":"}
             continue
         analytic = kind is MethodKind.ANALYTIC
         marker = {"marker": "s", "ls": "--"} if analytic else {"marker": "o"}
@@ -150,67 +142,37 @@ def _csv_row(r: PairedResult, k: int) -> dict[str, Any]:
     }
 
 
-def format_tables(results: Sequence[PairedResult]) -> str:
-    """A text table for each design, then those with an unmodelled effect."""
-    blocks = []
+def benchmark_tables(results: Sequence[PairedResult]) -> Iterator[ReportTable]:
+    """A table for each design, then those with an effect that no method models."""
     for same in _by_design([r for r in results if not r.effect]):
-        blocks.append(f"{same[0].design.description} ({same[0].sets} sets)\n\n{_full_table(same)}")
+        yield _table(f"{same[0].design.description} ({same[0].sets} sets)", same)
         if same[0].design.rows == LARGEST_SET:
-            blocks.append(_table_of_cohesion_range(same))
+            low, high = COHESION_RANGE
+            truth = same[0].truth[:, SHEAR.index("cohesion")]
+            inside = (truth >= low) & (truth <= high)
+            if inside.sum() > 1:
+                title = (
+                    f"Of these, c {low / 1e3:g} to {high / 1e3:g} kPa ({int(inside.sum())} sets)"
+                )
+                yield _table(title, [r.subset(inside) for r in same])
     for same in _by_design([r for r in results if r.effect]):
-        first = same[0]
-        title = f"{first.design.description}, simulated with {first.effect}, which no method models"
-        blocks.append(f"{title} ({first.sets} sets)\n\n{_short_table(same)}")
-    return "\n\n".join(blocks)
+        title = f"{same[0].design.description}, simulated with {same[0].effect}, which no method "
+        yield _table(f"{title}models ({same[0].sets} sets)", same)
 
 
-def _table_of_cohesion_range(same: Sequence[PairedResult]) -> str:
-    """The same table of the sets whose true cohesion is in the range of a goal."""
-    low, high = COHESION_RANGE
-    truth = same[0].truth[:, SHEAR.index("cohesion")]
-    inside = (truth >= low) & (truth <= high)
-    if inside.sum() < 2:
-        return f"fewer than two sets with c {low / 1e3:g} to {high / 1e3:g} kPa"
-    title = f"of these, c {low / 1e3:g} to {high / 1e3:g} kPa ({int(inside.sum())} sets)"
-    return f"{title}\n\n{_full_table([r.subset(inside) for r in same])}"
-
-
-_GOAL_HEADER = ("goal", "method", "measured", "std error", "Bayes limit", "result")
-
-
-def _goal_rows(found: Sequence[Goal]) -> list[list[str]]:
-    return [
-        [g.criterion, g.method, g.measured, g.standard_error, g.limit, "met" if g.met else "MISSED"]
-        for g in found
-    ]
-
-
-def format_goals(found: Sequence[Goal]) -> str:
+def goals_table(found: Sequence[Goal]) -> ReportTable:
     """The acceptance goals, each with the figure that was measured."""
-    return format_table(_GOAL_HEADER, _goal_rows(found), text_columns=len(_GOAL_HEADER))
-
-
-def short_goals(found: Sequence[Goal]) -> str:
-    """The same for a terminal."""
-    rows = [
-        ["met" if g.met else "MISSED", g.method, g.measured.split(" (")[0], g.criterion]
-        for g in found
-    ]
-    return format_table(("result", "method", "measured", "goal"), rows, text_columns=4)
-
-
-def short_tables(results: Sequence[PairedResult]) -> str:
-    """The tables of a terminal: errors, ratios to the limit, and coverage."""
-    blocks = []
-    for same in _by_design(results):
-        title = f"{same[0].design.description} ({same[0].sets} sets)"
-        if same[0].effect:
-            title += f"\nsimulated with {same[0].effect}, which no method models"
-            blocks.append(f"{title}\n\n{_short_table(same)}")
-            continue
-        hidden = {"/prior", "s.e.", "50 %", "joint", "log p", "failed", "flagged"}
-        blocks.append(f"{title}\n\n{format_table(*_without(*_full_rows(same), hidden))}")
-    return "\n\n".join(blocks)
+    return ReportTable(
+        "Acceptance goals",
+        [
+            Column("result", ["met" if goal.met else "MISSED" for goal in found]),
+            Column("method", [goal.method for goal in found]),
+            Column("measured", [goal.measured for goal in found]),
+            Column("std error", [goal.standard_error for goal in found]),
+            Column("Bayes limit", [goal.limit for goal in found]),
+            Column("goal", [goal.criterion for goal in found]),
+        ],
+    )
 
 
 def _by_design(results: Sequence[PairedResult]) -> list[list[PairedResult]]:
@@ -220,47 +182,29 @@ def _by_design(results: Sequence[PairedResult]) -> list[list[PairedResult]]:
     return list(groups.values())
 
 
-def _full_table(same: Sequence[PairedResult]) -> str:
-    return format_table(*_full_rows(same))
-
-
-def _short_table(same: Sequence[PairedResult]) -> str:
-    return format_table(*_short_rows(same))
-
-
-def _full_rows(same: Sequence[PairedResult]) -> tuple[list[str], list[list[str]]]:
-    header = ["method"]
-    for symbol, (_, unit) in zip(SHEAR_SYMBOLS, SHEAR_UNITS, strict=True):
-        header += [f"{symbol} {unit}", "/prior", "/limit", "s.e.", "50 %", "90 %"]
-    header += ["joint", "log p", "failed", "flagged", "ms"]
-    rows = []
-    for r in same:
-        row = [r.method]
-        for k, (factor, _) in enumerate(SHEAR_UNITS):
-            row += [
-                format_number(r.rmse[k] * factor, ".3g"),
-                format_number(r.rmse_over_prior[k], ".3f"),
-                format_number(r.rmse_ratio[k], ".3f"),
-                format_number(r.rmse_ratio_std[k], ".3f"),
-                format_number(r.coverage50[k], ".0%"),
-                format_number(r.coverage90[k], ".0%"),
-            ]
-        row += [format_number(r.joint_coverage90, ".0%"), format_number(r.log_score, ".3g")]
-        row += [str(r.failed or ""), f"{r.flagged_fraction:.1%}" if r.flagged_fraction else ""]
-        rows.append([*row, format_number(1e3 * r.estimates.seconds, ".2g")])
-    return header, rows
-
-
-def _short_rows(same: Sequence[PairedResult]) -> tuple[list[str], list[list[str]]]:
-    return _without(*_full_rows(same), {"/prior", "/limit", "s.e.", "50 %", "log p", "ms"})
-
-
-def _without(
-    header: list[str], rows: list[list[str]], hidden: set[str]
-) -> tuple[list[str], list[list[str]]]:
-    """A table without the columns of some names."""
-    kept = [i for i, name in enumerate(header) if name not in hidden]
-    return [header[i] for i in kept], [[row[i] for i in kept] for row in rows]
+def _table(title: str, same: Sequence[PairedResult]) -> ReportTable:
+    """A row for each method; with an unmodelled effect the posterior is no limit."""
+    columns = [Column("method", [r.method for r in same])]
+    for k, (symbol, name) in enumerate(zip(SHEAR_SYMBOLS, SHEAR, strict=True)):
+        unit = QUANTITIES[name].unit
+        columns.append(Column(symbol, [r.rmse[k] for r in same], unit, digits=3))
+        if not same[0].effect:
+            ratio, error = (
+                [getattr(r, own)[k] for r in same] for own in ("rmse_ratio", "rmse_ratio_std")
+            )
+            prior = [r.rmse_over_prior[k] for r in same]
+            columns.append(Column("/prior", prior, digits=3))
+            columns.append(Column("/limit", ratio, std=np.nan_to_num(error).tolist(), digits=4))
+            columns.append(Column("in 50 %", [r.coverage50[k] for r in same], "share", digits=2))
+        columns.append(Column("in 90 %", [r.coverage90[k] for r in same], "share", digits=2))
+    columns += [
+        Column("joint", [r.joint_coverage90 for r in same], "share", digits=2),
+        Column("log p", [r.log_score for r in same], digits=3),
+        Column("failed", [r.failed for r in same]),
+        Column("flagged", [r.flagged_fraction for r in same], "share", digits=2),
+        Column("ms", [1e3 * r.estimates.seconds for r in same], digits=2),
+    ]
+    return ReportTable(title, columns)
 
 
 #: Columns of the tables, explained.
@@ -272,11 +216,14 @@ LEGEND = (
     ),
     ("/prior", "RMSE over the prior's standard deviation."),
     (
-        "/limit, s.e.",
+        "/limit",
         "RMSE over that of the exact posterior mean on the same sets, and its standard error "
         "(paired jackknife over sets).",
     ),
-    ("50 %, 90 %", "coverage of the method's own 50 and 90 % intervals, of the sets answered."),
+    (
+        "in 50 %, in 90 %",
+        "coverage of the method's own 50 and 90 % intervals, of the sets answered.",
+    ),
     ("joint", "coverage of the 90 % ellipsoid of its mean and covariance."),
     (
         "log p",
@@ -299,48 +246,38 @@ LEGEND = (
 
 
 def benchmark_report(results: Sequence[PairedResult]) -> Report:
-    """The page of the benchmark."""
+    """The report of the benchmark."""
     found = goals(results)
     met = sum(goal.met for goal in found)
     methods = {r.method for r in results if not r.effect}
-    answer = [f"{met} of {len(found)} acceptance goals are met."]
-    answer += [
+    verdict = f"{met} of {len(found)} acceptance goals are met."
+    missed = [
         f"Missed: {g.method}: {g.criterion} (measured {g.measured})." for g in found if not g.met
     ]
-    figure = ReportPicture(
-        "Errors and coverage",
-        picture(partial(plot_benchmark, results), 4, 3, SIZE, answer[0]),
-        "RMSE (upper rows, logarithmic) and coverage of 90 % intervals (lower rows; green: 88 to "
-        "92 %) against the number of rows per set, at one load and at three. Black: the Bayes "
-        "limit. Dotted: the prior. Dashed: analytic methods.",
-    )
-    tables = [ReportTable("Acceptance goals", _GOAL_HEADER, _goal_rows(found), len(_GOAL_HEADER))]
-    for same in _by_design(results):
-        title = f"{same[0].design.description} ({same[0].sets} sets)"
-        if same[0].effect:
-            title += f", simulated with {same[0].effect}, which no method models"
-            tables.append(ReportTable(title, *_short_rows(same)))
-        else:
-            tables.append(ReportTable(title, *_full_rows(same)))
     return Report(
         kind="compare",
-        title="Benchmark of methods relative to the Bayes limit",
-        badge=f"{met} of {len(found)} goals",
-        meaning=f"{len(methods)} methods on fixed sets of simulated readings",
-        answer=answer[:MOST_SENTENCES],
-        tone="no-gap" if met == len(found) else "suspected",
-        pictures=[figure],
-        tables=tables,
-        warnings=[
+        verdict=verdict,
+        lines=missed[:MOST_LINES],
+        tables=[goals_table(found), *benchmark_tables(results)],
+        pictures=[
+            Picture(
+                "Errors and coverage", partial(plot_benchmark, results), 4, 3, SIZE, verdict,
+                "RMSE (upper rows, logarithmic) and coverage of 90 % intervals (lower rows; green: "
+                "88 to 92 %) against the number of rows per set, at one load and at three. Thick: "
+                "the Bayes limit. Dotted: the prior. Dashed: analytic methods.",
+            )
+        ],
+        remarks=[
             Remark(
                 "simulated-by-the-model",
-                "The sets are simulated by the model: no error of the model is in these figures.",
+                "the sets are simulated by the model: no error of the model is in these figures",
                 severity="note",
             )
         ],
-        next_steps=["soilml compare MODEL.toml TEST.parquet MODEL.onnx for data of your own."],
+        next_steps=["soilml compare MODEL.toml TEST.parquet MODEL.onnx for data of your own"],
+        status=f"{met} of {len(found)} goals",
+        tone="good" if met == len(found) else "warn",
+        title="Benchmark of methods relative to the Bayes limit",
+        basis=f"{len(methods)} methods on fixed sets of simulated readings",
         notation=LEGEND,
-    )
-
-
-MOST_SENTENCES = 6  # Most sentences of the page; the table of goals has all
+    )  # fmt: skip

@@ -1,12 +1,10 @@
-"""What a file carries of its errors on held-out rows, so that it can be fused with others."""
+"""What a file has of its errors on rows left out, so that it can be fused with others."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions
@@ -16,9 +14,6 @@ from training.calibration.recalibration import Metrics, compute_metrics
 from training.calibration.row_pooling import LEAST_GROUPS, Rows, row_groups, runs_with_pattern
 from training.dataset import Dataset
 
-#: Mean, standard deviation (n, q) and in-range flag (n,) of features (n, d), as in the file.
-Predict = Callable[[Floats], tuple[Floats, Floats, NDArray[np.bool_]]]
-
 MOST_ROWS = 2000  # Most rows that a file carries
 #: Numbers of repeated readings at which the error of their mean is measured.
 REPEATS = (1, 2, 4, 8, 16)
@@ -26,40 +21,40 @@ SAME_TARGET = 0.01  # A target counts as the same in all rows of a run up to thi
 
 
 def carry_errors(
-    predict: Predict, pooling: PoolingCalibration, data: Dataset, scored: Dataset, prior_std: Floats
+    mean: Floats, std: Floats, pooling: PoolingCalibration, data: Dataset, prior_std: Floats
 ) -> tuple[PoolingCalibration, dict[int, Metrics]]:
-    """The pooling calibration with held-out errors, and metrics of repeated readings.
+    """The pooling calibration with the errors of rows, and metrics of repeated readings.
 
-    The errors are those of the rows `data`, the metrics those of `scored`; `predict` was trained
-    on neither.
+    Metrics are those of half of the runs, with the errors of the others.
+
+    mean, std (n, q): Estimates of the rows of `data` by fits that have not seen them.
     """
-    factor = pooling.single_row_coverage_factor
-    held_out = measure_held_out(predict, data, pooling.conditions, factor)
-    scores = score_repeats(held_out, predict, scored, pooling.conditions, prior_std)
+    conditions, factor = pooling.conditions, pooling.single_row_coverage_factor
+    held_out = measure_held_out(mean, std, data, conditions, factor)
+    half = data.run % 2 == 0
+    known = measure_held_out(mean[half], std[half], data.rows(half), conditions, factor)
+    scores = score_repeats(known, mean[~half], std[~half], data.rows(~half), conditions, prior_std)
     return replace(pooling, held_out=held_out), scores
 
 
 def measure_held_out(
-    predict: Predict, data: Dataset, conditions: RunConditions, coverage_factor: Floats
+    mean: Floats, std: Floats, data: Dataset, conditions: RunConditions, coverage_factor: Floats
 ) -> HeldOutErrors:
-    """The errors of a file on held-out rows, and of repeated readings of one soil.
+    """The errors of a file on rows that it has not seen, and of repeated readings of one soil.
 
-    Rows that are out of range are left out: the file then answers with the prior. Repeats are runs
-    at one slip and load; without `LEAST_GROUPS` of them, repeated readings count as one.
+    Repeats are runs at one slip and load; without `LEAST_GROUPS` of them, repeated readings count
+    as one.
 
-    predict: The file's estimator.
-    data: Rows that it was neither trained nor scored on.
-    conditions: From the training rows.
+    mean, std (n, q): Estimates of the rows of `data`.
+    conditions: Of all rows.
     coverage_factor (q,): Half-width of the 90 % interval of one reading, in standard deviations.
     """
-    mean, std, inside = predict(data.features)
     first = np.asarray([run[0] for run in data.runs()])
     if len(first) > MOST_ROWS:
         first = first[np.linspace(0, len(first) - 1, MOST_ROWS).astype(int)]
-    first = first[inside[first]]  # after the choice, which is then the same for all files
     first = first[np.argsort(data.row[first])]
     repeats, size, factor = [1], [np.ones(mean.shape[1])], [coverage_factor]
-    runs = [run for run in steady_runs(data, conditions) if inside[run].all()]
+    runs = steady_runs(data, conditions)
     longest = row_groups([], 1)
     one = _size_and_quantile(row_groups(runs, 1), data.targets, mean, std)
     for count in REPEATS[1:]:
@@ -92,14 +87,14 @@ def measure_held_out(
 
 def score_repeats(
     held_out: HeldOutErrors,
-    predict: Predict,
+    mean: Floats,
+    std: Floats,
     data: Dataset,
     conditions: RunConditions,
     prior_std: Floats,
 ) -> dict[int, Metrics]:
     """Metrics of the mean of repeated readings, by their number, on rows of `data`."""
-    mean, std, inside = predict(data.features)
-    runs = [run for run in steady_runs(data, conditions) if inside[run].all()]
+    runs = steady_runs(data, conditions)
     scores = {}
     for count in REPEATS:
         groups = row_groups(runs, count)

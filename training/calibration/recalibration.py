@@ -1,4 +1,4 @@
-"""Metrics of estimates with a standard deviation, and its recalibration on held-out rows."""
+"""Metrics of estimates with a standard deviation, and its recalibration by rows left out."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.quantities import Z_50, Z_90
-from training.dataset import Dataset
 
 
 @dataclass(frozen=True)
@@ -56,13 +55,15 @@ class CalibratedRegressor:
         return mean, std * self.std_scale
 
 
-def recalibrate(regressor: Any, data: Dataset) -> CalibratedRegressor:
-    r"""Scale standard deviations so that the squared standardised errors of `data` average to 1.
+def calibrated(regressor: Any, mean: Floats, std: Floats, truth: Floats) -> CalibratedRegressor:
+    r"""Scale standard deviations so that squared standardised errors average to 1.
 
     .. math:: s_k^2 = \frac{1}{n} \sum_i (y_{ik} - \mu_{ik})^2 / \sigma_{ik}^2
+
+    regressor: Fitted.
+    mean, std, truth (n, q): Its estimates of rows by fits that have not seen them, and true values.
     """
-    mean, std = regressor.predict(data.features, return_std=True)
-    z = (data.targets - mean) / std
+    z = (truth - mean) / std
     std_scale = np.sqrt(np.mean(z**2, axis=0))
     return CalibratedRegressor(regressor, std_scale, np.corrcoef(z.T).reshape(z.shape[1], -1))
 

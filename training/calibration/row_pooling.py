@@ -16,7 +16,10 @@ from soilml.onboard.gaussian_pooling import (
     RowInformation,
     RunConditions,
     RunPattern,
+    pool_within_prior,
 )
+from soilml.quantities import Z_90
+from training.calibration.recalibration import Metrics, compute_metrics
 from training.dataset import Dataset
 
 Rows = NDArray[np.int64]
@@ -45,7 +48,12 @@ def run_conditions(data: Dataset) -> RunConditions:
 
 
 def calibrate_pooling(
-    mean: Floats, covariance: Floats, data: Dataset, prior: PriorSummary, conditions: RunConditions
+    mean: Floats,
+    covariance: Floats,
+    data: Dataset,
+    prior: PriorSummary,
+    conditions: RunConditions,
+    factor: Floats,
 ) -> PoolingCalibration:
     """Calibrate the pooling of several rows, by the operating conditions that the run varied.
 
@@ -53,11 +61,12 @@ def calibrate_pooling(
     the largest likelihood is taken, with the factors that give the intervals their coverage. For a
     pattern with too few runs, pooling does not reduce the uncertainty.
 
-    mean, covariance (n, q) and (n, q, q): Estimates of the rows of `data`, which were not fitted
-        to.
-    data: Held-out rows with true values.
+    mean, covariance (n, q) and (n, q, q): Estimates of the rows of `data` by fits that have not
+        seen them.
+    data: Rows with true values.
     prior: Prior of the targets.
-    conditions: From the training rows.
+    conditions: Of all rows.
+    factor (q,): Half-width of the 90 % interval of single rows, in standard deviations.
     """
     rows = row_groups(data.runs(), 1)
     truth = data.targets[rows[:, 0]]
@@ -78,19 +87,13 @@ def calibrate_pooling(
     return PoolingCalibration(
         conditions=conditions,
         patterns=tuple(_pattern(varies, [one_row, *e]) for varies, e in by_pattern.items()),
-        single_row_coverage_factor=_coverage_factor(
-            mean[rows[:, 0]], covariance[rows[:, 0]], truth, prior
-        ),
+        single_row_coverage_factor=factor,
         inconsistency_limits=np.max(limits, axis=0) if limits else np.full(2, NO_LIMIT),
     )
 
 
-def calibrate_single_rows(
-    mean: Floats, covariance: Floats, data: Dataset, prior: PriorSummary, conditions: RunConditions
-) -> PoolingCalibration:
-    """The same for rows that are not pooled: they have targets of their own, or a set posterior."""
-    rows = row_groups(data.runs(), 1)[:, 0]
-    factor = _coverage_factor(mean[rows], covariance[rows], data.targets[rows], prior)
+def single_rows(conditions: RunConditions, factor: Floats) -> PoolingCalibration:
+    """For rows that are not pooled: they have targets of their own, or a set posterior."""
     return PoolingCalibration(conditions, (), factor, np.full(2, NO_LIMIT))
 
 
@@ -149,13 +152,35 @@ def _measure_groups(
     )
 
 
-def _coverage_factor(
-    mean: Floats, covariance: Floats, truth: Floats, prior: PriorSummary
-) -> Floats:
-    """Half-width (q,) of the 90 % interval of single rows, in standard deviations."""
-    std = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
-    error = np.abs(truth - np.clip(mean, prior.lower, prior.upper))
-    return np.asarray(np.quantile(error / std, 0.9, axis=0))
+def score_pooling(
+    mean: Floats,
+    covariance: Floats,
+    data: Dataset,
+    prior: PriorSummary,
+    conditions: RunConditions,
+    factor: Floats,
+) -> dict[str, dict[int, Metrics]]:
+    """Metrics of pooled rows by pattern and number of rows, of `calibrate_pooling` on other runs.
+
+    Pooling is calibrated on half of the runs, and measured on the others.
+    """
+    half = data.run % 2 == 0
+    parts = mean[half], covariance[half], data.rows(half)
+    pooling = calibrate_pooling(*parts, prior, conditions, factor)
+    mean, covariance, data = mean[~half], covariance[~half], data.rows(~half)
+    scores: dict[str, dict[int, Metrics]] = {}
+    for pattern in pooling.patterns:
+        by_length = scores[pooling.label(pattern)] = {}
+        for groups in groups_by_length(runs_with_pattern(pattern.varies, data, conditions)):
+            rule = pooling.rule(measured_rows(data, groups))
+            pooled = pool_within_prior(mean[groups], covariance[groups], prior, rule)
+            std = np.sqrt(np.diagonal(pooled.covariance, axis1=1, axis2=2))
+            # of a Gaussian with the same 90 % interval
+            std = std * rule.coverage_factor / Z_90
+            by_length[groups.shape[1]] = compute_metrics(
+                data.targets[groups[:, 0]], pooled.mean, std, prior.std
+            )
+    return scores
 
 
 def runs_with_pattern(

@@ -16,7 +16,10 @@ from training.regressors.standardisation import Standardisation
 MOST_KNOTS = (24, 8)  # Largest number of knots along the first and the second operating condition
 #: Rows per knot, at least, so that the extremes of a cell are close to those of the population.
 LEAST_ROWS = 60
-BOUNDS_MARGIN = 0.02  # Margin added to the bounds, as a share of their distance
+#: Margins added to the bounds, as shares of their distance and of their size: of some four standard
+#: deviations of usual noise. A genuine reading that is refused costs far more than one that is
+#: extrapolated.
+BOUNDS_MARGIN, SIZE_MARGIN = 0.02, 0.08
 
 
 @dataclass(frozen=True)
@@ -62,8 +65,9 @@ class ConditionalBounds:
         empty = ~np.isfinite(lower)
         lower[empty], upper[empty] = values.min(), values.max()
         margin = (BOUNDS_MARGIN + slack) * (upper - lower)
-        conditions = conditions[: len(knots)]
-        return ConditionalBounds(column, conditions, knots, lower - margin, upper + margin)
+        lower = lower - margin - SIZE_MARGIN * np.abs(lower)
+        upper = upper + margin + SIZE_MARGIN * np.abs(upper)
+        return ConditionalBounds(column, conditions[: len(knots)], knots, lower, upper)
 
     def contains(self, features: Floats) -> NDArray[np.bool_]:
         """Whether rows (n, d) lie within the bounds, (n,)."""
@@ -121,7 +125,7 @@ CANDIDATES = 6000
 FEW = 1500  # Rows that gaps between rows are measured on, where few of them are independent
 CHUNK = 4096  # Rows whose distances to the centres are computed at a time
 #: Margin of box and balls, as a share of their size: rows do not reach the very ends of the range.
-MARGIN = 0.005
+MARGIN = 0.02
 
 
 @dataclass(frozen=True)

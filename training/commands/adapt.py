@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from soilml.cli.option_values import whole_number_from
 from soilml.cli.options import (
     InputFile,
     add_ignore_extra_option,
@@ -12,18 +13,16 @@ from soilml.cli.options import (
     add_seed_option,
     add_workers_option,
     folder_outputs,
-    whole_number_from,
 )
 from soilml.errors import InputError
 
-HELP = "find what a model lacks, and train a file for the board with it"
 DESCRIPTION = """\
 Compare MODEL.toml with measured runs, add the effect that it lacks, train a
 file for the board on the model with it, and judge that file on runs that were
 kept back, beside one trained on the model as it was.
 
-  soilml adapt MODEL.toml RUNS.csv --out DIR
-  soilml adapt MODEL.toml RUNS.csv --out DIR --against exported/wheel.onnx
+  soilml adapt MODEL.toml RUNS.csv --out FOLDER
+  soilml adapt MODEL.toml RUNS.csv --out FOLDER --against exported/wheel.onnx
 
 A quarter of the runs is kept back (--seed). From the torque of their first rows
 each file estimates the soil, and its model predicts torque, drawbar pull and
@@ -31,16 +30,16 @@ sinkage of the later rows. The verdict comes first: by how much the error falls,
 or why the old file stays. Of fewer than four runs none is kept back: the file
 is then trained and not judged.
 
-DIR receives report.html (start here), adapt.json, adapted.onnx with its card
+FOLDER receives report.html (start here), adapt.json, adapted.onnx with its card
 adapted.md, adapted.c and adapted.h, adapted.toml (the model with the effect),
 the recipes and rows of both files, before.onnx, campaign.csv and kept_back.csv,
-and the files of `soilml gap` in DIR/gap. The same command continues after an
+and the files of `soilml gap` in FOLDER/gap. The same command continues after an
 interruption: steps whose inputs are the same are kept.
 
 The exit status is 0 also where the analysis supports no change, which is a
 result, and 2 for bad input. --suspected adds the first suspect where the
 evidence names no effect and `gap` predicts rows kept back better with it.
---soil TRUE.toml, with [soil], compares the estimates with a soil that is known;
+--truth TRUE.toml, with [soil], compares the estimates with a soil that is known;
 columns such as cohesion_Pa do the same for each run.
 """
 #: Files of the folder, beside those of the folder `gap` in it.
@@ -55,7 +54,7 @@ LEAST_ROWS, MOST_ROWS = 2000, 10**9  # Synthetic rows of a file
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser)
-    parser.add_argument("-o", "--out", metavar="DIR", required=True, help="folder for all files")
+    parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder for all files")
     parser.add_argument(
         "--suspected",
         action="store_true",
@@ -68,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="compare with this model file, and train none on the model as it was",
     )
     parser.add_argument(
-        "--soil", type=InputFile, metavar="TRUE.toml", help="file with the known soil in [soil]"
+        "--truth", type=InputFile, metavar="TRUE.toml", help="file with the known soil in [soil]"
     )
     parser.add_argument(
         "--rows",
@@ -93,16 +92,15 @@ def run(args: argparse.Namespace) -> int:
 
     for library in ("jinja2", "matplotlib", "training.adaptation"):
         need(library, "adapt")
-    from soilml.cli.output import origin_of, show, tell
+    from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import stage_progress
     from soilml.cli.tables import print_table_hints, read_long_table
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
     from training.adaptation import adapt
-    from training.adaptation.page import adapt_text
 
     case = read_case(args.model, with_bias=True)
-    truth = None if args.soil is None else _known_soil(args.soil)
+    truth = None if args.truth is None else _known_soil(args.truth)
     table = read_long_table(args.runs, RUNS, ignore_extra=args.ignore_extra)
     print_table_hints(table, case)
     with stage_progress() as progress:
@@ -120,7 +118,7 @@ def run(args: argparse.Namespace) -> int:
             model_name=str(args.model),
             origin=origin_of(args),
         )
-    show(adapt_text(report))
+    show_result(report.report(), report.as_json())
     folder = Path(args.out)
     tell(f"\n{', '.join(str(folder / name) for name in ('report.html', *report.files))}")
     return 0

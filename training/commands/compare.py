@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_workers_option, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import create_folder, output_files
 
 if TYPE_CHECKING:
-    from soilml.report.page import Report
+    from soilml.report.report import Report
 
 #: Outputs of a comparison on the user's test data, and of the benchmark.
 FILES = ("report.html", "compare.json", "compare.csv", "compare.png")
@@ -22,7 +22,6 @@ BENCHMARK = ("report.html", "benchmark.json", "benchmark.csv", "benchmark.png")
 FOLDER = "demo/benchmark"
 RELEASED = ("wheel", "wheel_lssvm", "wheel_mlp", "wheel_linear", "any_wheel")
 
-HELP = "score model files and analytic identification on sets of known soil"
 DESCRIPTION = """\
 Score model files, analytic identification and the prior on sets of readings
 whose soil is known: RMSE, coverage of 50 and 90 % intervals, failures, and
@@ -42,7 +41,7 @@ time per estimate.
 
 2. On test data of your own
 
-     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out DIR
+     soilml compare MODEL.toml TEST.parquet wheel.onnx other.onnx --out FOLDER
 
    TEST.parquet comes from `soilml generate`, with a seed that was not used in
    training. Its runs are the sets; single rows are scored too. MODEL.toml
@@ -67,7 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "(default: the released models)",
     )
     parser.add_argument(
-        "-o", "--out", metavar="DIR", help=f"output folder (default for the benchmark: {FOLDER})"
+        "-o", "--out", metavar="FOLDER", help=f"output folder (default for the benchmark: {FOLDER})"
     )
     parser.add_argument(
         "--sets",
@@ -81,7 +80,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="compute the Bayes limit of the benchmark and write it to this file, nothing else",
     )
     parser.add_argument(
-        "--against",
+        "--bayes-limit",
         type=InputFile,
         metavar="FILE.parquet",
         help="Bayes limit to use, written by --limit (default: the packaged one)",
@@ -125,16 +124,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _run_benchmark(args: argparse.Namespace) -> int:
     from datagen.recipe import read_recipe
-    from soilml.cli.output import tell
+    from soilml.cli.output import show_result, tell
     from soilml.cli.progress import stage_progress
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.io.table import Table
     from soilml.onboard.estimator import Estimator
     from soilml.quantities import SHEAR
-    from soilml.report.figure_style import save_png
     from training.benchmark import report
     from training.benchmark.acceptance import goals
-    from training.benchmark.report import SIZE, plot_benchmark
     from training.benchmark.suite import RECIPE, benchmark
     from training.benchmark.user_comparison import check_same_provenance
 
@@ -145,12 +142,11 @@ def _run_benchmark(args: argparse.Namespace) -> int:
     for note in check_same_provenance(case, Table({}, f"recipe {RECIPE}"), estimators, SHEAR):
         tell(note.text)
     with create_folder(args.out or FOLDER) as folder, stage_progress() as progress:
-        results = benchmark(estimators, None, args.sets, args.against, progress)
+        results = benchmark(estimators, None, args.sets, args.bayes_limit, progress)
         progress("drawing the report", 0, 1)
         columns = report.csv_columns(results)
         found = goals(results)
         content = {"columns": columns, "goals": [vars(goal) for goal in found]}
-        draw = partial(save_png, partial(plot_benchmark, results), 4, 3, SIZE)
         page = report.benchmark_report(results)
         _write(
             args=args,
@@ -158,10 +154,9 @@ def _run_benchmark(args: argparse.Namespace) -> int:
             names=BENCHMARK,
             page=page,
             content=content,
-            draw=draw,
             read=files,
         )
-    print(f"{report.short_tables(results)}\n\n{report.short_goals(found)}")
+    show_result(page, content)
     _say_where(folder, BENCHMARK)
     return 0
 
@@ -172,7 +167,6 @@ def _write(
     names: Sequence[str],
     page: Report,
     content: Mapping[str, Any],
-    draw: Callable[[Path], object],
     read: Sequence[Path],
 ) -> None:
     """Write page, JSON, CSV and picture as one set; `read` are the model files."""
@@ -183,7 +177,8 @@ def _write(
 
     origin = origin_of(args, [str(path) for path in read])
     files = report_texts(page, origin, content, (names[0], names[1]), folder)
-    files |= {folder / names[2]: csv_text(content["columns"]), folder / names[3]: draw}
+    files |= {folder / names[2]: csv_text(content["columns"])}
+    files |= {folder / names[3]: page.pictures[0].save}
     write_files(files)
 
 
@@ -214,7 +209,7 @@ def _compute_limit(args: argparse.Namespace) -> int:
     from training.benchmark.bayes_limit_file import save_limit
     from training.benchmark.suite import RECIPE
 
-    if args.files or args.out or args.against:
+    if args.files or args.out or args.bayes_limit:
         raise InputError(
             "--limit given with other arguments; it allows --sets alone: omit the rest"
         )
@@ -232,18 +227,17 @@ def _check_labels(estimators: Mapping[str, object], files: Sequence[object]) -> 
 
 
 def _compare_on_test_data(args: argparse.Namespace) -> int:
-    from soilml.cli.output import tell
+    from soilml.cli.output import show_result, tell
     from soilml.cli.progress import stage_progress
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case_of_one_gear
     from soilml.identification.trained_estimator import for_simulated_case
     from soilml.onboard.estimator import Estimator
-    from soilml.report.figure_style import save_png
     from training.benchmark import user_report as report
     from training.benchmark.user_comparison import check_same_provenance, compare
 
     if len(args.files) < 3 or not args.out:
-        raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out DIR")
+        raise InputError("needed are MODEL.toml TEST.parquet MODEL.onnx ... --out FOLDER")
     model, test, *files = args.files
     case = read_case_of_one_gear(model)
     table = read_long_table(test, ("run", "slip", "load_N", "torque_Nm"), filled=("run",))
@@ -256,11 +250,8 @@ def _compare_on_test_data(args: argparse.Namespace) -> int:
         scores = compare(case, table, estimators, progress, args.analytic_sets)
         progress("drawing the report", 0, 1)
         content = {"columns": report.csv_columns(scores, names)}
-        draw = partial(save_png, scores.plot, 2, len(names), report.figure_size(names))
         page = report.comparison_report(scores, names, Path(test).name)
-        _write(
-            args=args, folder=folder, names=FILES, page=page, content=content, draw=draw, read=[]
-        )
-    print(report.format_tables(scores, names))
+        _write(args=args, folder=folder, names=FILES, page=page, content=content, read=[])
+    show_result(page, content)
     _say_where(folder, FILES)
     return 0

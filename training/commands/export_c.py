@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import InputFile, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
 
-HELP = "write a model file as C99 code"
 DESCRIPTION = """\
 Write MODEL.onnx as the C file OUT.c and its header OUT.h: C99, libm alone,
 no allocation; the header states the memory that is needed.
@@ -40,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
     parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
     parser.add_argument(
-        "--rows",
+        "--step-rows",
         type=whole_number_from(1, MOST_ROWS),
         default=32,
         metavar="N",
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import tell
     from soilml.optional_imports import need
 
-    need("onnx", "export-c")
+    need("onnx", "export c")
     import onnx
 
     from soilml.onboard.estimator import Estimator
@@ -76,7 +76,9 @@ def run(args: argparse.Namespace) -> int:
     check_c_name(out)
     file = find_model(args.model)
     metadata = Estimator.load(file).metadata
-    written = write_c(onnx.load(str(file)), metadata, out.stem, file.name, args.rows, args.length)
+    written = write_c(
+        onnx.load(str(file)), metadata, out.stem, file.name, args.step_rows, args.length
+    )
     with atomic_outputs(outputs(args)) as (source, header):
         source.write_text(written.source, encoding="utf-8")
         header.write_text(written.header, encoding="utf-8")

@@ -10,7 +10,6 @@ from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
 
-HELP = "write the fusion of several model files as C99 code"
 DESCRIPTION = """\
 Write the fusion of files that estimate the same quantity from different
 sensors, such as slip from torque and from vibration, as the C file OUT.c and
@@ -18,7 +17,7 @@ its header OUT.h. They use the structs that export-c writes for each file.
 
   soilml export c exported/slip_torque.onnx slip_torque.c
   soilml export c exported/slip_vibration.onnx slip_vibration.c
-  soilml export fusion slip.c exported/slip_torque.onnx exported/slip_vibration.onnx
+  soilml export fusion exported/slip_torque.onnx exported/slip_vibration.onnx slip.c
 
 slip_fuse() weighs the estimates by their variances and by the correlation of
 their errors, which are in the files. docs/how-to/deploy.md describes it.
@@ -27,14 +26,14 @@ their errors, which are in the files. docs/how-to/deploy.md describes it.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
     parser.add_argument(
         "model",
         type=InputFile,
         nargs="+",
         metavar="MODEL.onnx",
-        help="model files, 2 to 4, named as the C files that export-c writes for them",
+        help="model files, 2 to 4, named as the C files that export c writes for them",
     )
+    parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
@@ -47,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import tell
     from soilml.optional_imports import need
 
-    need("jinja2", "export-fusion")
+    need("jinja2", "export fusion")
     from soilml.onboard.estimator import Estimator
     from soilml.onboard.model_file import find_model
     from training.export_c.fusion import write_fusion

@@ -1,30 +1,24 @@
-"""`soilml export slip`: the filter of `soilml slip` for the board, as ONNX and as C."""
+"""`soilml export slip`: the filter of `soilml drive slip` for the board, as ONNX and as C."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_effects_option,
-    add_output,
-    whole_number_from,
-)
+from soilml.cli.option_values import NumberFrom, whole_number_from
+from soilml.cli.options import InputFile, add_effects_option, add_output
 from soilml.io.atomic_files import output_files
 
-HELP = "write the slip filter of a rover without odometry as ONNX, and as C99"
 DESCRIPTION = """\
-Write one step of the filter of `soilml slip` for a rover: belief and readings
+Write one step of the filter of `soilml drive slip` for a rover: belief and readings
 in, belief, speed, slips and flags out. All shapes are numbers, so that memory
 and time of a step are fixed.
 
   soilml export slip ROVER.toml rover_slip.onnx
-  soilml export slip ROVER.toml rover_slip.onnx --c rover_slip.c --soils 512
+  soilml export slip ROVER.toml rover_slip.onnx --c rover_slip.c --draws 512
 
-ROVER.toml is that of `soilml slip`. The table of its forces is part of the
-file: fewer --soils are smaller and coarser. soilml.onboard.slip_stream runs
+ROVER.toml is that of `soilml drive slip`. The table of its forces is part of the
+file: fewer --draws are smaller and coarser. soilml.onboard.slip_stream runs
 OUT.onnx with numpy and onnxruntime alone; OUT.c needs the C library alone.
 """
 SOILS = 1024
@@ -37,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_output(parser, "out", "OUT.onnx", "file to write")
     parser.add_argument("--c", metavar="OUT.c", help="C file to write too; OUT.h is beside it")
     parser.add_argument(
-        "--soils", type=whole_number_from(32, 16384), default=SOILS, metavar="N",
+        "--draws", type=whole_number_from(32, 16384), default=SOILS, metavar="N",
         help=f"draws of the prior that stand for all soils (default: {SOILS})",
     )  # fmt: skip
     parser.add_argument(
@@ -63,13 +57,13 @@ def run(args: argparse.Namespace) -> int:
     from training.export_c.c_names import check_c_name
     from training.slip_step.files import slip_files
 
-    need("onnx", "export-slip")
-    need("jinja2", "export-slip")
+    need("onnx", "export slip")
+    need("jinja2", "export slip")
     if args.c is not None:
         check_c_name(Path(args.c))
     case = read_case(args.rover, available_effects(args))
-    with working(f"tabulating forces on {args.soils} soils"):
-        found = slip_files(case, args.soils, STEEPEST, args.least_speed, args.c, args.out)
+    with working(f"tabulating forces on {args.draws} soils"):
+        found = slip_files(case, args.draws, STEEPEST, args.least_speed, args.c, args.out)
     paths = outputs(args)
 
     def model(path: Path) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import argparse
 
-from soilml.cli.options import InputFile, add_output, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile, add_output
 
-HELP = "write one step of a stream as an ONNX file of fixed shapes"
 DESCRIPTION = """\
 Write the set posterior of MODEL.onnx as OUT.onnx, in which every shape is a
 number: one row in, and a memory that is always as large as it can be. It is
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="a model file")
     add_output(parser, "out", "OUT.onnx", "file to write")
     parser.add_argument(
-        "--rows",
+        "--step-rows",
         type=whole_number_from(1, MOST_ROWS),
         default=1,
         metavar="N",
@@ -38,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import tell
     from soilml.optional_imports import need
 
-    need("onnx", "export-step")
+    need("onnx", "export step")
     import onnx
 
     from soilml.onboard.estimator import Estimator
@@ -48,14 +48,14 @@ def run(args: argparse.Namespace) -> int:
 
     file = find_model(args.model)
     metadata = Estimator.load(file).metadata
-    graph = one_step_graph(onnx.load(str(file)), str(file), args.rows)
+    graph = one_step_graph(onnx.load(str(file)), str(file), args.step_rows)
     own = {key: value for key, value in metadata.items() if not key.endswith("_sha256")}
     kept = {key: metadata[key] for key in ("recipe_sha256", "data_sha256") if key in metadata}
     origin = {"soilml_kind": ONE_STEP, "step_of_graph_sha256": metadata["graph_sha256"]}
     write_model(graph, own | kept | origin, args.out)
     memory = next(v for v in graph.graph.input if v.name == "memory").type.tensor_type.shape.dim
     tell(
-        f"written: {args.out}; {args.rows} rows a step, memory {memory[0].dim_value} x "
+        f"written: {args.out}; {args.step_rows} rows a step, memory {memory[0].dim_value} x "
         f"{memory[1].dim_value}, {len(graph.graph.node)} nodes"
     )
     return 0

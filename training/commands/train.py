@@ -10,10 +10,9 @@ from soilml.cli.options import InputFile, add_workers_option
 from soilml.errors import InputError
 from soilml.io.atomic_files import atomic_outputs, output_files
 
-HELP = "train regressors on data and export one ONNX model file"
 DESCRIPTION = """\
-Train the regressors of SPEC.toml on DATA.parquet, calibrate their uncertainty
-on held-out rows, and export the result as one ONNX file.
+Train the regressors of SPEC.toml on all rows of DATA.parquet, calibrate their
+uncertainty by fits without each row's run, and export one ONNX file.
 
   soilml train spec.toml data.parquet wheel.onnx
   soilml train fused data.parquet wheel.onnx
@@ -33,7 +32,7 @@ contains
   type = "fixed-size-lssvm"          # centres; gamma, width (tuned if absent)
   centres = 150                      # features = [...]: a subset of the spec's
   [[regressor]]
-  type = "mlp"                       # hidden = [64, 64], epochs, batch, ...
+  type = "mlp"                       # hidden = [32, 32], epochs, steps, ...
   [[regressor]]
   type = "linear"
   [[regressor]]
@@ -118,8 +117,8 @@ def _from_data(args: argparse.Namespace) -> int:
     """Train an estimator on a data file."""
     from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
-    from soilml.io.text_tables import format_table
     from soilml.quantities import QUANTITIES
+    from soilml.report.aligned_text import format_table
     from training.dataset import read_dataset
     from training.export.learning_curves import plot_learning_curves
     from training.export.model_card import model_card
@@ -145,9 +144,7 @@ def _from_data(args: argparse.Namespace) -> int:
     ]
     labels = [QUANTITIES[name].symbol if name in QUANTITIES else name for name in spec.targets]
     head = ("", *[f"RMSE {n}" for n in labels], *[f"cover {n}" for n in labels])
-    kind = "held-out rows"
-    if trained.left_out is not None:
-        kind = "rows, each left out, on which the intervals are calibrated too"
+    kind = "rows, each by a fit without its run, on which the intervals are calibrated too"
     tell(
         f"On {trained.scores['estimator'].rows} {kind}: RMSE over the prior's standard "
         "deviation, and coverage of 90 % intervals\n"

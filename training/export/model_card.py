@@ -23,34 +23,31 @@ PER_ROW = (
 )
 POOLED = (
     "Several readings of one soil, pooled (`run`), by the operating conditions that the run "
-    "varied, on runs that pooling was not calibrated on. Rows of nearly the same slip and load "
-    "count as one; for a run between these patterns, the calibration is interpolated."
+    "varied, on half of the runs, with pooling calibrated on the others. Rows of nearly the same "
+    "slip and load count as one; for a run between these patterns, the calibration is interpolated."
 )
 REPEATED = (
     "Repeated readings of one soil at one slip and load (`soilml.onboard.multi_sensor`). The error "
-    "of the model on this soil is common to them and does not average out. On runs that were not "
-    "used for training or calibration."
+    "of the model on this soil is common to them and does not average out. On half of the runs, "
+    "calibrated on the others."
 )
 MEASURED = (
-    "On {rows} rows that were not used for training or calibration. Error is RMSE / prior std; "
+    "On {rows} rows, each estimated by a fit that has not seen its run. Error is RMSE / prior std; "
     "-log p is the mean negative log density of the value over the prior std (prior alone: 1.42 as "
-    "a Gaussian); 90 % is the coverage of the 90 % interval."
+    "a Gaussian); 90 % is the coverage of the Gaussian 90 % interval. The sizes of standard "
+    "deviations and intervals are calibrated on these same errors."
 )
-LEFT_OUT = (
-    "A campaign of few rows: all {rows} rows were learned from. Each is judged by a fit without "
-    "its run, of which there are {runs}. Error is RMSE / prior std; -log p is the mean negative "
-    "log density of the value over the prior std (prior alone: 1.42 as a Gaussian). The intervals "
-    "are "
-    "calibrated on these same errors: the coverage of a Gaussian interval, 90 %, does not test "
-    "them. Rows of one run share a part of their error; together they are worth {freedom:.0f} "
-    "independent ones."
+FEW_RUNS = (
+    "A campaign of few rows: the {runs} runs do not tell how the standard deviation varies, and it "
+    "is constant. Rows of one run share a part of their error; together they are worth "
+    "{freedom:.0f} independent ones."
 )
 ONE_RUN = (
     "All rows are of one run: the intervals are valid for readings of this run's soil, and nothing "
     "is known of others."
 )
 HELD_OUT = (
-    "The file carries its errors on {rows} held-out rows and {runs} averages of repeated readings: "
+    "The file has its errors on {rows} rows left out, and on {runs} averages of repeated readings: "
     "fused with another file that was trained from the same data, it is weighed by the correlation "
     "of their errors, and the interval is calibrated for the pair."
 )
@@ -102,10 +99,10 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
 
 def _judged_on(trained: TrainedModel) -> list[str]:
     """What the figures were measured on."""
-    rows, left = trained.scores["estimator"].rows, trained.left_out
-    if left is None:
-        return [MEASURED.format(rows=rows)]
-    text = LEFT_OUT.format(rows=rows, runs=left.runs, freedom=left.freedom.min() + 1.0)
+    left = trained.left_out
+    text = MEASURED.format(rows=trained.scores["estimator"].rows)
+    if left.few:
+        text += " " + FEW_RUNS.format(runs=left.runs, freedom=left.freedom.min() + 1.0)
     return [text] if left.runs > 1 else [text, "", ONE_RUN]
 
 
@@ -152,13 +149,7 @@ def _validity(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
 
 
 def _provenance(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
-    parts, dropped = trained.parts, trained.data.dropped
-    rows = (
-        f"{len(parts.train)} for training, {len(parts.validation)} for validation, "
-        f"{len(parts.calibration)} for calibration and metrics; {dropped} dropped"
-    )
-    if trained.left_out is not None:
-        rows = f"{len(trained.data)}, all for training; {dropped} dropped"
+    rows = f"{len(trained.data)}, all for training; {trained.data.dropped} dropped"
     return [
         f"- rows: {rows}",
         f"- training recipe sha256 `{metadata['recipe_sha256']}`",

@@ -129,7 +129,7 @@ def file_metadata(
             "lower": float(values.min()),
             "upper": float(values.max()),
         }
-        for name, values in trained.parts.train.measured.items()
+        for name, values in trained.data.measured.items()
     ]
     outputs = [
         {
@@ -261,9 +261,9 @@ def write_model(model: Any, metadata: dict[str, str], path: str | os.PathLike[st
 
 def _parity_readings(trained: TrainedModel) -> dict[str, Floats]:
     """Readings (n,) that fill the box of the training rows, and some of these rows."""
-    measured = trained.parts.train.measured
+    measured = trained.data.measured
     fill = qmc.Sobol(len(measured), rng=11).random(PARITY_ROWS)
-    step = max(len(trained.parts.train) // PARITY_ROWS, 1)
+    step = max(len(trained.data) // PARITY_ROWS, 1)
     readings = {}
     for k, (name, values) in enumerate(measured.items()):
         box = values.min() + (values.max() - values.min()) * fill[:, k]
@@ -295,9 +295,9 @@ def _probe(trained: TrainedModel) -> dict[str, Any]:
 
     The last lies halfway between the largest training value and the end of what can be measured.
     """
-    chosen = np.linspace(0, len(trained.parts.train) - 1, 8).astype(int)
+    chosen = np.linspace(0, len(trained.data) - 1, 8).astype(int)
     readings = {}
-    for name, values in trained.parts.train.measured.items():
+    for name, values in trained.data.measured.items():
         far = 0.5 * (values.max() + min(READABLE[name][1], 100.0 * np.abs(values).max()))
         readings[name] = np.append(values[chosen], far).astype(np.float32).astype(np.float64)
     mean, std, inside = trained.predict(compute_features(trained.spec.features, readings))

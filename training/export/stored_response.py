@@ -56,7 +56,7 @@ def write_anew(path: Path) -> None:
     response = replace(response, carried=float(sets.get("carried", 1.0)))
     small = bool(sets.get("small", False))
     posterior = SetPosteriorGraph(
-        family, response, limits, sets["noise"], small, _scales(sets), _sensor_errors(metadata)
+        family, response, limits, sets["noise"], small, _scales(metadata), _sensor_errors(metadata)
     )
     graph = Graph("" if sets["alone"] else "sets_")
     posterior.add_to(graph, "" if sets["alone"] else "sets_")
@@ -84,9 +84,9 @@ def _family(metadata: Mapping[str, str], sets: Mapping[str, Any], path: Path) ->
     return RecipeFamily.of(parse_recipe(metadata["recipe"], str(path)), targets)
 
 
-def _scales(sets: Mapping[str, Any]) -> ErrorScales:
-    """Scales of the model's errors; the usual ones where a file states none."""
-    stated = sets.get("model_error_scales")
+def _scales(metadata: Mapping[str, str]) -> ErrorScales:
+    """Scales of the model's errors that the spec of a file states, else the usual ones."""
+    stated = json.loads(metadata["spec"]).get("set_posterior", {}).get("model_errors")
     return USUAL_SCALES if stated is None else ErrorScales.of_list(stated)
 
 

@@ -60,7 +60,7 @@ def write_fusion(
     name: Prefix of the C names of the fusion.
 
     Raises `InputError` for files that cannot be fused: of different quantities or priors, or that
-    do not carry their errors on common rows.
+    do not state their errors on common rows.
     """
     _check(estimators, files, name)
     first, chosen = estimators[0], range(2 ** len(files))
@@ -100,13 +100,13 @@ def _check(estimators: Sequence[Estimator], files: Sequence[str], name: str) -> 
     if any(estimator.pooling.held_out is None for estimator in estimators):
         without = next(e.path for e in estimators if e.pooling.held_out is None)
         raise InputError(
-            f"{without} does not carry its errors on held-out rows, which fusion in C needs; "
+            f"{without} does not state its errors on held-out rows, which fusion in C needs; "
             "files that estimate slip do"
         )
     fuse_estimates([estimator.prior_estimate() for estimator in estimators])
     if not are_comparable([estimator.pooling.held_out for estimator in estimators]):
         raise InputError(
-            f"{' and '.join(estimator.path for estimator in estimators)} do not carry their errors "
+            f"{' and '.join(estimator.path for estimator in estimators)} do not state their errors "
             "on common rows: train them from one data file"
         )
 

@@ -8,15 +8,18 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin
+from sklearn.base import BaseEstimator, MultiOutputMixin, RegressorMixin, clone
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
+from training.regressors.row_groups import Groups, folds_of
 from training.regressors.standardisation import Standardisation
 
+#: Called with the steps done and the total number of steps.
 Progress = Callable[[int, int], None]
 
+RANGE_ROWS = 20_000  # Most training rows on which the range of the log-variance is measured
 TAIL = 0.001  # Share of the training rows whose log-variances are clipped at either end
 
 
@@ -59,9 +62,6 @@ class GaussianHead:
         )
 
 
-#: Called with the steps done and the total number of steps.
-
-
 @dataclass(frozen=True)
 class Requirements:
     """What a fit will take: the size of the model in words, and the memory in bytes."""
@@ -93,10 +93,8 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     head_: GaussianHead
 
     @abstractmethod
-    def _fit_standardised(
-        self, x: Floats, z: Floats, validation: tuple[Floats, Floats] | None, progress: Progress
-    ) -> Floats:
-        """Fit inputs x to outputs z; the log-variances (k, q) of training rows."""
+    def _fit_standardised(self, x: Floats, z: Floats, groups: Groups, progress: Progress) -> None:
+        """Fit inputs x to outputs z; rows of one group (n,) share a part of their error."""
 
     @abstractmethod
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
@@ -106,38 +104,60 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
     def _add_standardised_outputs(self, graph: Graph, x: str) -> tuple[str, str]:
         """Add the same to an ONNX graph: names of mean and log-variance (n, q)."""
 
-    def _set_aside(self, X: Floats, Y: Floats) -> tuple[Floats, Floats, Any]:
-        """Training rows and validation rows of a fit without separate ones; here none."""
-        return X, Y, None
-
     def _input_factor(self) -> float:
         """Factor on standardised inputs in the graph."""
         return 1.0
 
+    def _left_out(
+        self, x: Floats, z: Floats, groups: Groups, progress: Progress
+    ) -> tuple[Floats, Floats]:
+        """Mean and log-variance (n, q) of each row, by a fit without its group; after the fit."""
+        mean, log_variance, fold = np.empty_like(z), np.empty_like(z), folds_of(groups)
+        for k in range(count := int(fold.max()) + 1):
+            progress(k, count)
+            out, other = fold == k, clone(self)
+            other._fit_standardised(x[~out], z[~out], groups[~out], lambda done, total: None)
+            mean[out], log_variance[out] = other._standardised_outputs(x[out])
+        progress(count, count)
+        return mean, log_variance
+
     def fit(self, X: Any, y: Any) -> Self:
         """Fit rows X (n, d) to y (n,) or (n, q)."""
-        return self.fit_with_validation(X, y, None, lambda done, total: None)
+        self._fit(X, y, None, lambda done, total: None)
+        return self
 
-    def fit_with_validation(
-        self, X: Any, y: Any, validation: tuple[Floats, Floats] | None, progress: Progress
-    ) -> Self:
-        """Fit rows X (n, d) to y (n,) or (n, q), with validation rows (X, y) where that is useful.
+    def fit_left_out(
+        self, X: Any, y: Any, groups: Groups, progress: Progress, equal_std: bool = False
+    ) -> tuple[Floats, Floats]:
+        """Fit all rows X (n, d) to y (n, q), and estimate each row by a fit without its group.
 
-        They select hyperparameters, or stop the training early.
+        groups (n,): Rows of one number share a part of their error, such as those of one soil.
+        equal_std: One standard deviation for all rows: few rows do not tell how it varies.
+
+        Returns: Mean and standard deviation (n, q) of the rows, by fits that have not seen them.
         """
+        x, z = self._fit(X, y, groups, progress)
+        mean, log_variance = self._left_out(x, z, groups, progress)
+        if equal_std:
+            log_variance = np.zeros_like(z)
+        self.head_ = GaussianHead.of(self.y_scaling_, log_variance, y.ndim == 1)
+        found: tuple[Floats, Floats] = self.head_.to_original_units(mean, log_variance, True)
+        return found
+
+    def _fit(
+        self, X: Any, y: Any, groups: Groups | None, progress: Progress
+    ) -> tuple[Floats, Floats]:
+        """Fit, and the standardised rows; every row is a group where there are none."""
         rules = {"multi_output": True, "y_numeric": True, "ensure_min_samples": 2}
         X, y = validate_data(self, X, y, dtype=np.float64, **rules)
         Y = y.reshape(len(y), -1).astype(np.float64)
-        if validation is None:
-            X, Y, validation = self._set_aside(X, Y)
         self.x_scaling_, self.y_scaling_ = Standardisation.of(X), Standardisation.of(Y)
         x, z = self.x_scaling_.apply(X), self.y_scaling_.apply(Y)
-        if validation is not None:
-            truth = validation[1].reshape(len(validation[1]), -1)
-            validation = (self.x_scaling_.apply(validation[0]), self.y_scaling_.apply(truth))
-        log_variances = self._fit_standardised(x, z, validation, progress)
-        self.head_ = GaussianHead.of(self.y_scaling_, log_variances, y.ndim == 1)
-        return self
+        self._fit_standardised(x, z, np.arange(len(x)) if groups is None else groups, progress)
+        some = np.random.default_rng(1).permutation(len(x))[:RANGE_ROWS]
+        log_variance = self._standardised_outputs(x[some])[1]
+        self.head_ = GaussianHead.of(self.y_scaling_, log_variance, y.ndim == 1)
+        return x, z
 
     def add_to_graph(self, graph: Graph, features: str) -> tuple[str, str]:
         """Add the fitted regressor to an ONNX graph; names of mean and std, (n, q)."""
@@ -171,18 +191,6 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         """
         return {}
 
-    def hyperparameter_search(self) -> list[tuple[float, Floats, Floats]]:
-        """Kernel width, gammas and held-out errors of each width; the selected one is the last."""
-        return []
-
-    def mean_only_epochs(self) -> int:
-        """Number of first epochs in which only the mean is fitted, with another loss."""
-        return 0
-
-    def loss_history(self) -> list[tuple[float, float]]:
-        """Training and validation loss of each epoch, of a regressor that is fitted by epochs."""
-        return []
-
 
 @dataclass(frozen=True)
 class FeatureSubset:
@@ -202,12 +210,11 @@ class FeatureSubset:
         """The columns (n, k) that the regressor reads."""
         return features if self.columns is None else features[:, list(self.columns)]
 
-    def fit(
-        self, training: tuple[Floats, Floats], validation: tuple[Floats, Floats], progress: Progress
-    ) -> None:
-        """Fit the regressor to features and targets, with others for early stopping."""
-        subset = (self.select(validation[0]), validation[1])
-        self.model.fit_with_validation(self.select(training[0]), training[1], subset, progress)
+    def fit_left_out(
+        self, features: Floats, targets: Floats, groups: Groups, progress: Progress, few: bool
+    ) -> tuple[Floats, Floats]:
+        """As `GaussianRegressor.fit_left_out`, on the columns that the regressor reads."""
+        return self.model.fit_left_out(self.select(features), targets, groups, progress, few)
 
     def predict(self, features: Floats, return_std: bool = False) -> Any:
         """Mean (n, q); with `return_std` a tuple with the standard deviation."""

@@ -10,6 +10,7 @@ from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
 from training.regressors.gaussian_regressor import GaussianRegressor, Progress
 from training.regressors.rbf_expansion import log_squared_residuals
+from training.regressors.row_groups import Groups
 
 
 class LinearGaussian(GaussianRegressor):
@@ -37,16 +38,15 @@ class LinearGaussian(GaussianRegressor):
     def __init__(self, ridge: float = 1e-8) -> None:
         self.ridge = ridge
 
-    def _fit_standardised(
-        self, x: Floats, z: Floats, validation: tuple[Floats, Floats] | None, progress: Progress
-    ) -> Floats:
+    def _fit_standardised(self, x: Floats, z: Floats, groups: Groups, progress: Progress) -> None:
         normal = x.T @ x + self.ridge * len(x) * np.eye(x.shape[1])
-        self.weights_ = np.linalg.solve(normal, x.T @ z)
-        self.bias_ = z.mean(axis=0)
+        self.bias_, centre = z.mean(axis=0), x.mean(axis=0)
+        normal -= len(x) * np.outer(centre, centre)
+        self.weights_ = np.linalg.solve(normal, (x - centre).T @ z)
+        self.bias_ = self.bias_ - centre @ self.weights_
         logs = log_squared_residuals(z - x @ self.weights_ - self.bias_)
-        self.log_variance_weights_ = np.linalg.solve(normal, x.T @ (logs - logs.mean(axis=0)))
-        self.log_variance_bias_ = logs.mean(axis=0)
-        return np.asarray(x @ self.log_variance_weights_ + self.log_variance_bias_)
+        self.log_variance_weights_ = np.linalg.solve(normal, (x - centre).T @ logs)
+        self.log_variance_bias_ = logs.mean(axis=0) - centre @ self.log_variance_weights_
 
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
         return (

@@ -11,12 +11,13 @@ from training.onnx_graph.builder import Graph
 from training.regressors.exact_solution import ExactSolution
 from training.regressors.fixed_size_solution import FixedSizeSolution
 from training.regressors.gaussian_regressor import GaussianRegressor, Progress, Requirements
-from training.regressors.rbf_expansion import Expansion, Rows, rbf
+from training.regressors.rbf_expansion import Expansion, rbf
+from training.regressors.row_groups import Groups
 
 #: Most training rows that are solved exactly unless the solution is stated: 1.7 GB, some minutes.
 MOST_EXACT_ROWS = 20_000
 #: Elements of the kernel matrix that a prediction computes at a time.
-PREDICTED_AT_A_TIME = 4_000_000
+PREDICTED_AT_A_TIME = 500_000
 
 
 class LSSVM(GaussianRegressor):
@@ -33,8 +34,8 @@ class LSSVM(GaussianRegressor):
     centres : int
         Prototypes of the fixed-size solution.
     gamma : float, optional
-        Weight of the errors against smoothness; selected if None, by the error on validation rows,
-        or where there are too few by closed-form leave-one-out.
+        Weight of the errors against smoothness; selected if None, by the error on rows left out,
+        in closed form.
     width : float, optional
         Kernel width in standardised inputs; selected in the same way if None.
     random_state : int
@@ -43,7 +44,7 @@ class LSSVM(GaussianRegressor):
     Notes
     -----
     The log-variance is a second expansion on the same kernel, fitted to the logarithms of the
-    squared leave-one-out residuals.
+    squared residuals of rows that were left out.
 
     Examples
     --------
@@ -79,11 +80,15 @@ class LSSVM(GaussianRegressor):
         return FixedSizeSolution(self.centres, self.gamma, self.width, self.random_state)
 
     @final
-    def _fit_standardised(
-        self, x: Floats, z: Floats, validation: Rows | None, progress: Progress
-    ) -> Floats:
-        self.expansion_ = self.solution_for(len(x)).solve(x, z, validation, progress)
-        return self.expansion_.log_variances
+    def _fit_standardised(self, x: Floats, z: Floats, groups: Groups, progress: Progress) -> None:
+        self.expansion_ = self.solution_for(len(x)).solve(x, z, groups, progress)
+
+    @final
+    def _left_out(
+        self, x: Floats, z: Floats, groups: Groups, progress: Progress
+    ) -> tuple[Floats, Floats]:
+        """In closed form, as part of the solution."""
+        return self.expansion_.left_out
 
     @final
     def _standardised_outputs(self, x: Floats) -> tuple[Floats, Floats]:
@@ -125,11 +130,6 @@ class LSSVM(GaussianRegressor):
         """Solution, number of centres, gamma and width."""
         e = self.expansion_
         return f"{e.solution}, {len(e.centres)} centres, gamma {e.gamma:.3g}, width {e.width:.3g}"
-
-    @final
-    def hyperparameter_search(self) -> list[tuple[float, Floats, Floats]]:
-        """Kernel width, gammas and held-out errors of each width; the selected one is the last."""
-        return self.expansion_.search
 
     def learning_curve_parameters(self) -> dict[str, Any] | None:
         """The chosen gamma, width and solution; None where fitting again takes too long."""

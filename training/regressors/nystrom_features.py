@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from training.regressors.ordered_threads import Progress, ordered_map, thread_count
 from training.regressors.rbf_expansion import rbf
+from training.regressors.row_groups import MOST_FOLDS, Groups
 
 #: Rows that centres are selected from, at least and for each centre; and exchanges per centre.
 CANDIDATES, CANDIDATES_PER_CENTRE = 4000, 10
@@ -76,33 +77,13 @@ class RidgeEigensystem:
         centred = gram - np.outer(total, total) / count
         return RidgeEigensystem(count, origin + total / count, *np.linalg.eigh(centred))
 
-    @staticmethod
-    def of(features: Floats) -> RidgeEigensystem:
-        """Of features (n, m) in memory."""
-        mean = features.mean(axis=0)
-        centred = features - mean
-        return RidgeEigensystem(len(features), mean, *np.linalg.eigh(centred.T @ centred))
-
     def project(self, features: Floats) -> Floats:
         """Centred features (n, m) along the eigenvectors."""
         return np.asarray((features - self.mean) @ self.vectors)
 
     def solve(self, moment: Floats, gamma: float) -> Floats:
         """Weights (m, q) along the eigenvectors, from moments (m, q) of centred features and y."""
-        return np.asarray((self.vectors.T @ moment) * self.shrinkage(gamma)[:, None])
-
-    def shrinkage(self, gamma: float) -> Floats:
-        """Eigenvalues (m,) of the inverse of the penalised Gram matrix."""
-        return np.asarray(1.0 / (self.values + 1.0 / gamma))
-
-    def leverage(self, projected: Floats, gamma: float) -> Floats:
-        """Derivative (n,) of each row's prediction by its own y, from projected features (n, m)."""
-        return np.asarray(1.0 / self.count + (projected**2) @ self.shrinkage(gamma))
-
-    def leave_one_out(self, projected: Floats, y: Floats, weights: Floats, gamma: float) -> Floats:
-        """Residuals (n, q) of centred y when each row is left out (PRESS), in closed form."""
-        residual = y - projected @ weights
-        return np.asarray(residual / (1.0 - self.leverage(projected, gamma))[:, None])
+        return np.asarray((self.vectors.T @ moment) / (self.values + 1.0 / gamma)[:, None])
 
 
 CHUNK = 4096  # Rows whose features are computed at a time in each thread
@@ -134,57 +115,116 @@ class NystromFeatures:
         """Features (n, k) of rows (n, d), all at once."""
         return np.asarray(rbf(x, self.centres, self.width) @ self.projection)
 
-    def ridge(
-        self, x: Floats, y: Floats, origin: Floats, progress: Progress
-    ) -> tuple[RidgeEigensystem, Floats]:
-        """The ridge regression on all rows (n, d), and its moments (k, q) with centred y (n, q).
 
-        `origin` (k,) is near the mean of the features: sums of differences from it are accurate.
+@dataclass(frozen=True)
+class FoldedRidge:
+    """Ridge regressions on features of rows: without each fold of them, and on all.
+
+    Rows (n, d) are read in parts, fold by fold.
+    """
+
+    features: NystromFeatures
+    x: Floats
+    parts: list[tuple[int, NDArray[np.int64]]]  # a fold, and some of its rows
+    origin: Floats  # (k,) near the mean of the features: sums of differences from it are accurate
+    sums: list[Floats]  # (k,) of each fold
+    fits: list[RidgeEigensystem]  # without each fold; the last on all rows
+
+    @staticmethod
+    def of(features: NystromFeatures, x: Floats, fold: Groups, progress: Progress) -> FoldedRidge:
+        """The regressions for rows (n, d), of which each fold (n,) is left out once."""
+        parts = [
+            (k, rows[i : i + CHUNK])
+            for k in range(int(fold.max()) + 1)
+            for rows in [np.flatnonzero(fold == k)]
+            for i in range(0, len(rows), CHUNK)
+        ]
+        origin = features.at(x[:CHUNK]).mean(axis=0)
+
+        def products(part: tuple[int, NDArray[np.int64]]) -> tuple[Floats, Floats]:
+            own = features.at(x[part[1]]) - origin
+            return own.sum(axis=0), own.T @ own
+
+        count, size = np.bincount(fold), len(origin)
+        sums = [np.zeros(size) for _ in count]
+        grams = [np.zeros((size, size)) for _ in count]
+        for done, ((k, _), (total, gram)) in enumerate(
+            zip(parts, ordered_map(products, parts), strict=True)
+        ):
+            sums[k] += total
+            grams[k] += gram
+            progress(done + 1, len(parts))
+        whole, gram = np.sum(sums, axis=0), np.sum(grams, axis=0)
+        fits = [
+            RidgeEigensystem.of_moments(len(x) - n, origin, whole - own, gram - of_fold)
+            for n, own, of_fold in zip(
+                [*count, 0], [*sums, 0.0 * origin], [*grams, 0.0 * gram], strict=True
+            )
+        ]
+        return FoldedRidge(features, x, parts, origin, sums, fits)
+
+    def regress(
+        self, y: Floats, gammas: Sequence[float], most: int
+    ) -> tuple[float, float, Floats, Floats, Floats]:
+        """Least squares of y (n, q) with the best gamma, by the rows that are left out.
+
+        most: About so many rows select gamma.
+
+        Returns: Gamma, its mean squared error, weights (k, q) of the features and bias (q,) of the
+        fit to all rows, and estimates (n, q) of the rows by fits without their folds.
         """
+        moments, means = self._moments(y)
+        solved = {
+            gamma: [
+                fit.solve(moment, gamma) for fit, moment in zip(self.fits, moments, strict=True)
+            ]
+            for gamma in gammas
+        }
+        errors, some = np.zeros(len(gammas)), max(most // CHUNK, len(self.fits) - 1)
+        for k, rows in self.parts[:: max(len(self.parts) // some, 1)]:
+            projected = self.fits[k].project(self.features.at(self.x[rows]))
+            for i, gamma in enumerate(gammas):
+                left = y[rows] - means[k] - projected @ solved[gamma][k]
+                errors[i] += np.sum(left**2)
+        gamma = gammas[int(np.argmin(errors))]
+        found = np.empty_like(y)
 
-        def sums(rows: slice) -> tuple[Floats, Floats, Floats]:
-            features = self.at(x[rows]) - origin
-            return features.sum(axis=0), features.T @ features, features.T @ y[rows]
+        def predict(part: tuple[int, NDArray[np.int64]]) -> Floats:
+            k, rows = part
+            projected = self.fits[k].project(self.features.at(self.x[rows]))
+            return np.asarray(means[k] + projected @ solved[gamma][k])
 
-        size = len(origin)
-        totals = np.zeros(size), np.zeros((size, size)), np.zeros((size, y.shape[1]))
-        parts = _chunks(len(x))
-        for done, found in enumerate(ordered_map(sums, parts)):
-            for total, part in zip(totals, found, strict=True):
-                total += part
-            progress(done + 1, len(parts))
-        return RidgeEigensystem.of_moments(len(x), origin, *totals[:2]), totals[2]
+        for (_, rows), own in zip(self.parts, ordered_map(predict, self.parts), strict=True):
+            found[rows] = own
+        whole = self.fits[-1]
+        weights = whole.vectors @ solved[gamma][-1]
+        return gamma, float(errors.min()), weights, means[-1] - whole.mean @ weights, found
 
-    def moment(self, x: Floats, y: Floats, ridge: RidgeEigensystem, progress: Progress) -> Floats:
-        """Products (k, q) of centred features of all rows (n, d) and centred y (n, q)."""
+    def _moments(self, y: Floats) -> tuple[list[Floats], list[Floats]]:
+        """Products (k, q) of centred features and y, and means (q,) of y, of each fit."""
+        folds = len(self.fits) - 1
+        products = [np.zeros((len(self.origin), y.shape[1])) for _ in range(folds)]
+        totals = [np.zeros(y.shape[1]) for _ in range(folds)]
 
-        def product(rows: slice) -> Floats:
-            return np.asarray(rbf(x[rows], self.centres, self.width).T @ y[rows])
+        def product(part: tuple[int, NDArray[np.int64]]) -> Floats:
+            return np.asarray((self.features.at(self.x[part[1]]) - self.origin).T @ y[part[1]])
 
-        total = np.zeros((len(self.centres), y.shape[1]))
-        parts = _chunks(len(x))
-        for done, part in enumerate(ordered_map(product, parts)):
-            total += part
-            progress(done + 1, len(parts))
-        return np.asarray(self.projection.T @ total - np.outer(ridge.mean, y.sum(axis=0)))
-
-    def projected(self, x: Floats, ridge: RidgeEigensystem) -> Iterator[tuple[slice, Floats]]:
-        """Rows, and their centred features along the eigenvectors, for some rows at a time."""
-        along = self.projection @ ridge.vectors
-        shift = ridge.mean @ ridge.vectors
-
-        def project(rows: slice) -> tuple[slice, Floats]:
-            return rows, rbf(x[rows], self.centres, self.width) @ along - shift
-
-        yield from ordered_map(project, _chunks(len(x)))
+        for (k, rows), own in zip(self.parts, ordered_map(product, self.parts), strict=True):
+            products[k] += own
+            totals[k] += y[rows].sum(axis=0)
+        moments, means = [], []
+        for k, fit in enumerate(self.fits):
+            others = [j for j in range(folds) if j != k]
+            total = sum(totals[j] for j in others)
+            mean = total / fit.count
+            features = sum(self.sums[j] for j in others)
+            moments.append(sum(products[j] for j in others) - np.outer(features, mean))
+            means.append(np.asarray(mean))
+        return moments, means
 
 
 def streaming_bytes(prototypes: int) -> int:
     """Memory of the chunks of all threads, and of matrices of the prototypes."""
     threads = thread_count()
     chunks = (3 * threads + threads + 2) * CHUNK * prototypes  # at work, and waiting to be used
-    return 8 * (chunks + (2 * threads + 8) * prototypes**2)
-
-
-def _chunks(rows: int) -> list[slice]:
-    return [slice(i, min(i + CHUNK, rows)) for i in range(0, rows, CHUNK)]
+    return 8 * (chunks + (2 * threads + 8 + 2 * MOST_FOLDS) * prototypes**2)

@@ -8,8 +8,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 
-Rows = tuple[Floats, Floats]
-
 LOG_CHI2 = -1.2703628454614782  # Expectation of the logarithm of a squared standard normal variable
 #: Share of their mean that is added to squared residuals, so that their logarithms are finite.
 SQUARE_FLOOR = 1e-4
@@ -28,6 +26,25 @@ def log_squared_residuals(residual: Floats) -> Floats:
     return np.asarray(np.log(square + floor) - LOG_CHI2)
 
 
+#: Steps of Fisher scoring after the fit to logarithms, and the largest squared error over variance.
+SCORING_STEPS, MOST_SQUARE = 2, 20.0
+
+
+def scored_response(residual: Floats, log_variance: Floats) -> Floats:
+    r"""Working response (n, q) of a step of Fisher scoring for a log-variance :math:`\eta`.
+
+    .. math:: u = \eta + r^2 e^{-\eta} - 1
+
+    Its least squares fit is a step towards the largest Gaussian likelihood, whose information on
+    a log-variance is the same for all rows. Logarithms of squared residuals, from which the steps
+    start, have 2.5 times its variance, and a bias where errors are not Gaussian.
+
+    References: Smyth, J. Royal Statistical Society B 51(1), 1989.
+    """
+    square = np.minimum(residual**2 * np.exp(-log_variance), MOST_SQUARE)
+    return np.asarray(log_variance + square - 1.0)
+
+
 def median_distance(x: Floats) -> float:
     """Median distance between rows (n, d), of at most 400 of them: the unit of kernel widths."""
     sample = x[np.random.default_rng(0).permutation(len(x))[:400]]
@@ -35,17 +52,6 @@ def median_distance(x: Floats) -> float:
     pairs = np.triu_indices(len(sample), 1)
     median = float(np.median(distance[pairs])) if len(sample) > 1 else 1.0
     return median if median > 0.0 else 1.0
-
-
-#: Standardised inputs (n, d) and outputs (n, q).
-
-#: With fewer validation rows hyperparameters are selected by leave-one-out.
-LEAST_VALIDATION_ROWS = 200
-MOST_VALIDATION_ROWS = 4000  # Most validation rows that they are selected on
-
-
-#: Kernel width, gammas and mean squared errors of each width that was searched.
-Search = list[tuple[float, Floats, Floats]]
 
 
 @dataclass(frozen=True)
@@ -62,18 +68,5 @@ class Expansion:
     #: (m, q) and (q,) of the log-variance
     log_variance_alpha: Floats
     log_variance_bias: Floats
-    log_variances: Floats  # (k, q) on training rows
-    residual: Floats  # (n, q) leave-one-out residuals of the training rows
-    search: Search  # what width and gamma were selected from; the selected width is the last
-
-
-def by_error(search: Search) -> Search:
-    """The same with the width of the least error last."""
-    return sorted(search, key=lambda entry: -float(entry[2].min()))
-
-
-def usable_validation(validation: Rows | None) -> Rows | None:
-    """The validation rows to select on, or None where there are too few."""
-    if validation is None or len(validation[0]) < LEAST_VALIDATION_ROWS:
-        return None
-    return validation[0][:MOST_VALIDATION_ROWS], validation[1][:MOST_VALIDATION_ROWS]
+    #: (n, q) mean and log-variance of the training rows, each by a solution without its group
+    left_out: tuple[Floats, Floats]

@@ -11,7 +11,7 @@ from lunar.predictions import Mask
 from lunar.sweep import Floats, add_torque_noise, soils, three_loads, wheel_forces
 
 from soilml import Case, Estimate, Estimator
-from soilml.io.text_tables import format_table
+from soilml.report.aligned_text import format_table
 
 #: True bearing over that of the soil's table, which the file of known bearing was trained on.
 FACTORS = {"as in training": 1.0, "half": 0.5, "a quarter": 0.25}

@@ -20,8 +20,8 @@ from lunar.pull import pull_interval, repeat_over_slips
 from lunar.sweep import Floats, add_torque_noise, soils, table, three_loads, wheel_forces
 
 from soilml import Case, Estimator, Model, Wheel, identify
-from soilml.io.text_tables import format_table
 from soilml.quantities import SHEAR, Z_90
+from soilml.report.aligned_text import format_table
 
 SOILS, FITTED = 200, 25
 SLIPS = np.linspace(0.2, 0.6, 9)

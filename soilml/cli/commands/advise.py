@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from soilml.cli.option_values import NumberFrom, slip_limit, whole_number_from
 from soilml.cli.options import (
-    NumberFrom,
     add_effects_option,
     add_exact_model_option,
     add_gravity_options,
@@ -14,8 +14,6 @@ from soilml.cli.options import (
     add_output,
     add_row_options,
     gravity_change,
-    slip_limit,
-    whole_number_from,
 )
 from soilml.errors import InputError
 
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
     from soilml.remarks import Remark
 
 FORMATS = ("table", "csv", "json")
-HELP = "the next measurement that reduces the uncertainty most"
 DESCRIPTION = """\
 Rank the operating points (slip, load) and sensors of a next measurement by how
 much they reduce the uncertainty of the parameters that have a prior in
@@ -45,15 +42,15 @@ repetition of a measured row, and the best sequence of --count rows, whose
 widths are those after all rows up to it. --all lists every candidate instead.
 
 Candidate channels are those whose noise is declared in [noise]: torque alone,
-and torque with each other channel. Without --loads, loads from half to twice
+and torque with each other channel. Without --load, loads from half to twice
 the measured ones are tried. A point is excluded where a twentieth or more of
 the posterior samples does not carry the wheel. Model errors are considered where
 [discrepancy] declares them or [remainder] has them.
 
 With --gravity, rate tests made where --tested-at says (on Earth) by what they
-tell of the drawbar pull of the wheel there, under --target-load:
+reveal of the drawbar pull of the wheel there, under --target-load:
 
-  soilml plan next MODEL.toml --gravity moon --target-load 20 --radii 0.1,0.15
+  soilml plan next MODEL.toml --gravity moon --target-load 20 --radius 0.1,0.15
 
 A test has rows at all --slip under a load, with a wheel of a radius.
 pull_left_N is the standard deviation of the pull that is expected after it, by
@@ -81,15 +78,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--slip",
         dest="slips",
-        metavar="A,B,...",
+        metavar="S,...",
         help="candidate slips: A,B,... or start:stop:count",
     )
-    parser.add_argument("--load", dest="loads", metavar="A,B,...", help="candidate loads in N")
-    for old in ("--slips", "--loads"):
-        parser.add_argument(old, help=argparse.SUPPRESS)
+    parser.add_argument("--load", dest="loads", metavar="N,...", help="candidate loads in N")
     parser.add_argument(
         "--count",
         type=whole_number_from(1, MAX_COUNT),
+        metavar="N",
         help="number of rows in the planned sequence, 1 to 5 (default: 3)",
     )
     parser.add_argument(
@@ -106,7 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--target-slip", type=slip_limit, metavar="S", help="slip of the pull there (default: 0.3)"
     )
-    parser.add_argument("--radii", metavar="A,B,...", help="further wheel radii of tests in m")
+    parser.add_argument("--radius", metavar="M,...", help="further wheel radii of tests in m")
     add_effects_option(parser)
     add_exact_model_option(parser)
     add_row_options(parser)
@@ -118,24 +114,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
+    from functools import partial
+
     import numpy as np
 
-    from soilml.cli.options import available_effects, parse_names, parse_numbers
-    from soilml.cli.output import show_verdict, tell, write_columns
+    from soilml.cli.option_values import parse_names, parse_numbers
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import save_columns, show_rows, tell, write_columns, write_set
     from soilml.cli.progress import working
-    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
     from soilml.experiment_design.advice_after_results import mean_covariates
     from soilml.experiment_design.next_rows import COUNT, known_soil
-    from soilml.experiment_design.presentation import advice_columns, best_rows, next_row_remarks
+    from soilml.experiment_design.presentation import (
+        advice_columns,
+        best_rows,
+        next_row_remarks,
+        report_of_advice,
+    )
     from soilml.io.read_table import RUNS
     from soilml.remarks import Remark, texts
 
     if args.where is not None and args.runs is None:
         raise InputError("--where selects rows of RUNS.csv; give RUNS.csv too")
     if args.gravity is None:
-        for option in ("target_load", "target_slip", "radii"):
+        for option in ("target_load", "target_slip", "radius"):
             if getattr(args, option) is not None:
                 raise InputError(f"--{option.replace('_', '-')} needs --gravity, such as moon")
     elif args.count is not None or args.picture is not None:
@@ -143,7 +146,7 @@ def run(args: argparse.Namespace) -> int:
     table = None if args.runs is None else read_rows(args, RUNS)
     slips, loads = (
         None if text is None else parse_numbers(option, text).tolist()
-        for option, text in (("--slips", args.slips), ("--loads", args.loads))
+        for option, text in (("--slip", args.slips), ("--load", args.loads))
     )
     case = read_case_of_rows(args, args.model, table, available_effects(args), with_bias=False)
     change = gravity_change(args, case)
@@ -173,19 +176,6 @@ def run(args: argparse.Namespace) -> int:
         advice = advise(
             case, samples, ranges, measured=at, count=args.count or COUNT, covariates=covariates
         )
-    if args.picture is not None:
-        from soilml.experiment_design.presentation import save_maps
-
-        save_maps(args.picture, advice, at)
-    show_verdict(advice.summary(), args.out)
-    rows = best_rows(advice)
-    if args.all:
-        ranked = sorted(advice.choices, key=lambda c: c.overall)
-        rows = [("candidate", c) for c in ranked]
-    columns = advice_columns(advice, rows)
-    if args.out is None and SCREEN.form_of_rows() == "table" and not args.verbose:
-        columns = _short(columns)
-    write_columns(columns, args.out)
     remarks = [] if at is None else [*next_row_remarks(advice), *notes]
     if case.states_model_error:
         which = "[discrepancy]" if case.remainder is None else "error of the [remainder]"
@@ -197,18 +187,15 @@ def run(args: argparse.Namespace) -> int:
             "are excluded: a twentieth or more of the posterior samples does not carry the wheel"
         )
         remarks.append(Remark("not-carried", text))
-    tell("\n".join(texts(remarks)))
+    report = report_of_advice(advice, at, remarks)
+    rows = best_rows(advice)
+    if args.all:
+        rows = [("candidate", c) for c in sorted(advice.choices, key=lambda c: c.overall)]
+    columns = advice_columns(advice, rows)
+    write_set({args.out: partial(save_columns, columns), args.picture: report.pictures[0].save})
+    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
+    show_rows(report, columns, content, args.out)
     return 0
-
-
-def _short(columns: dict[str, Any]) -> dict[str, Any]:
-    """The columns that fit 80 characters: channels are in the names of rows, `all` is left out."""
-    kept = {k: v for k, v in columns.items() if k not in ("channels", "all_left")}
-    kept["row"] = [
-        name.replace("best in ", "").replace("best for ", "").replace("all with", "all, with")
-        for name in columns["row"]
-    ]
-    return {k.removesuffix("_left"): v for k, v in kept.items()}
 
 
 def _tests_elsewhere(
@@ -217,7 +204,7 @@ def _tests_elsewhere(
     """Columns and remarks of tests that are rated for the pull under another gravity."""
     import numpy as np
 
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.experiment_design.transfer_tests import TARGET_SLIP, advise_transfer
 
     load = args.target_load
@@ -225,7 +212,7 @@ def _tests_elsewhere(
         if case.rover is None:
             raise InputError("--gravity needs --target-load, the load of the wheel there in N")
         load = case.rover.mass * options["change"].target / len(case.rover.wheels)
-    radii = None if args.radii is None else parse_numbers("--radii", args.radii).tolist()
+    radii = None if args.radius is None else parse_numbers("--radius", args.radius).tolist()
     if len(options["loads"] or ()) * (1 + len(radii or ())) > MAX_TESTS:
         raise InputError(f"loads times radii are too many tests; at most {MAX_TESTS} are possible")
     slip = args.target_slip or TARGET_SLIP

@@ -13,11 +13,10 @@ from soilml.errors import InputError, MissingLibraryError, SoilmlError, TableErr
 from soilml.io.atomic_files import save_text
 
 if TYPE_CHECKING:
-    from soilml.identification.bevameter import BevameterResult
     from soilml.io.table import Table
     from soilml.remarks import Remark
 
-HELP = "soil parameters from plate-sinkage and shear tests, without a wheel"
+FORMATS = ("table", "json")
 DESCRIPTION = """\
 Fit kc, kphi and n to plate-sinkage tests, and cohesion, friction angle and
 shear modulus to shear tests. Say what the tests cannot tell: kc apart from kphi
@@ -73,8 +72,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODEL.toml",
         help="whose gear, noise and other soil values to take",
     )
-    add_output(parser, "--out", "SOIL.toml", "write a model file with this soil")
-    add_output(parser, "--json", "FILE.json", "write estimates and remarks")
+    add_output(
+        parser,
+        "--out",
+        "SOIL.toml",
+        "write a model file with this soil, or FILE.json with estimates and remarks",
+        ".json",
+    )
     add_output(parser, "--picture", "FILE.png", "draw the tests and the fitted laws")
     add_ignore_extra_option(parser)
     add_effects_option(parser)
@@ -82,30 +86,29 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Fit the tests, print the result and write the files."""
-    from soilml.cli.options import available_effects
-    from soilml.cli.output import show, tell
+    from soilml.cli.options import available_effects, is_json
+    from soilml.cli.output import show_result, tell, write_set
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
     from soilml.identification.bevameter.soil_section import missing_values, model_file_text
     from soilml.report.page import json_text
 
+    as_json = args.out is not None and is_json(args)
     plates, shear, left = _tables(args)
     case = None if args.model is None else read_case(args.model, available_effects(args))
     with working("fitting the tests"):
         result = bevameter(plates, shear, case)
     result = replace(result, remarks=(*left, *result.remarks))
-    if args.picture is not None:
-        from soilml.identification.bevameter.result import save_picture
-
-        save_picture(args.picture, result)
-    if args.json is not None:
-        save_text(args.json, json_text(result.as_json()))
-    if args.out is not None:
+    report = result.report()
+    write_set({args.picture: report.pictures[0].save})
+    if as_json:
+        save_text(args.out, json_text(result.as_json()))
+    elif args.out is not None:
         save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))
         if case is None and (missing := missing_values(result)):
             tell(f"{args.out} lacks {', '.join(missing)}: add them, or give --model")
-    show(_text(result))
+    show_result(report, result.as_json())
     return 0
 
 
@@ -204,30 +207,3 @@ def _together(tables: list[Table]) -> Table | None:
     columns = {key: np.concatenate([table[key] for table in tables]) for key in first.columns}
     source = ", ".join(table.source for table in tables)
     return Table({**columns, "test": np.asarray(labels)}, source)
-
-
-def _text(result: BevameterResult) -> str:
-    from soilml.io.text_tables import format_table
-    from soilml.report.terminal import shown_unit, significant
-
-    rows = [
-        (
-            name,
-            significant(factor * e.value),
-            _range(e.mean_95, factor),
-            _range(e.another_place_95, factor),
-            unit,
-        )
-        for name, e in result.estimates().items()
-        for factor, unit in [shown_unit(e.unit, e.value)]
-    ]
-    if result.shear is not None and result.shear.shear_modulus is None:
-        rows.append(("shear_modulus", "not measured", "", "", ""))
-    head = ("parameter", "value", "95 % of the mean", "95 % at another place", "unit")
-    return "\n".join([format_table(head, rows), *(f"! {text}" for text in result.remarks)])
-
-
-def _range(ends: tuple[float, float], factor: float) -> str:
-    from soilml.report.terminal import significant
-
-    return f"{significant(factor * ends[0], 3)} .. {significant(factor * ends[1], 3)}"

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, slip_limit
-from soilml.errors import InputError
-from soilml.io.atomic_files import output_files, save_text, write_files
-
-if TYPE_CHECKING:
-    from soilml.systems.climbing.report import ClimbingReport
+from soilml.cli.option_values import slip_limit
+from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, folder_outputs
+from soilml.io.atomic_files import write_files
 
 #: Files of the folder of --out.
 FILES = ("report.html", "climb.json", "curve.csv", "climbs.csv")
 FORMATS = ("table", "json")
-HELP = "the steepest slope a rover with force-sensor wheels can climb"
 DESCRIPTION = """\
 Identify cohesion, friction angle and shear modulus of the ground from climbs
 of gentle slopes and the measured stress on the rims of a front and a rear
@@ -24,7 +19,7 @@ wheel; then predict drawbar pull against slip and the steepest slope that can
 be climbed.
 
   soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv
-  soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv --out DIR
+  soilml paper climb ROVER.toml RUNS.csv --stress STRESS.csv --out FOLDER
 
 ROVER.toml describes a rover with four wheels:
 
@@ -43,7 +38,7 @@ angle_rad, normal_Pa, and slip where the run is no climb (imposed slip on level
 ground).
 
 Each slope gives one equation, so three unknowns need three slopes. The bands
-are 90 % intervals. DIR receives report.html (start here), climb.json,
+are 90 % intervals. FOLDER receives report.html (start here), climb.json,
 curve.csv and climbs.csv.
 """
 
@@ -67,23 +62,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_seed_option(parser)
     add_ignore_extra_option(parser)
-    parser.add_argument(
-        "-o", "--out", metavar="DIR", help="folder for four files, or FILE.json alone"
-    )
+    parser.add_argument("-o", "--out", metavar="FOLDER", help="folder for the four files")
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
     """The files that the command writes, where their folder exists already."""
-    if args.out is None or args.out.lower().endswith(".json"):
-        return output_files(args.out, ".json")
-    if not args.out:
-        raise InputError("--out is empty; needed is a folder, or a file name ending in .json")
-    folder = Path(args.out)
-    if folder.exists() and not folder.is_dir():
-        raise InputError(
-            f"--out {args.out} is a file; needed is a folder, or a file name ending in .json"
-        )
-    return [folder / name for name in FILES] if folder.is_dir() else []
+    return folder_outputs("--out", args.out, FILES)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -92,60 +76,26 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
-    from soilml.report.page import json_text, report_texts
-    from soilml.systems.climbing.presentation import climb_report, climb_text
-    from soilml.systems.climbing.report import climbing_report
-    from soilml.systems.climbing.rover_file import read_rover
-    from soilml.systems.climbing.tables import read_climb_data
+    from soilml.report.page import report_texts
+    from soilml.systems.rim_stress.report import climbing_report
+    from soilml.systems.rim_stress.rover_file import read_rover
+    from soilml.systems.rim_stress.tables import read_climb_data
 
-    folder = args.out is not None and not args.out.lower().endswith(".json")
-    if folder:
+    if args.out is not None:
         for library in ("jinja2", "matplotlib"):
-            need(library, "climb")
+            need(library, "paper climb")
     file = read_rover(args.rover)
     data = read_climb_data(args.runs, args.stress, file.stress, ignore_extra=args.ignore_extra)
     with working(f"identifying from {len(data.climbs)} climbs"):
-        report = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
-    content = report.as_json()
-    if folder:
-        page = climb_report(report, (args.rover, args.runs))
+        found = climbing_report(file, data, slip_limit=args.slip_limit, seed=args.seed)
+    content = found.as_json()
+    page = found.report(f"Slopes that {Path(args.rover).name} climbs, from {Path(args.runs).name}")
+    if args.out is not None:
         html, result, curve, climbs = FILES
         target = Path(args.out)
         contents = report_texts(page, origin_of(args), content, (html, result), target)
-        contents |= {target / curve: csv_text(_curve(report))}
-        contents |= {target / climbs: csv_text(_runs(report))}
+        contents |= {target / curve: csv_text(found.curve)}
+        contents |= {target / climbs: csv_text(found.climbs)}
         write_files(contents, folders=[args.out])
-    elif args.out is not None:
-        save_text(args.out, json_text(content))
-    show_result(climb_text(report), content)
+    show_result(page, content)
     return 0
-
-
-def _curve(report: ClimbingReport) -> dict[str, Any]:
-    pull, slope = report.pull, report.slope
-    return {
-        "slip": report.ability.slip,
-        "drawbar_pull_N": pull.middle,
-        "drawbar_pull_N_p05": pull.lower,
-        "drawbar_pull_N_p95": pull.upper,
-        "slope_rad": slope.middle,
-        "slope_rad_p05": slope.lower,
-        "slope_rad_p95": slope.upper,
-    }
-
-
-def _runs(report: ClimbingReport) -> dict[str, Any]:
-    from soilml.systems.climbing.report import SPEED_ERROR
-
-    climbs = report.data.climbs
-    return {
-        "run": [c.name for c in climbs],
-        "slope_rad": [c.slope for c in climbs],
-        "slip_front": [c.front.slip for c in climbs],
-        "slip_rear": [c.rear.slip for c in climbs],
-        "off_N": report.ground.residual,
-        "off_N_std": report.ground.residual_std,
-        "shear_modulus_m_if_speed_low": report.modulus_per_climb[-SPEED_ERROR],
-        "shear_modulus_m": report.modulus_per_climb[0.0],
-        "shear_modulus_m_if_speed_high": report.modulus_per_climb[SPEED_ERROR],
-    }

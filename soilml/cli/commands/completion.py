@@ -1,21 +1,22 @@
-"""`soilml completion`: completion of commands, options and names in a shell."""
+"""`soilml setup completion`: completion of commands, options and names in a shell."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable
 
-HELP = "completion for bash, zsh or fish"
+from soilml.cli.options import leaves
+
 DESCRIPTION = """\
 Print a script with which a shell completes commands, options, soils, effects,
 released model files and file names. For a shell, and for good:
 
-  eval "$(soilml completion bash)"             # or zsh
-  soilml completion fish | source
+  eval "$(soilml setup completion bash)"             # or zsh
+  soilml setup completion fish | source
 
-  soilml completion bash > ~/.local/share/bash-completion/completions/soilml
-  soilml completion zsh  > ~/.zfunc/_soilml    # a folder of fpath, before compinit
-  soilml completion fish > ~/.config/fish/completions/soilml.fish
+  soilml setup completion bash > ~/.local/share/bash-completion/completions/soilml
+  soilml setup completion zsh  > ~/.zfunc/_soilml    # a folder of fpath, before compinit
+  soilml setup completion fish > ~/.config/fish/completions/soilml.fish
 
 Print it again after an update of soilml, which may have other commands.
 """
@@ -31,12 +32,14 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import write_stdout
     from soilml.optional_imports import need
 
-    need("shtab", "completion")
+    need("shtab", "setup completion")
     import shtab
 
-    root: argparse.ArgumentParser = args.make_parser()
-    commands = next(a for a in root._actions if isinstance(a, argparse._SubParsersAction))
-    for name, command in commands.choices.items():
+    root = args.make_parser()
+    for action in root._actions:  # shtab leaves out what the help leaves out
+        if action.metavar == "COMMAND":
+            action.help = "command"
+    for name, command in leaves(root):
         for action in command._actions:
             if action.choices is None and action.nargs != 0:
                 _complete(action, name)
@@ -51,10 +54,10 @@ def _complete(action: argparse.Action, command: str) -> None:
     metavar = str(action.metavar or action.dest)
     names = " ".join(_names(command, action.dest, metavar))
     file = any(
-        ending in metavar.replace("...", "") for ending in ("FILE", "LOG", "DIR", "FOLDER", ".")
+        ending in metavar.replace("...", "") for ending in ("FILE", "LOG", "FOLDER", ".")
     ) or (getattr(action.type, "__name__", "") == "InputFile")
     if file and names:
-        function = f"_soilml_{command}_{action.dest}".replace("-", "_")
+        function = f"_soilml_{command}_{action.dest}".replace("-", "_").replace(" ", "_")
         action.complete = {  # type: ignore[attr-defined]
             "bash": function,
             "zsh": f"{{compadd {names}; _files}}",
@@ -71,11 +74,11 @@ def _complete(action: argparse.Action, command: str) -> None:
 
 def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
     """Names that are known for an argument."""
-    if command == "soils" or dest == "soil":
+    if command == "show soils" or dest == "soil":
         from soilml.physics.soils import soil_catalogue
 
         return soil_catalogue()
-    if command == "effects" and dest == "name":
+    if command == "show effects" and dest == "name":
         from soilml.physics.effects import EFFECTS
 
         return EFFECTS

@@ -1,33 +1,27 @@
-"""`soilml design`: wheels of a rover for a slope, over soils and errors of the model."""
+"""`soilml plan wheels`: wheels of a rover for a slope, over soils and errors of the model."""
 
 from __future__ import annotations
 
 import argparse
-from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_output,
-    add_report_option,
-    parse_names,
-    whole_number_from,
-)
+from soilml.cli.option_values import NumberFrom, parse_names, whole_number_from
+from soilml.cli.options import InputFile, add_output, add_report_option
 
 if TYPE_CHECKING:
+    from soilml.report.page import Content
     from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
-HELP = "which wheels climb a slope, with what margin"
 DESCRIPTION = """\
 Find the wheels with which a rover climbs a slope: sizes within limits are
 compared over the soils that it may meet and over typical errors of the model.
 
-  soilml design ROVER.toml
-  soilml design ROVER.toml --slope 20 --gravity moon --picture design.png
-  soilml design ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
+  soilml plan wheels ROVER.toml
+  soilml plan wheels ROVER.toml --slope 20 --gravity moon --picture design.png
+  soilml plan wheels ROVER.toml --soil ding2015/lunar_soil,mckay1994/jsc-1
 
 ROVER.toml states the rover; no figure of it is assumed. A dimension is a
 number, a range that is searched, or { values = [...] }:
@@ -75,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--slope", type=NumberFrom(0.0, 60.0, "degrees"), metavar="DEG", help="slope in degrees"
     )
     parser.add_argument("--gravity", metavar="G", help="gravity: earth, moon, mars, or in m/s^2")
-    parser.add_argument("--soil", metavar="A,B,...", help="published soils, each as likely")
+    parser.add_argument("--soil", metavar="PAPER/SOIL,...", help="published soils, each as likely")
     parser.add_argument(
         "--risk", type=NumberFrom(0.001, 0.5), help="probability of failing that is accepted"
     )
@@ -107,11 +101,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import stage_progress
     from soilml.optional_imports import need
 
-    need("scipy", "design")
-    from soilml.report.figure_style import save_png
+    need("scipy", "plan wheels")
     from soilml.report.page import json_text
-    from soilml.rover_design.figures import SIZE
-    from soilml.rover_design.presentation import design_page, design_text
+    from soilml.rover_design.presentation import report_of_design
     from soilml.rover_design.report import design_report
 
     study = _study(args)
@@ -124,15 +116,13 @@ def run(args: argparse.Namespace) -> int:
             progress=progress,
         )
     content = found.as_json()
-
-    text, draw = json_text(content), partial(save_png, found.plot, 2, 2, SIZE)
-    write_with_report(
-        args,
-        {args.out: text, args.picture: draw},
-        lambda: (design_page(found, args.study), content),
-        study.soil.files,
-    )
-    show_result(design_text(found), content)
+    report = report_of_design(found, f"Wheels for {Path(args.study).name}")
+    files: dict[str | None, Content] = {
+        args.out: json_text(content),
+        args.picture: report.pictures[0].save,
+    }
+    write_with_report(args, files, lambda: (report, content), study.soil.files)
+    show_result(report, content)
     return 0
 
 

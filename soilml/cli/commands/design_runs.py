@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from soilml.cli.options import InputFile, add_output, add_seed_option, whole_number_from
+from soilml.cli.option_values import whole_number_from
+from soilml.cli.options import InputFile, add_output, add_seed_option
 
-HELP = "runs of a simulator that takes the place of the equations"
 DESCRIPTION = """\
 Propose the runs of [simulator] in MODEL.toml: slip, load and the soil in the
 ranges of its priors. With --trust, the python or command of [simulator] makes
@@ -57,10 +57,11 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design import simulator_runs as runs
     from soilml.io.atomic_files import save_text
     from soilml.io.cell_text import one_line
-    from soilml.io.text_tables import csv_text, format_table
+    from soilml.io.text_tables import csv_text
     from soilml.optional_imports import need
+    from soilml.report.aligned_text import format_table
 
-    need("scipy", "design-runs")
+    need("scipy", "plan runs")
     case = read_case(args.model, with_bias=True, with_simulator=False)
     inputs = runs.design_inputs(case)
     assert case.simulator is not None

@@ -1,4 +1,4 @@
-"""`soilml doctor`: whether this installation works, and what it can do."""
+"""`soilml setup check`: whether this installation works, and what it can do."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from importlib import metadata
 
 from soilml.errors import SoilmlError
 
-HELP = "check this installation: libraries, model files, output"
 DESCRIPTION = """\
 Check this installation: which libraries are present and in which version, what
 cannot be done without the missing ones, and whether a released model file gives
@@ -55,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     import platform
 
     from soilml import __version__
-    from soilml.io.text_tables import format_table
+    from soilml.report.aligned_text import format_table
 
     print(f"soilml {__version__}, Python {platform.python_version()}, {platform.platform()}")
     print(f"{_cores()} usable cores; {sys.executable}\n")

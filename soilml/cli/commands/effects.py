@@ -1,4 +1,4 @@
-"""`soilml effects`: the catalogue of effects."""
+"""`soilml show effects`: the catalogue of effects."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import argparse
 from soilml.cli.options import add_effects_option
 from soilml.errors import InputError, did_you_mean
 
-HELP = "list the effects that a model can include, or show one"
 DESCRIPTION = """\
 List the effects that [[effect]] in a model file may name.
 
-  soilml effects                 all effects, one line each
-  soilml effects slip-sinkage    one effect: parameters, units, bounds,
+  soilml show effects                 all effects, one line each
+  soilml show effects slip-sinkage    one effect: parameters, units, bounds,
                                  equation, source
 """
 
@@ -26,11 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Print the catalogue or one entry."""
     from soilml.cli.options import available_effects
-    from soilml.io.text_tables import format_table
     from soilml.parameters import declared
     from soilml.physics.effects.base import STAGES
     from soilml.physics.operating_point import COVARIATES
-    from soilml.report.terminal import shown_unit, significant
+    from soilml.report.aligned_text import format_table
+    from soilml.report.numbers import shown_unit, significant
 
     effects = available_effects(args)
     if args.name is None:

@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import argparse
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    add_output,
-    add_report_option,
-    add_row_options,
-)
+from soilml.cli.options import InputFile, add_output, add_report_option, add_row_options
 from soilml.errors import InputError, TableError
 
 if TYPE_CHECKING:
@@ -23,7 +19,6 @@ if TYPE_CHECKING:
     from soilml.onboard.estimate import Estimate
     from soilml.onboard.estimator import Estimator
     from soilml.remarks import Remark
-    from soilml.report.page import Report
 
 #: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
 FUSION_RULES = (
@@ -34,7 +29,6 @@ FUSION_RULES = (
     "pairwise",
 )
 FORMATS = ("table", "csv", "json")
-HELP = "soil parameters or slip from measured rows, by a trained model"
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
 are those of the onboard runtime.
@@ -42,11 +36,11 @@ are those of the onboard runtime.
   soilml estimate exported/wheel.onnx
   soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
   soilml estimate exported/wheel.onnx RUNS.csv --by run
-  soilml estimate exported/any_wheel.onnx RUNS.csv --case MODEL.toml --by run
+  soilml estimate exported/any_wheel.onnx RUNS.csv --model MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
-Without a table, one line tells what the file is for: wheel, effects and priors.
---case compares them with those of your model file, and refuses another wheel.
+Without a table, one line says what the file is for: wheel, effects and priors.
+--model compares them with those of your model file, and refuses another wheel.
 
 Each row of the table gives mean, standard deviation (_std) and 90 % interval
 (_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
@@ -61,7 +55,7 @@ of a run is the prior where they are more than half of its rows, and widened as
 far as the misfit says where no soil explains the others. The interval includes
 errors of the model of wheel and soil, whose size follows from the residuals of
 the run. --exact-model leaves them out, for a model that was checked on a known
-soil; a [discrepancy] or [remainder] of --case takes their place. With a file of
+soil; a [discrepancy] or [remainder] of --model takes their place. With a file of
 a set posterior, disagrees is 1 where the rows of a run fit no exact model, as
 those of one sound run in a hundred: check units, sensors and wheel. A row with
 a blank reading, or whose status is not ok, gets a blank estimate. Slip differs
@@ -80,13 +74,13 @@ print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument("model", type=InputFile, metavar="MODEL.onnx", help="trained model file")
+    parser.add_argument("trained", type=InputFile, metavar="MODEL.onnx", help="trained model file")
     parser.add_argument(
         "runs",
         nargs="?",
         type=InputFile,
         metavar="RUNS.csv",
-        help="measured rows: CSV, Parquet or .xlsx; without it, tell what the file is for",
+        help="measured rows: CSV, Parquet or .xlsx; without it, print what the file is for",
     )
     parser.add_argument(
         "--by",
@@ -104,7 +98,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--rule", help=f"fusion rule of --with: {', '.join(FUSION_RULES)}")
     parser.add_argument(
-        "--case",
+        "--model",
+        dest="case",
         type=InputFile,
         metavar="MODEL.toml",
         help="your wheel and effects, which are compared with those of the model file; for a file "
@@ -113,7 +108,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--exact-model",
         action="store_true",
-        help="take the model of wheel and soil as exact, as for a model checked on a known soil",
+        help="assume a perfect model of wheel and soil, as for one checked on a known soil",
     )
     add_row_options(parser)
     add_output(parser, "--out", "FILE.csv", "write the estimates to this file")
@@ -130,9 +125,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import (
         save_columns,
         show,
-        show_verdict,
-        tell,
-        tell_columns,
+        show_rows,
         write_with_report,
     )
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
@@ -147,7 +140,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.quantities import column
     from soilml.remarks import texts
 
-    estimators = [Estimator.load(file) for file in (args.model, *args.others)]
+    estimators = [Estimator.load(file) for file in (args.trained, *args.others)]
     _check_options(args, estimators)
     if args.runs is None and args.case is None:
         show("\n".join(presentation.description(estimator).text for estimator in estimators))
@@ -199,18 +192,17 @@ def run(args: argparse.Namespace) -> int:
     if args.report is not None:
         presentation.check_size(len(columns["in_range"]))
 
-    def build() -> tuple[Report, dict[str, Any]]:
-        content = {"columns": {k: np.asarray(v).tolist() for k, v in columns.items()}}
-        files = args.model, args.runs
-        page = presentation.estimate_report(columns, remarks, estimators[0], args.by, files)
-        return page, {**content, "notes": [remark.as_json() for remark in remarks]}
-
+    title = f"Estimates of {Path(args.runs).name} by {Path(args.trained).name}"
+    report = presentation.estimate_report(columns, remarks, estimators[0], args.by, title)
+    content = {k: np.asarray(v).tolist() for k, v in columns.items()}
+    notes = [remark.as_json() for remark in remarks]
     write_with_report(
-        args, {args.out: partial(save_columns, columns)}, build, [str(e.path) for e in estimators]
+        args,
+        {args.out: partial(save_columns, columns)},
+        lambda: (report, {"columns": content, "notes": notes}),
+        [str(e.path) for e in estimators],
     )
-    show_verdict(presentation.verdict(columns, args.by, remarks), args.out)
-    tell_columns(columns, args.out)
-    tell("\n".join(texts(remarks)))
+    show_rows(report, columns, content, args.out)
     return 0
 
 
@@ -232,8 +224,8 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
-            f"{args.model} estimates {estimators[0].per_row[0]}, which differs from row to row of "
-            "a run; omit --by"
+            f"{args.trained} estimates {estimators[0].per_row[0]}, which differs from row to row "
+            "of a run; omit --by"
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,13 +12,19 @@ from soilml.errors import InputError, did_you_mean
 if TYPE_CHECKING:
     from soilml.io.table import Table
 
-HELP = "files to try the commands with: a campaign, a log, a rover"
 DESCRIPTION = """\
 Write an example into a folder, and say which command to run on it.
 
-  soilml example DIR                  a campaign whose wheel does what its model lacks
-  soilml example log DIR              the recording of a rig, in the units of its maker
-  soilml example rover DIR            a rover, and rows of one of its wheels
+  soilml example FOLDER               a campaign whose wheel does what its model lacks
+  soilml example log FOLDER           the recording of a rig, in the units of its maker
+  soilml example rover FOLDER         a rover, and rows of one of its wheels
+
+and what the source papers measured:
+
+  soilml example sensor-wheel FOLDER  readings of four sensors in the rim of a wheel
+  soilml example climb FOLDER         gentle climbs of a rover with two such wheels
+  soilml example wheel-leg FOLDER     strides of a wheel-leg on two soils
+  soilml example track FOLDER         the log of a tracked robot's pulls
 
 All measurements are simulated, with noise. Existing files are not replaced.
 """
@@ -66,7 +73,66 @@ EXAMPLES = {
         ("rover.toml", "runs.csv"),
         "soilml pull {0}/rover.toml {0}/runs.csv --slope 0,10,20",
     ),
+    "sensor-wheel": (
+        ("model.toml", "runs.csv", "readings.csv"),
+        "soilml paper sensor-wheel {0}/model.toml {0}/runs.csv --readings {0}/readings.csv",
+    ),
+    "climb": (
+        ("rover.toml", "runs.csv", "stress.csv"),
+        "soilml paper climb {0}/rover.toml {0}/runs.csv --stress {0}/stress.csv",
+    ),
+    "wheel-leg": (("strides.csv",), "soilml paper wheel-leg {0}/strides.csv --by run"),
+    "track": (
+        ("model.toml", "log.csv"),
+        "soilml paper track {0}/model.toml {0}/log.csv --mass 130 --spacing 0.6",
+    ),
 }
+SENSOR_WHEEL = """\
+# The wheel and the sand of Nagatani et al. 2009.
+[gear]
+type = "wheel"
+radius = 0.055 # m
+width = 0.064
+
+[soil]
+name = "nagatani2009/toyoura_sand"
+"""
+CLIMB = """\
+# A rover on four equal wheels, on sand whose cohesion and friction angle are known.
+[rover]
+mass = 12.0 # kg
+radius = 0.055 # m
+width = 0.064
+front_share = 0.52 # of the weight on the front wheels, on the flat
+height_ratio = 0.4 # height of the centre of mass over the wheelbase
+
+[soil]
+cohesion = 0.0 # Pa
+friction_angle = 0.6632 # rad
+
+[soil.prior]
+shear_modulus = [0.001, 0.05] # m
+
+[noise]
+speed_m_s = "0.87 %" # within 1.5 %
+slope_rad = 0.005
+normal_Pa = "5 %"
+"""
+TRACK = """\
+# One track of the robot of Wang et al. 2018; its dimensions are assumed.
+[gear]
+type = "track"
+radius = 0.1 # m, end wheel with the belt
+width = 0.08
+base = 0.6 # m, between the axles
+
+[soil]
+name = "wang2018/sand"
+
+[soil.prior]
+friction_angle = [0.3, 0.6] # rad
+shear_modulus = { range = [0.01, 0.1], scale = "log" } # m
+"""
 LOADS = (40.0, 55.0, 70.0, 85.0, 100.0, 115.0)  # N
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
 MEASURED = ("run", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
@@ -78,7 +144,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "words",
         nargs="+",
-        metavar="[NAME] DIR",
+        metavar="[NAME] FOLDER",
         help=f"{', '.join(EXAMPLES)} (default: campaign), and the folder for its files",
     )
 
@@ -88,7 +154,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     from soilml.cli.options import folder_outputs
 
     name, folder = _name_and_folder(args)
-    return folder_outputs("DIR", str(folder), EXAMPLES[name][0])
+    return folder_outputs("FOLDER", str(folder), EXAMPLES[name][0])
 
 
 def run(args: argparse.Namespace) -> int:
@@ -103,7 +169,16 @@ def run(args: argparse.Namespace) -> int:
     taken = [str(file) for file in files if file.exists()]
     if taken:
         raise InputError(f"{taken[0]} exists; give another folder")
-    texts = {"campaign": _campaign, "log": _log, "rover": _rover}[name]()
+    make: dict[str, Callable[[], tuple[str, ...]]] = {
+        "campaign": _campaign,
+        "log": _log,
+        "rover": _rover,
+        "sensor-wheel": _sensor_wheel,
+        "climb": _climb,
+        "wheel-leg": _wheel_leg,
+        "track": _track,
+    }
+    texts = make[name]()
     write_files(dict(zip(files, texts, strict=True)), folders=[folder])
     show(f"{', '.join(map(str, files))} written. Next: {EXAMPLES[name][1].format(folder)}")
     return 0
@@ -183,3 +258,94 @@ def _log() -> tuple[str, str]:
     }
     text = csv_text({name: np.round(values, 4) for name, values in columns.items()})
     return MODEL, f"Radius: {1e3 * RADIUS:.0f} mm\n{text}"
+
+
+def _sensor_wheel() -> tuple[str, str, str]:
+    """Five turns of the wheel of Nagatani et al. 2009 on each of four slopes, k_x 7.2 mm."""
+    import numpy as np
+
+    from soilml.io.text_tables import csv_text
+    from soilml.systems.rim_stress import (
+        MohrCoulomb,
+        SensingWheel,
+        SteadyRun,
+        balanced_arc,
+        simulate_readings,
+    )
+
+    wheel, sand = SensingWheel(), MohrCoulomb(friction_angle=0.6632)
+    rng, runs = np.random.default_rng(4), {}
+    readings: dict[str, list[Any]] = {"run": [], "angle_rad": [], "sensor": [], "force_N": []}
+    for k, (slip, slope) in enumerate(((0.11, 0), (0.18, 2), (0.29, 4), (0.39, 6))):
+        at = SteadyRun(slip=slip, weight=28.92, slope=np.deg2rad(slope))
+        arc = balanced_arc(np.deg2rad(30.0), at, wheel, sand, shear_modulus=0.0072)
+        found = simulate_readings(arc, wheel, turns=5, crown=0.3, lugs=(0.3, 0.3), seed=k)
+        near = np.abs(found.angle) < 1.0
+        columns = (found.angle.round(5), found.sensor.astype(int), found.force.round(4))
+        readings["run"] += [f"slope_{slope}"] * int(near.sum())
+        for name, values in zip(list(readings)[1:], columns, strict=True):
+            readings[name] += values[near].tolist()
+        read = round(slip + 0.01 * (1.0 - slip) * float(rng.standard_normal()), 4)
+        runs[f"slope_{slope}"] = (read, 0.01, 28.92, 0.3, round(float(at.slope), 5))
+    names = ("slip", "slip_std", "load_N", "load_N_std", "slope_rad")
+    table = dict(zip(names, zip(*runs.values(), strict=True), strict=True))
+    return SENSOR_WHEEL, csv_text({"run": list(runs), **table}), csv_text(readings)
+
+
+def _climb() -> tuple[str, str, str]:
+    """Climbs of 0 and 4 degrees, and artificial slip on the flat."""
+    import numpy as np
+
+    from soilml.io.text_tables import csv_text
+    from soilml.systems.rim_stress import SimulatedRover
+    from soilml.systems.rim_stress.simulated_rover import SLOPES
+    from soilml.systems.rim_stress.tables import climb_tables
+
+    true, rng = SimulatedRover(), np.random.default_rng(4)
+    climbs = true.simulate_climbs(rng, SLOPES[:2])
+    tables = climb_tables(climbs, *true.simulate_artificial_slip(rng, repeats=2), rim_speed=0.00915)
+    return CLIMB, csv_text(tables[0]), csv_text(tables[1])
+
+
+def _wheel_leg() -> tuple[str]:
+    """Strides on SSC-1 and ES-3 by the printed relations, with the errors of table VIII."""
+    import numpy as np
+
+    from soilml.io.text_tables import csv_text
+    from soilml.systems.wheel_legs import TORQUE_SLIP, VIBRATION_SLIP
+    from soilml.systems.wheel_legs.stride_relations import LINEAR, S_I, S_Z, SIMPLIFIED, SINKAGE
+
+    rng, columns = np.random.default_rng(4), dict[str, list[Any]]()
+    relations = (TORQUE_SLIP["simplified"], VIBRATION_SLIP["linear"])
+    for k, name, angle in ((0, "SSC-1", 0.7381), (3, "ES-3", 0.6254)):
+        slip, noise = np.linspace(0.1, 0.4, 12), rng.standard_normal((3, 12))
+        angles = [angle * (1.0 + 0.01 * e.friction[k]) for e in (SIMPLIFIED, LINEAR, SINKAGE)]
+        read = []
+        for relation, phi, z in zip(relations, angles, noise, strict=False):
+            p, q, r, s = relation.single or (0.0, 0.0, 0.0, 0.0)
+            y = (phi - relation.to_soil[0, 0]) / relation.to_soil[0, 1]
+            read.append((slip + 0.03 * z - p - y * r) / (q + y * s))
+        sunk = (angles[2] - S_I) / S_Z * (1.0 + 0.05 * noise[2])
+        own = {"run": [name] * 12, "slip": slip, "torque_Nm": read[0], "vibration_m_s2": read[1]}
+        for key, values in (own | {"sinkage_m": sunk}).items():
+            cells = values if key == "run" else np.round(values, 4).tolist()
+            columns.setdefault(key, []).extend(cells)
+    return (csv_text(columns),)
+
+
+def _track() -> tuple[str, str]:
+    """Seven pulls of a tracked robot on sand, at 20 Hz."""
+    import numpy as np
+
+    from soilml.config.case import take_case
+    from soilml.io.text_tables import csv_text
+    from soilml.io.toml_settings import Settings
+    from soilml.optional_imports import tomllib
+    from soilml.systems.tracked_robot.track_log import simulate_log
+
+    case = take_case(Settings(tomllib.loads(TRACK), "example"))
+    slips = np.asarray([0.03, 0.08, 0.15, 0.25, 0.4, 0.6, 0.8])
+    log = simulate_log(case, slips, 0.5 * 130.0 * 9.81, 0.6, np.random.default_rng(1))
+    return TRACK, csv_text(
+        {k: v if k == "run" else np.round(np.asarray(v, float), 5) for k, v in log.items()}
+    )

@@ -5,16 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    add_seed_option,
-    folder_outputs,
-    named_numbers,
-    whole_number_from,
-)
+from soilml.cli.option_values import named_numbers, whole_number_from
+from soilml.cli.options import InputFile, add_seed_option, folder_outputs
 from soilml.errors import InputError
 
-HELP = "soil parameters for Chrono, Gazebo, Isaac or a table"
 DESCRIPTION = """\
 Write the soil of FIT.json in the units and names of a simulator, with a README of
 the equations, of what is ignored and of what no wheel test reveals.
@@ -66,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="value of a parameter of the target that rows cannot reveal; can be repeated",
     )
     parser.add_argument(
-        "--run", dest="run_name", metavar="NAME", help="which result of `identify --by`"
+        "--group", dest="run_name", metavar="NAME", help="which result of `identify --by`"
     )
     add_seed_option(parser)
 
@@ -79,8 +73,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 def run(args: argparse.Namespace) -> int:
     """Write the folder and say what is in it."""
     from soilml.cli.output import show
-    from soilml.io.text_tables import format_table
-    from soilml.report.terminal import significant
+    from soilml.report.aligned_text import format_table
+    from soilml.report.numbers import significant
     from soilml.soil_export import export_soil
 
     given = named_numbers(args.given, "--set", "NAME=NUMBER, such as elastic_K=1e8")

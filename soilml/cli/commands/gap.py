@@ -26,16 +26,15 @@ FILES = ("report.html", "gap.json", "model.toml", "next_runs.csv")
 #: Exit status where the data cannot be analysed; the report is written and says why
 BAD_DATA = 3
 FORMATS = ("table", "json")
-HELP = "find where a model and measured runs disagree, and name the missing effect"
 DESCRIPTION = """\
 Compare MODEL.toml with measured runs. Where they disagree by more than noise
 and run-to-run scatter, search for the missing effect, name it if the data
 distinguish it from all others, add it to the model, and report how much of the
 gap it closes.
 
-  soilml gap MODEL.toml RUNS.csv --out DIR
-  soilml gap MODEL.toml RUNS.csv --out DIR --holdout run
-  soilml gap MODEL.toml RUNS.csv --out DIR --holdout load_N=150
+  soilml gap MODEL.toml RUNS.csv --out FOLDER
+  soilml gap MODEL.toml RUNS.csv --out FOLDER --holdout run
+  soilml gap MODEL.toml RUNS.csv --out FOLDER --holdout load_N=150
 
 --holdout keeps a quarter of the runs, or the rows with this value, for
 validation. All rows of a run must come from one soil bed; one load per run is
@@ -44,17 +43,17 @@ error in them appears as an effect.
 
 RUNS.csv has the columns run, slip, load_N, torque_Nm, and optionally
 drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
-slip_angle_rad, time_s and <column>_std. DIR receives report.html (start here),
-gap.json, model.toml (the model with the effects that the evidence supports, or
-with a suspected one, marked so, where rows kept back are predicted better with
-it) and next_runs.csv (runs to measure next). The exit status is 0 whatever the
-result and 2 for bad input.
+slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start here),
+gap.json, model.toml (the model with the effect that is missing, or all likely
+explanations with their weights, by whose mixture other commands predict) and
+next_runs.csv (runs to measure next). The exit status is 0 whatever the result
+and 2 for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.
 
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
-after calibration, in the unit that `soilml effects` lists. --cost second-pass=3
+after calibration, in the unit that `soilml show effects` lists. --cost second-pass=3
 gives the cost of a kind of run in next_runs.csv, in any unit; runs are then
 ranked by what they discriminate per cost.
 """
@@ -64,7 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser)
     parser.add_argument(
-        "-o", "--out", metavar="DIR", required=True, help="folder for the four files"
+        "-o", "--out", metavar="FOLDER", required=True, help="folder for the four files"
     )
     parser.add_argument(
         "--holdout",
@@ -94,7 +93,8 @@ def outputs(args: argparse.Namespace) -> list[Path]:
 
 def run(args: argparse.Namespace) -> int:
     """Analyse and write the four files."""
-    from soilml.cli.options import available_effects, parse_costs, parse_names
+    from soilml.cli.option_values import parse_costs, parse_names
+    from soilml.cli.options import available_effects
     from soilml.cli.output import origin_of, show_result, tell
     from soilml.cli.progress import progress_bar
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
@@ -105,14 +105,14 @@ def run(args: argparse.Namespace) -> int:
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
     from soilml.gap import gap
-    from soilml.gap.presentation import gap_files, gap_text
+    from soilml.gap.report.report import gap_files
 
     table, costs = read_rows(args, RUNS), parse_costs(args)
     effects = available_effects(args)
     if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects)
+        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
     else:
-        case = read_case(args.model, effects, with_bias=True)
+        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
     print_table_hints(table, case)
     with progress_bar(f"analysing {len(table)} rows", 100) as done:
         report = gap(
@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
     folder = Path(args.out)
     files = {folder / name: text for name, text in texts.items()}
     write_files(files, folders=[folder])
-    show_result(gap_text(report), report.as_json())
+    show_result(report.report(), report.as_json())
     tell(f"\n{', '.join(str(name) for name in files)}")
     return BAD_DATA if report.status == "bad-data" else 0
 

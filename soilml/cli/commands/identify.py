@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from soilml.cli.options import (
     InputFile,
@@ -19,14 +18,10 @@ from soilml.cli.options import (
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
-    from soilml.config.case import Case
-    from soilml.identification.presentation import Identification
+    from soilml.identification.fit import Fit
     from soilml.io.table import Table
-    from soilml.report.page import Report
-    from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
 FORMATS = ("table", "json")
-HELP = "soil parameters from measured rows, by fitting a model"
 DESCRIPTION = """\
 Identify the soil parameters with which MODEL.toml explains the rows of
 RUNS.csv.
@@ -45,9 +40,9 @@ one of [gears.NAME] in MODEL.toml, in the column gear.
 
 Methods:
   averaged   (default) the soil averaged over explanations of the rows, each
-             weighted by its evidence: the model as it is, typical errors of
-             model and sensors of several sizes, effects of the catalogue
-The others take the model as exact, and sensors but for [noise] and [bias]:
+             weighted by its evidence: the model as it is, a smooth error of
+             it, effects of the catalogue; typical errors of sensors beside all
+The others assume a perfect model, and sensors with [noise] and [bias] alone:
   posterior  mean, standard deviation and 90 % interval of the exact posterior
              under the priors and the noise
   nonlinear  bounded least squares on the full model, from several starts
@@ -55,10 +50,9 @@ The others take the model as exact, and sensors but for [noise] and [bias]:
   newton     friction angle, shear modulus and kphi from a closed form;
              cohesion known
 
-`averaged` gives the answer of the exact model second, as exact_model. Use that
-only where model and sensors were verified on a known soil. It and `posterior`
-report which parameters the rows do not determine, and the next measurement
-that would help most.
+Use `posterior` only where model and sensors were verified on a known soil. It
+and `averaged` report which parameters the rows do not determine, and the next
+measurement that would help most.
 
 --mean averages the groups of --by, with the errors that they share. --fresh
 predicts other rows by the mean, and gives the regression of measured on
@@ -66,10 +60,10 @@ predicted values:
 
   soilml identify MODEL.toml RUNS.csv --by run --mean --fresh MORE.csv
 
-The result is JSON in SI units, in the file of --out or in a pipe; a terminal
-shows a table. --report writes a page to read and print. `posterior/prior`
-(remaining_fraction in the file) is the width of the estimate divided by that of the
-prior. std is the expected error. Read the warnings.
+The verdict comes first; -v shows all of it, and --out FILE.json has the result
+in SI units. --report writes a page to read and print. `left of prior`
+(remaining_fraction in the file) is the width of the estimate divided by that of
+the prior; +- is the expected error. Read the warnings.
 """
 
 
@@ -100,9 +94,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Identify and write the result."""
-    from dataclasses import replace
+    from dataclasses import asdict, replace
 
-    from soilml.cli.options import available_effects, parse_names
+    from soilml.cli.option_values import parse_names
+    from soilml.cli.options import available_effects
     from soilml.cli.output import show_result, write_with_report
     from soilml.cli.tables import (
         print_table_hints,
@@ -112,8 +107,9 @@ def run(args: argparse.Namespace) -> int:
         tell_failures,
     )
     from soilml.config.case import read_case
-    from soilml.io.read_table import RUNS
+    from soilml.io.read_table import RUNS, read_table
     from soilml.optional_imports import need
+    from soilml.remarks import texts
     from soilml.report.page import json_text
 
     if args.mean and args.by is None:
@@ -124,80 +120,57 @@ def run(args: argparse.Namespace) -> int:
     from soilml.experiment_design.advice_after_results import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
-    from soilml.identification.presentation import (
-        Identification,
-        identify_report,
-        soil_entries,
-    )
+    from soilml.identification.report import fit_report, group_report, soil_entries
+    from soilml.systems.tracked_robot.group_identification import GroupFits, regressions
     from soilml.systems.tracked_robot.regression_presentation import (
         regression_picture,
-        regression_text,
-        regressions_as_json,
+        regression_table,
     )
 
     table = read_rows(args, RUNS)
     effects = available_effects(args)
     if args.gear is not None:
-        case = read_case_of_rows(args, args.model, table, effects)
+        case = read_case_of_rows(args, args.model, table, effects, with_explanations=True)
     else:
-        case = read_case(args.model, effects, with_bias=True)
+        case = read_case(args.model, effects, with_bias=True, with_explanations=True)
     print_table_hints(table, case)
     free = parse_names(args.free)
 
-    def solve(rows: Table) -> Identification:
+    def solve(rows: Table) -> tuple[Fit, dict[str, Any], list[str]]:
         fit = identify(case, rows, free, args.method)
         advice = None if fit.samples is None else advice_after_fit(case, rows, free, fit)
-        soil = soil_entries(case, fit, free, with_draws=args.by is None)
-        fit = replace(fit, samples=None)  # those of thousands of runs are not held together
+        content = fit.as_json() | soil_entries(case, fit, with_draws=args.by is None)
+        fit = replace(fit, samples=None)  # those of thousands of runs are not kept together
         if advice is None:
-            return Identification(fit, soil=soil)
-        return Identification(fit, tuple(next_row_remarks(advice)), advice_as_json(advice), soil)
+            return fit, content, []
+        return fit, content | advice_as_json(advice), texts(next_row_remarks(advice))
 
     found, failed = result_by_group(args, table, "identifying", solve)
-    runs = {name: result.as_json() for name, result in found.items()}
-    content = runs[""] if args.by is None else {"by": args.by, "runs": runs, "failed": failed}
-    shown, lines = dict(found), None
-    if args.mean:
-        mean, lines = _mean(args, case, found, free)
-        shown[f"mean of {len(found)}"] = mean
-        content["mean"] = mean.as_json()
-        if lines is not None:
-            content["mean"]["regression"] = regressions_as_json(lines)
-    text, files = json_text(content), (args.model, args.runs)
-
-    def page() -> Report:
-        report = identify_report(case, shown, failed, args.by, files)
-        if lines is None:
-            return report
-        extra = regression_picture(lines, Path(args.fresh).name)
-        return replace(report, pictures=[*report.pictures, extra])
-
-    write_with_report(args, {args.out: text}, lambda: (page(), content))
-    heads = {name: f"{args.by} {name}: " if name else "" for name in shown}
-    parts = [heads[name] + result.text(args.verbose) for name, result in shown.items()]
-    if lines is not None:
-        parts.append(regression_text(lines, Path(args.fresh).name))
-    show_result("\n\n".join(parts), {k: content[k] for k in content if k != "draws"})
+    title = f"Soil of {Path(args.runs).name}, by the model {Path(args.model).name}"
+    fits = {name: fit for name, (fit, _, _) in found.items()}
+    runs = {name: own for name, (_, own, _) in found.items()}
+    if args.by is None:
+        (content,), ((fit, _, steps),) = runs.values(), found.values()
+        report = fit_report(fit, steps, title)
+    else:
+        content = {"by": args.by, "runs": runs, "failed": failed}
+        if args.mean:
+            mean = GroupFits(tuple(fits.values())).average
+            fits[f"mean of {len(found)}"] = mean
+            content["mean"] = mean.as_json() | soil_entries(case, mean, with_draws=False)
+        report = group_report(fits, failed, args.by, title)
+    if args.fresh is not None:
+        if case.gears:
+            raise InputError("--fresh predicts rows of one gear: name it by --gear")
+        fresh = read_table(args.fresh, ("slip", "load_N"), ignore_extra=args.ignore_extra)
+        lines, name = regressions(case, mean, fresh.rows(fresh.answered)), Path(args.fresh).name
+        content["mean"]["regression"] = {key: asdict(one.line) for key, one in lines.items()}
+        report = replace(
+            report,
+            tables=[*report.tables, regression_table(lines, name)],
+            pictures=[*report.pictures, regression_picture(lines, name)],
+        )
+    write_with_report(args, {args.out: json_text(content)}, lambda: (report, content))
+    show_result(report, {k: content[k] for k in content if k != "draws"})
     tell_failures(args.by, failed)
     return 0
-
-
-def _mean(
-    args: argparse.Namespace,
-    case: Case,
-    found: Mapping[str, Identification],
-    free: Sequence[str] | None,
-) -> tuple[Identification, dict[str, ChannelRegression] | None]:
-    """The mean of the groups, and the regressions of the rows of --fresh on what it predicts."""
-    from soilml.identification.presentation import Identification, soil_entries
-    from soilml.io.read_table import read_table
-    from soilml.systems.tracked_robot.group_identification import GroupFits, regressions
-
-    fit = GroupFits(tuple(one.fit for one in found.values())).average
-    mean = Identification(fit, soil=soil_entries(case, fit, free, with_draws=False))
-    if args.fresh is None:
-        return mean, None
-    if case.gears:
-        raise InputError("--fresh predicts rows of one gear: name it by --gear")
-    rows = read_table(args.fresh, ("slip", "load_N"), ignore_extra=args.ignore_extra)
-    return mean, regressions(case, fit, rows.rows(rows.answered))

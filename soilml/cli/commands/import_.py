@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 #: Endings of the table, its report and the errors that all rows share.
 SUFFIXES = (".csv", ".report.html", ".report.json", ".bias.toml")
-HELP = "bring logs of a rig or a rover into a table of runs"
 DESCRIPTION = """\
 Bring raw logs into the table RUNS.csv that identify, estimate and gap read:
 slip, torque and load of each wheel in each steady window, with standard
@@ -103,7 +102,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.text_tables import csv_text
     from soilml.log_import.workflow import import_log
     from soilml.optional_imports import need
-    from soilml.report.page import json_text
+    from soilml.report.page import json_text, page, report_entry
 
     need("pint", "import")
     if args.init:
@@ -115,11 +114,9 @@ def run(args: argparse.Namespace) -> int:
         found = import_log(args.files, args.map, accept=args.accept, progress=progress)
         html, entry = "", {}
         if args.out is not None:
-            from soilml.log_import.page import page, summary
-
-            origin = origin_of(args)
-            html = page(found, progress, origin)
-            entry = {"report": summary(found).as_json(origin)}
+            progress("drawing the report", 0, 1)
+            report, origin = found.report(), origin_of(args)
+            html, entry = page(report, origin), {"report": report_entry(report, origin)}
     _print_remarks(found)
     if args.out is None:
         _print_table(found)
@@ -150,9 +147,11 @@ def _init(args: argparse.Namespace) -> int:
     import shlex
 
     from soilml.cli.output import tell, write_stdout
+    from soilml.cli.progress import stage_progress
     from soilml.log_import.new_map import draft_map
 
-    draft = draft_map(args.files)
+    with stage_progress() as progress:
+        draft = draft_map(args.files, progress)
     if args.explain:
         tell(draft.evidence.rstrip())
     if args.out is None:
@@ -179,7 +178,7 @@ def _print_remarks(found: ImportedLog) -> None:
 
 
 def _print_table(found: ImportedLog) -> None:
-    from soilml.cli.output import format_columns, write_stdout
+    from soilml.cli.output import write_stdout
     from soilml.cli.screen import is_terminal
     from soilml.io.text_tables import csv_text
 
@@ -187,6 +186,8 @@ def _print_table(found: ImportedLog) -> None:
     if not is_terminal():
         write_stdout(csv_text(table.columns))
         return
+    from soilml.report.tables import ReportTable
+
     columns = {name: table[name][:_MOST_SHOWN] for name in _SHOWN if name in table}
     more = f"and {len(table) - _MOST_SHOWN} more\n" if len(table) > _MOST_SHOWN else ""
-    write_stdout(f"{format_columns(columns)}\n{more}")
+    write_stdout(f"{ReportTable.of('rows', columns).text()}\n{more}")

@@ -6,12 +6,11 @@ import argparse
 import sys
 from pathlib import Path
 
-from soilml.cli.options import whole_number_from
+from soilml.cli.option_values import whole_number_from
 from soilml.errors import InputError, did_you_mean
 from soilml.io.atomic_files import save_text
 from soilml.io.cell_text import is_number, read_number
 
-HELP = "write a first model file, with comments"
 DESCRIPTION = """\
 Write a model file to begin with: the wheel, a soil with wide priors, the noise
 of the sensors, and the other sections as comments.
@@ -49,7 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--soil",
         metavar="PAPER/SOIL",
-        help="soil whose bearing is known; `soilml soils` lists them",
+        help="soil whose bearing is known; `soilml show soils` lists them",
     )
     parser.add_argument(
         "--torque-noise",
@@ -102,7 +101,7 @@ def _ask(key: str) -> str | None:
 
 def _size(key: str, text: str) -> float:
     """A size in SI units, from a number or a text with a unit."""
-    from soilml.config.model_settings import text_in_si
+    from soilml.io.declared_settings import text_in_si
 
     try:
         return read_number(text)
@@ -133,7 +132,7 @@ def _text(given: dict[str, str | float | None], rover: str | None) -> str:
     catalogue = soil_catalogue()
     if name is not None and name not in catalogue:
         raise InputError(
-            f"no soil {name!r}; {did_you_mean(str(name), catalogue)}`soilml soils` lists them"
+            f"no soil {name!r}; {did_you_mean(str(name), catalogue)}`soilml show soils` lists them"
         )
     noise = str(given["torque_noise"] or "2 %")
     written = noise if is_number(noise) else f'"{noise}"'
@@ -150,7 +149,7 @@ def _text(given: dict[str, str | float | None], rover: str | None) -> str:
     parts.append(
         "# [discrepancy] # typical error of the model, beyond the noise\n"
         '# torque_Nm = "2 %"\n\n'
-        "# [[effect]] # `soilml effects` lists them, `soilml gap` finds which ones are missing\n"
+        "# [[effect]] # see `soilml show effects`; `soilml gap` finds which are missing\n"
         '# name = "slip-sinkage"\n# n1 = 0.3'
     )
     return "\n\n".join(parts) + "\n"

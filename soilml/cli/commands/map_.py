@@ -1,29 +1,22 @@
-"""`soilml map`: the soil along a drive, and where a rover can climb."""
+"""`soilml drive map`: the soil along a drive, and where a rover can climb."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_effects_option,
-    add_row_options,
-    folder_outputs,
-    whole_number_from,
-)
+from soilml.cli.option_values import NumberFrom, whole_number_from
+from soilml.cli.options import InputFile, add_effects_option, add_row_options, folder_outputs
 
 SIZE = NumberFrom(0.01, 1000.0, "m")  # Of a cell, and how far a reading reaches
-HELP = "a map of the soil along a drive, and of the slopes that can be climbed"
 DESCRIPTION = """\
 Make a map of the soil from the rows of a drive with positions: its parameters
 with uncertainty, where the soil changes, and for a rover the probability of
 climbing, the slip that slopes need, and the work of the wheels.
 
-  soilml map DRIVE.csv --rover ROVER.toml --out map
-  soilml map DRIVE.csv --rover ROVER.toml --slope 0,10,20 --cell 0.25 --out map
-  soilml map DRIVE.csv --rover ROVER.toml --elevation dem.tif --out map
+  soilml drive map ROVER.toml DRIVE.csv --out map
+  soilml drive map ROVER.toml DRIVE.csv --slope 0,10,20 --cell 0.25 --out map
+  soilml drive map ROVER.toml DRIVE.csv --elevation dem.tif --out map
 
 DRIVE.csv has x_m, y_m, slip, torque_Nm and load_N; several wheels also wheel
 and time_s. Positions are those of the wheel's contact, or those of the rover's
@@ -44,15 +37,13 @@ headings, and the occupancy is that of the worst of them.
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="wheel, soil, rover")
     parser.add_argument("runs", type=InputFile, metavar="DRIVE.csv", help="rows with positions")
     parser.add_argument(
-        "--rover", type=InputFile, metavar="ROVER.toml", required=True, help="wheel, soil and rover"
-    )
-    parser.add_argument(
-        "--from", dest="trained", type=InputFile, metavar="FILE.onnx",
+        "--from", dest="trained", type=InputFile, metavar="MODEL.onnx",
         help="trained file for this wheel (default: any_wheel)",
     )  # fmt: skip
-    parser.add_argument("--slope", metavar="DEG", help="slopes in degrees (default: 0,5,10,15)")
+    parser.add_argument("--slope", metavar="DEG,...", help="slopes in degrees (default: 0,5,10,15)")
     parser.add_argument("--cell", type=SIZE, metavar="M", help="side of a cell (default: 0.5)")
     parser.add_argument(
         "--reach", type=SIZE, metavar="M",
@@ -81,22 +72,22 @@ def run(args: argparse.Namespace) -> int:
     """Make the map and write its folder."""
     import numpy as np
 
-    from soilml.cli.options import available_effects, parse_numbers
-    from soilml.cli.output import show
+    from soilml.cli.option_values import parse_numbers
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import show_result
     from soilml.cli.progress import stage_progress
     from soilml.cli.tables import read_case_of_rows, read_rows
     from soilml.io.atomic_files import write_files
     from soilml.onboard.estimator import Estimator
     from soilml.optional_imports import need
-    from soilml.report.figure_style import save_png
     from soilml.soil_maps.drive import NEEDED
-    from soilml.soil_maps.presentation import FILES, map_files, map_panels, map_text, plot_map
+    from soilml.soil_maps.presentation import FILES, map_files, map_json
     from soilml.soil_maps.raster import read_elevation
     from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
 
     if args.out is not None:
-        need("tifffile", "map --out", "map")
-        need("matplotlib", "map --out")
+        need("tifffile", "drive map --out", "map")
+        need("matplotlib", "drive map --out")
     table = read_rows(args, NEEDED, NEEDED[:2])
     case = read_case_of_rows(args, args.rover, table, available_effects(args))
     with stage_progress() as progress:
@@ -111,14 +102,11 @@ def run(args: argparse.Namespace) -> int:
             elevation=None if args.elevation is None else read_elevation(args.elevation),
             progress=progress,
         )  # fmt: skip
+    report = found.report()
     if args.out is not None:
-
-        def draw(path: Path) -> None:
-            save_png(lambda ax: plot_map(found, ax), *map_panels(found), path)
-
         folder = Path(args.out)
-        files = map_files(found, folder, args.epsg, draw)
+        files = map_files(found, folder, args.epsg, report.pictures[0].save)
         earlier = [folder / name for name in FILES if folder / name not in files]
         write_files(files, folders=[folder], remove=[p for p in earlier if p.exists()])
-    show(map_text(found))
+    show_result(report, map_json(found))
     return 0

@@ -1,4 +1,4 @@
-"""`soilml models`: the released model files."""
+"""`soilml show models`: the released model files."""
 
 from __future__ import annotations
 
@@ -7,12 +7,11 @@ import json
 
 from soilml.errors import ModelFileError
 
-HELP = "list the released model files, which `estimate` takes by their short names"
 DESCRIPTION = """\
 List the released model files of this installation. A short name stands for the
 file wherever a command reads a model file:
 
-  soilml models                     all files, one line each
+  soilml show models                     all files, one line each
   soilml estimate wheel             what one file is for
   soilml estimate wheel RUNS.csv    estimates by it
 """
@@ -24,13 +23,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Print the list."""
-    from soilml.io.text_tables import format_table
     from soilml.onboard.estimator import Estimator
     from soilml.onboard.model_file import released_models
     from soilml.optional_imports import need
     from soilml.quantities import QUANTITIES, SHEAR
+    from soilml.report.aligned_text import format_table
 
-    need("onnxruntime", "models")
+    need("onnxruntime", "show models")
     files = released_models()
     if not files:
         raise ModelFileError(

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from soilml.report.page import Content
 
 FORMATS = ("table", "csv", "json")
-HELP = "printed numbers of the source papers next to the computed ones"
 DESCRIPTION = """\
 Compute the numbers that the source papers print, and compare them.
 
@@ -27,7 +26,7 @@ Compute the numbers that the source papers print, and compare them.
   soilml paper numbers --summary              how many numbers of each status
   soilml paper numbers comin2017 --all        every number, also those not computed
   soilml paper numbers --out papers.csv       every number, as CSV
-  soilml paper numbers --json papers.json     the same with the summary, as JSON
+  soilml paper numbers --out papers.json     the same with the summary, as JSON
 
 status: reproduced     computed without the number, within the tolerance
         recovered      the number, or what it follows from, was put into a
@@ -57,12 +56,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("paper", nargs="?", help=f"paper to compute: {', '.join(PAPERS)}")
     parser.add_argument("--all", action="store_true", help="list every number")
     parser.add_argument("--summary", action="store_true", help="print the counts by status alone")
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--json", "FILE.json", "write numbers and counts to this file")
+    add_output(parser, "--out", "FILE.csv", "write numbers to this file, or FILE.json", ".json")
 
 
 def run(args: argparse.Namespace) -> int:
     """Compute, compare and write the table."""
+    from soilml.cli.options import is_json
     from soilml.cli.output import save_columns, tell, tell_columns, write_stdout
     from soilml.cli.progress import progress_bar
     from soilml.cli.screen import SCREEN
@@ -71,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.papers.published import count_statuses, printed_numbers
     from soilml.report.page import json_text
 
-    need("scipy", "papers")
+    need("scipy", "paper numbers")
     rows = list(printed_numbers(args.paper))
     found = []
     with progress_bar("computing", len(rows)) as progress:
@@ -81,12 +80,11 @@ def run(args: argparse.Namespace) -> int:
     counts, columns = count_statuses(found), _columns(found)
     files: dict[Path, Content] = {}
     if args.out is not None:
-        files[Path(args.out)] = partial(save_columns, columns)
-    if args.json is not None:
-        files[Path(args.json)] = json_text(_as_json(found, counts))
+        text = json_text(_as_json(found, counts)) if is_json(args) else None
+        files[Path(args.out)] = partial(save_columns, columns) if text is None else text
     write_files(files)
     as_text = SCREEN.form_of_rows() == "table"
-    if args.out is not None or not (args.summary or args.json or as_text):
+    if args.out is not None or not (args.summary or as_text):
         tell_columns(columns, args.out)
     elif not args.summary and as_text:
         papers = {c.row.paper: [d for d in found if d.row.paper == c.row.paper] for c in found}
@@ -108,8 +106,8 @@ def _said(counts: dict[str, dict[str, int]]) -> str:
 
 def _summary(found: list[Comparison], counts: dict[str, dict[str, int]]) -> str:
     """Counts by status and paper, and how many of those reproduced are orders or counts."""
-    from soilml.io.text_tables import format_table
     from soilml.papers.published import ORDINAL, STATUSES
+    from soilml.report.aligned_text import format_table
 
     papers = list(counts) if len(counts) == 1 else [*counts, "all"]
     columns = [Counter(numbers) for numbers in counts.values()]
@@ -132,7 +130,7 @@ def _summary(found: list[Comparison], counts: dict[str, dict[str, int]]) -> str:
 
 def _page(paper: str, found: list[Comparison], every: bool) -> str:
     """One paper as an aligned table with the reasons under it, then what the table omits."""
-    from soilml.io.text_tables import format_table
+    from soilml.report.aligned_text import format_table
 
     rows = [c for c in found if every or c.status not in OMITTED]
     notes = list(dict.fromkeys(c.row.reason for c in rows if c.row.reason))

@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
+from soilml.cli.option_values import slip_limit
 from soilml.cli.options import (
     InputFile,
     add_by_option,
@@ -18,7 +19,6 @@ from soilml.cli.options import (
     add_report_option,
     add_row_options,
     gravity_change,
-    slip_limit,
 )
 from soilml.errors import InputError
 
@@ -26,13 +26,11 @@ if TYPE_CHECKING:
     from soilml.config.case import Case
     from soilml.io.table import Table
     from soilml.onboard.estimator import Estimator
-    from soilml.report.page import Report
-    from soilml.traction.presentation import Plotted, Presentation
-
-Result = TypeVar("Result", bound="Plotted")
+    from soilml.report.page import Content
+    from soilml.traction.report import PullReport
+    from soilml.traction.rover_report import RoverReport
 
 FORMATS = ("table", "csv", "json")
-HELP = "drawbar pull against slip, and the slope that can be climbed"
 DESCRIPTION = """\
 Predict the drawbar pull of a running gear against slip on the soil of the
 measured rows, and the slope that a vehicle with such gears can climb, both
@@ -43,16 +41,17 @@ with 90 % bands.
   soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
 
 RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm and, where
-measured, drawbar_pull_N and sinkage_m. Samples of the soil are drawn from the
-posterior given the rows (--free names its parameters), or from the estimate of
-a trained model (--from), and the model computes the pull of each. All rows are
-assumed to come from one soil, unless --by run asks for a result for each run.
+measured, drawbar_pull_N and sinkage_m. The soil (--free names its parameters),
+effects that the model may lack, and its smooth error are drawn together from
+one posterior given the rows, or the soil from the estimate of a trained model
+(--from). All rows are assumed to come from one soil, unless --by run asks for a
+result for each run. A MODEL.toml of gap with several [[explanation]] predicts
+by their mixture.
 
 Loads are those of the rows, unless --load names others. Slips reach 0.6, the
 highest measured slip, or --slip-limit. On a slope, a wheel carries the
 component of its load normal to the slope and pulls the component along it. The
-bands include errors of the model where [discrepancy] states that of the pull,
-but neither load transfer nor side slopes.
+bands include errors of the model, but neither load transfer nor side slopes.
 
 A model file with [rover] answers for the whole rover, unless --load or --gear
 names one wheel: the slip that slopes need, the margin of pull, the work of the
@@ -79,8 +78,10 @@ MAX_LOADS = 8  # Largest number of loads
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_model_and_runs(parser)
-    parser.add_argument("--load", help="vertical loads in N: A,B,... or start:stop:count")
-    parser.add_argument("--slope", metavar="A,B,...", help="slopes of a rover in degrees")
+    parser.add_argument(
+        "--load", metavar="N,...", help="vertical loads in N: A,B,... or start:stop:count"
+    )
+    parser.add_argument("--slope", metavar="DEG,...", help="slopes of a rover in degrees")
     add_gravity_options(parser)
     parser.add_argument(
         "--slip-limit", type=slip_limit, metavar="S", help="largest slip considered"
@@ -93,7 +94,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="trained",
         type=InputFile,
         metavar="MODEL.onnx",
-        help="take the soil from the estimate of this model file",
+        help="use the soil that this trained file estimates",
     )
     add_effects_option(parser)
     add_by_option(parser)
@@ -106,7 +107,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Predict and write the results."""
-    from soilml.cli.options import available_effects, parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
+    from soilml.cli.options import available_effects
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
@@ -115,7 +117,6 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.config.case import read_case
     from soilml.io.read_table import RUNS
-    from soilml.traction.presentation import PRESENTATION
     from soilml.traction.report import pull_report
 
     _check(args)
@@ -128,14 +129,20 @@ def run(args: argparse.Namespace) -> int:
     loads = None if args.load is None else parse_numbers("--load", args.load).tolist()
     if len(loads or ()) > MAX_LOADS:
         raise InputError(f"--load names {len(loads or ())} loads; at most {MAX_LOADS}")
+    if loads is not None and min(loads) <= 0.0:
+        raise InputError(f"--load {args.load}: needed is a load above zero")
     if args.load is None and args.gear is None:
-        whole = read_case(args.model, available_effects(args), with_bias=True)
+        whole = read_case(
+            args.model, available_effects(args), with_bias=True, with_explanations=True
+        )
         if whole.rover is not None:
             print_table_hints(table, whole)
             return _run_rover(args, whole, table, options)
     if args.slope is not None:
         raise InputError("--slope needs a model file with [rover], and neither --load nor --gear")
-    case = read_case_of_rows(args, args.model, table, available_effects(args))
+    case = read_case_of_rows(
+        args, args.model, table, available_effects(args), with_explanations=True
+    )
     print_table_hints(table, case)
     options |= {
         "loads": loads,
@@ -145,7 +152,7 @@ def run(args: argparse.Namespace) -> int:
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: pull_report(case, rows, **options)
     )
-    _write_results(args, found, PRESENTATION, failed)
+    _write_results(args, found, failed)
     return 0
 
 
@@ -153,10 +160,9 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
     """The same for a whole rover."""
     import numpy as np
 
-    from soilml.cli.options import parse_numbers
+    from soilml.cli.option_values import parse_numbers
     from soilml.cli.tables import result_by_group
-    from soilml.traction.rover_presentation import rover_presentation
-    from soilml.traction.rover_report import rover_report, with_gravity
+    from soilml.traction.rover_report import rover_report
 
     slopes = None if args.slope is None else np.deg2rad(parse_numbers("--slope", args.slope))
     change = gravity_change(args, case)
@@ -164,9 +170,7 @@ def _run_rover(args: argparse.Namespace, case: Case, table: Table, options: dict
     found, failed = result_by_group(
         args, table, "predicting", lambda rows: rover_report(case, rows, **options)
     )
-    moved = case if change is None else with_gravity(case, change.target)
-    assert moved.rover is not None
-    _write_results(args, found, rover_presentation(moved.rover), failed)
+    _write_results(args, found, failed)
     return 0
 
 
@@ -197,8 +201,7 @@ def _check(args: argparse.Namespace) -> None:
 
 def _write_results(
     args: argparse.Namespace,
-    found: Mapping[str, Result],
-    how: Presentation[Result],
+    found: Mapping[str, PullReport | RoverReport],
     failed: Mapping[str, str],
 ) -> None:
     """Write --out, --picture and --report as one set; then text, or CSV into a pipe.
@@ -206,45 +209,40 @@ def _write_results(
     found: Results by group of --by; one under "" without groups.
     failed: Why other groups have none.
     """
+    from dataclasses import replace
+
     import numpy as np
 
-    from soilml.cli.output import show, tell, tell_columns, write_with_report
-    from soilml.cli.screen import SCREEN
+    from soilml.cli.output import show_result, show_rows, write_with_report
     from soilml.cli.tables import tell_failures
     from soilml.io.text_tables import csv_text
-    from soilml.report.figure_style import save_png
+    from soilml.report.report import by_group
 
     parts: list[dict[str, Any]] = []
     for name, one in found.items():
-        own = how.columns(one)
+        own = one.frame_columns()
         count = len(next(iter(own.values())))
         parts.append(({args.by: np.full(count, name)} if args.by else {}) | dict(own))
     columns = {key: np.concatenate([np.asarray(p[key]) for p in parts]) for key in parts[0]}
-
-    def draw(path: Path) -> None:
-        (only,) = found.values()
-        rows, across, size = how.panels(only)
-        save_png(only.plot, rows, across, size, path)
-
-    def build() -> tuple[Report, Mapping[str, Any]]:
-        content = {
-            "columns": {name: values.tolist() for name, values in columns.items()},
-            "warnings": {
-                name: [remark.as_json() for remark in how.warnings(one)]
-                for name, one in found.items()
-            },
-            "failed": dict(failed),
-        }
-        return how.page(found, args.by, (args.model, args.runs)), content
-
-    table = csv_text(columns)
-    write_with_report(args, {args.out: table, args.picture: draw}, build)
-    heads = {name: f"{args.by} {name}: " if args.by else "" for name in found}
-    if args.out is None and args.report is None and SCREEN.form_of_rows() != "table":
-        tell_columns(columns, None)
-        for name, one in found.items():
-            for remark in how.warnings(one):
-                tell(f"{heads[name]}{remark}")
+    reports = {name: one.report() for name, one in found.items()}
+    title = f"Pull on the soil of {Path(args.runs).name}, by the model {Path(args.model).name}"
+    if args.by is None:
+        report = replace(reports[""], title=title)
     else:
-        show("\n\n".join(heads[name] + how.text(one) for name, one in found.items()))
+        verdict = f"{len(found)} groups of rows have a prediction."
+        report = by_group(reports, failed, args.by, verdict, title)
+    content = {
+        "columns": {name: values.tolist() for name, values in columns.items()},
+        "warnings": {n: [remark.as_json() for remark in r.remarks] for n, r in reports.items()},
+        "failed": dict(failed),
+    }
+    files: dict[str | None, Content] = {
+        args.out: csv_text(columns),
+        args.picture: report.pictures[0].save,
+    }
+    write_with_report(args, files, lambda: (report, content))
+    if args.out is None and args.report is None:
+        show_rows(report, columns, content)
+    else:
+        show_result(report, content)
     tell_failures(args.by, failed)

@@ -6,21 +6,15 @@ import argparse
 import sys
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_effects_option,
-    add_gear_option,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.report import Picture
 
 FORMATS = ("table", "csv", "json")
-HELP = "forces and sinkage against slip and load, from a model"
 DESCRIPTION = """\
 Solve the equilibrium of gear and soil of MODEL.toml at every combination of
 the slips and loads.
@@ -42,6 +36,7 @@ Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
 
+_ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version before
 MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 
 
@@ -51,9 +46,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "model", type=InputFile, metavar="MODEL.toml", help="gear, soil and effects"
     )
     parser.add_argument(
-        "--slip", required=True, help="slip ratios, above 0 driving, below 0 braking"
+        "--slip",
+        metavar="S,...",
+        required=True,
+        help="slip ratios, above 0 driving, below 0 braking",
     )
-    parser.add_argument("--load", required=True, help="vertical loads in N")
+    parser.add_argument("--load", metavar="N,...", required=True, help="vertical loads in N")
     parser.add_argument(
         "--speed",
         type=NumberFrom(-100.0, 100.0, "m/s"),
@@ -68,9 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--slip-angle",
-        type=NumberFrom(-1.6, 1.6, "rad"),
-        metavar="RAD",
-        help="angle between wheel plane and path, in rad",
+        type=NumberFrom(-91.0, 91.0, "degrees"),
+        metavar="DEG",
+        help="angle between wheel plane and path, in degrees",
     )
     add_effects_option(parser)
     add_gear_option(parser)
@@ -106,8 +104,9 @@ def run(args: argparse.Namespace) -> int:
     """Simulate and write the table."""
     import numpy as np
 
-    from soilml.cli.options import available_effects, parse_numbers
-    from soilml.cli.output import write_columns
+    from soilml.cli.option_values import parse_numbers
+    from soilml.cli.options import available_effects
+    from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
@@ -124,7 +123,9 @@ def run(args: argparse.Namespace) -> int:
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
-    case = read_case_of_one_gear(args.model, available_effects(args), args.gear)
+    case = read_case_of_one_gear(
+        args.model, available_effects(args), args.gear, with_explanations=True
+    )
     if args.std and case.remainder is None:
         raise InputError(f"--std: {args.model} has no [remainder]; soilml gap learns one")
     most = MOST_BALANCED if args.balance else ROWS.most
@@ -134,7 +135,10 @@ def run(args: argparse.Namespace) -> int:
             f"at most {most} are possible{' with --balance' if args.balance else ''}"
         )
     slip, load = (grid.ravel() for grid in np.meshgrid(slips, loads))
-    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": args.slip_angle}
+    angle = None if args.slip_angle is None else np.deg2rad(args.slip_angle)
+    if angle is not None and 0.0 < abs(args.slip_angle) <= _ONCE_RADIANS:
+        tell(f"! --slip-angle is in degrees now: {args.slip_angle:g} degrees")
+    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
     options["with_efficiency"], settling = args.efficiency, None
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
@@ -157,7 +161,7 @@ def run(args: argparse.Namespace) -> int:
         )
     if args.balance:
         rows = balanced_rows(case, rows, settling)
-    write_columns(rows.columns, args.out, args.picture, _panels(rows, loads.size))
+    write_columns(rows.columns, args.out, args.picture, _picture(rows, loads.size))
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)
     if failed:
@@ -168,12 +172,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _panels(rows: Table, loads: int) -> ColumnPanels:
+def _picture(rows: Table, loads: int) -> Picture:
     """Forces, sinkage, and what was asked for beside them, against slip, a line for each load."""
-    from soilml.report.column_panels import ColumnPanels
+    from soilml.report.column_figure import column_picture
 
     panels: list[tuple[str, ...]] = [("torque_Nm",), ("drawbar_pull_N",), ("sinkage_m",)]
     panels += [(name,) for name in ("tractive_efficiency", "pull_efficiency") if name in rows]
     if "trim_rad" in rows:
         panels += [("front_share", "belt_share", "rear_share"), ("trim_rad",), ("rear_sinkage_m",)]
-    return ColumnPanels(rows.columns, "slip", panels, ("load_N",) if loads > 1 else ())
+    return column_picture(rows.columns, "slip", panels, ("load_N",) if loads > 1 else ())

@@ -1,25 +1,17 @@
-"""`soilml slip`: slip, speed and soil of a rover without odometry."""
+"""`soilml drive slip`: slip, speed and soil of a rover without odometry."""
 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
-from typing import Any
 
-from soilml.cli.options import (
-    InputFile,
-    add_effects_option,
-    add_ignore_extra_option,
-    add_output,
-)
+from soilml.cli.options import InputFile, add_effects_option, add_ignore_extra_option, add_output
 
 FORMATS = ("table", "csv", "json")
-HELP = "slip of a rover without odometry, from torque and pitch"
 DESCRIPTION = """\
 Infer body speed, slip of each wheel and the soil along a drive whose speed
 nobody measured, from torques, rim speeds and pitch, with 90 % intervals.
 
-  soilml slip DRIVE.csv --rover ROVER.toml --out slip.csv --picture slip.png
+  soilml drive slip ROVER.toml DRIVE.csv --out slip.csv --picture slip.png
 
 ROVER.toml has [gear], [soil] with [soil.prior], [rover] with mass and wheels,
 and [drive]: torque_per_ampere, the friction of the drives and their errors.
@@ -33,66 +25,50 @@ the loads follow from mass and positions.
 All wheels share one body speed, at which they pull what the slope requires.
 Torques weigh the soils of the prior. The result has a row for each time;
 flags say which rows are refused (standing, hard floor) and where the slip is
-not determined. --json has the same with remarks.
+not determined. FILE.json has the same with remarks.
 """
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
+    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover and prior")
     parser.add_argument(
         "drive", type=InputFile, metavar="DRIVE.csv", help="a row for each time and wheel"
     )
-    parser.add_argument(
-        "--rover", type=InputFile, metavar="ROVER.toml", required=True, help="rover and prior"
-    )
     add_effects_option(parser)
     add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
+    add_output(parser, "--out", "FILE.csv", "write the table to this file, or FILE.json", ".json")
     add_output(parser, "--picture", "FILE.png", "draw slip, speed and pitch against time")
-    add_output(parser, "--json", "FILE.json", "write table and remarks")
 
 
 def run(args: argparse.Namespace) -> int:
     """Infer and write."""
-    from soilml.cli.options import available_effects
-    from soilml.cli.output import show, tell, tell_columns
+    from soilml.cli.options import available_effects, is_json
+    from soilml.cli.output import show_result, show_rows, write_set
     from soilml.cli.progress import working
-    from soilml.cli.screen import SCREEN
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.io.atomic_files import write_files
     from soilml.io.text_tables import csv_text
-    from soilml.report.figure_style import save_png
     from soilml.report.page import json_text
     from soilml.slip_filter.drive import read_drive, slip_of_drive
     from soilml.slip_filter.presentation import (
-        SIZE,
         drive_columns,
         drive_json,
-        drive_text,
-        plot_drive,
+        report_of_drive,
     )
 
     driven = read_long_table(args.drive, ignore_extra=args.ignore_extra)
-    case = read_case(args.rover, available_effects(args))
+    case = read_case(args.rover, available_effects(args), with_explanations=True)
     rows = read_drive(driven, case)
     with working(f"inferring from {len(rows.time)} rows"):
         found = slip_of_drive(case, rows)
 
-    def draw(path: Path) -> None:
-        save_png(lambda ax: plot_drive(found, ax), 3, 1, SIZE, path)
-
-    table = csv_text(drive_columns(found))
-    contents: dict[str | None, Any] = {
-        args.out: table,
-        args.picture: draw,
-        args.json: json_text(drive_json(found)),
-    }
-    write_files({Path(path): content for path, content in contents.items() if path is not None})
-    if args.out is None and args.json is None and SCREEN.form_of_rows() != "table":
-        tell_columns(drive_columns(found), None)
-        for remark in found.remarks():
-            tell(f"! {remark}")
+    report, columns, content = report_of_drive(found), drive_columns(found), drive_json(found)
+    whole = args.out is not None and is_json(args)
+    table = json_text(content) if whole else csv_text(columns)
+    write_set({args.out: table, args.picture: report.pictures[0].save})
+    if args.out is None:
+        show_rows(report, columns, content)
     else:
-        show(drive_text(found))
+        show_result(report, content)
     return 0

@@ -1,4 +1,4 @@
-"""`soilml soils`: the catalogue of published soils."""
+"""`soilml show soils`: the catalogue of published soils."""
 
 from __future__ import annotations
 
@@ -12,13 +12,12 @@ if TYPE_CHECKING:
     from soilml.physics.soils import SoilEntry
 
 FORMATS = ("table", "json")
-HELP = "list the published soils, or show one with its source"
 DESCRIPTION = """\
 List the catalogue of published soils. Values are in SI units; * marks a value
 that is not printed in the paper and is assumed.
 
-  soilml soils                      all soils, one line each
-  soilml soils wong1989/dry_sand    one soil, with its source and every value
+  soilml show soils                      all soils, one line each
+  soilml show soils wong1989/dry_sand    one soil, with its source and every value
 """
 
 
@@ -35,7 +34,8 @@ def run(args: argparse.Namespace) -> int:
     catalogue = soil_catalogue()
     if args.name is not None and args.name not in catalogue:
         raise InputError(
-            f"no soil {args.name!r}; {did_you_mean(args.name, catalogue)}`soilml soils` lists them"
+            f"no soil {args.name!r}; {did_you_mean(args.name, catalogue)}"
+            "`soilml show soils` lists them"
         )
     chosen = catalogue if args.name is None else {args.name: catalogue[args.name]}
     if args.json or args.format == "json":
@@ -48,7 +48,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _list(entries: list[SoilEntry]) -> str:
-    from soilml.io.text_tables import format_table
+    from soilml.report.aligned_text import format_table
 
     header = ("soil", "c kPa ", "phi deg ", "K mm ", "n ", "what")
     rows = []
@@ -58,10 +58,7 @@ def _list(entries: list[SoilEntry]) -> str:
             for field in ("cohesion", "friction_angle", "shear_modulus", "n")
         )
         rows.append((entry.name, *values, entry.text))
-    notes = (
-        "* not in the paper: assumed. `soilml soils NAME` has kc, kphi, and the source; "
-        "--format json all."
-    )
+    notes = "* not in the paper: assumed. `soilml show soils NAME` has kc, kphi, and the source."
     return f"{format_table(header, rows, last_left=True)}\n{notes}"
 
 
@@ -69,17 +66,17 @@ def _text(entry: SoilEntry, field: str) -> str:
     """The value of a parameter in the unit of a terminal."""
     from soilml.parameters import declared
     from soilml.physics.soils import Soil
-    from soilml.report.terminal import shown_unit, significant
+    from soilml.report.numbers import shown_unit, significant
 
     value = float(getattr(entry.soil, field))
     return significant(shown_unit(declared(Soil)[field].unit, value)[0] * value)
 
 
 def _one(entry: SoilEntry) -> str:
-    from soilml.io.text_tables import format_table
     from soilml.parameters import declared
     from soilml.physics.soils import Soil
-    from soilml.report.terminal import shown_unit, significant
+    from soilml.report.aligned_text import format_table
+    from soilml.report.numbers import shown_unit, significant
 
     rows = []
     for name, parameter in declared(Soil).items():

@@ -5,17 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import (
-    NumberFrom,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import add_output
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.systems.wheel_legs.resistive_force import LinearGround
 
 FORMATS = ("table", "csv", "json")
-HELP = "a wheel-leg walking over soft ground: slip, sinkage, torque"
 DESCRIPTION = """\
 Simulate wheel-legs by resistive-force theory (Li, Zhang and Goldman 2013; Comin
 and Saaj 2017, eqs. 4 to 11), at every combination of feet, numbers of legs,
@@ -43,7 +40,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--legs", default="5", help="numbers of legs, 1 to 6 (default: 5)")
     parser.add_argument("--ground", metavar="A,B,...", help="soils of table I (default: all four)")
     parser.add_argument("--stiffness", help="stiffnesses in N/m^3, in place of --ground")
-    parser.add_argument("--slip", help="commanded slips; without it the wheel rolls freely")
+    parser.add_argument(
+        "--slip", metavar="S,...", help="commanded slips; without it the wheel rolls freely"
+    )
     parser.add_argument("--offset", action="store_true", help="with the stress at the surface")
     parser.add_argument(
         "--mass", type=NumberFrom(0.01, 1e5, "kg"), metavar="KG", help="carried (default: 3.75 kg)"
@@ -52,7 +51,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--angular-speed", dest="speed", type=spin, metavar="RAD_S", help="default: 0.3 rad/s"
     )
-    parser.add_argument("--speed", type=spin, help=argparse.SUPPRESS)
     add_output(parser, "--over-time", "FILE.csv", "write the motion of the last turn")
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
     add_output(
@@ -67,10 +65,10 @@ def run(args: argparse.Namespace) -> int:
     """Simulate the walks and write the tables."""
     import numpy as np
 
-    from soilml.cli.options import parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.output import tell, write_columns
     from soilml.cli.progress import working
-    from soilml.systems.wheel_legs.walk_tables import walk_tables
+    from soilml.systems.wheel_legs.gaits import walk_tables
 
     feet = parse_names(args.foot) or []
     counts = parse_numbers("--legs", args.legs)
@@ -86,9 +84,9 @@ def run(args: argparse.Namespace) -> int:
     changes = {name: value for name, value in given.items() if value is not None}
     with working("simulating the walks"):
         found = walk_tables(feet, counts.astype(int).tolist(), _grounds(args), slips, **changes)
-    panels = None if args.picture is None else found.panels
+    drawn = None if args.picture is None else found.picture
     more = {} if args.over_time is None else {args.over_time: found.motion}
-    write_columns(found.columns, args.out, args.picture, panels, more)
+    write_columns(found.columns, args.out, args.picture, drawn, more)
     status = np.asarray(found.columns["status"])
     for reason in dict.fromkeys(status[status != "ok"].tolist()):
         tell(f"{np.sum(status == reason)} of {status.size} walks: {reason}")
@@ -99,7 +97,7 @@ def _grounds(args: argparse.Namespace) -> dict[str, LinearGround]:
     """The grounds of --ground or --stiffness, by name."""
     from dataclasses import replace
 
-    from soilml.cli.options import parse_names, parse_numbers
+    from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
 
     if args.stiffness is not None:

@@ -3,37 +3,37 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    InputFile,
-    NumberFrom,
-    add_by_option,
-    add_ignore_extra_option,
-    add_output,
-)
+from soilml.cli.option_values import NumberFrom
+from soilml.cli.options import InputFile, add_by_option, add_ignore_extra_option, add_output
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
-    from soilml.report.parameter_figure import ParameterIntervals
 
 FORMATS = ("table", "csv", "json")
-HELP = "soil, or slip, from torque, vibration and sinkage of a wheel-leg"
 DESCRIPTION = """\
 Estimate friction angle and normal stiffness (the stress 1 cm deep) of one soil
-from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print.
+from the strides of a wheel-leg, by the relations that Comin and Saaj 2017 print,
+and what they mean for a heavy rover that is to follow.
 
   soilml paper wheel-leg STRIDES.csv
   soilml paper wheel-leg STRIDES.csv --by run --torque-model empirical --out soil.csv
 
 STRIDES.csv has a row for each stride: run, slip, and one or more of torque_Nm
 (at midstance), vibration_m_s2 (largest acceleration after it) and sinkage_m
-(at midstance); blank where not measured. Each sensor has an estimate, with a
-standard deviation, and `fused` is that of all by the weights of eq. 30. Standard
-deviations include the error that all strides on a soil share, as large as on
-the four soils of the source (table VIII): more strides do not lessen it.
+(at midstance); blank where not measured. `soilml import` makes it from a log.
+Each sensor has an estimate, with a standard deviation, and `fused` is that of
+all by the weights of eq. 30. Standard deviations include the error that all
+strides on a soil share, as large as on the four soils of the source (table
+VIII): more strides do not lessen it.
+
+The last row of each soil has k_phi and the pull efficiency of a wheel of a
+300 kg rover (eq. 32) with its class: non-trafficable, unsafe from 35 %, safe
+from 50 %, trafficable from 65 %. Strides show neither n nor cohesion nor shear
+modulus: these are uniform over the four soils of the source, unless --assume
+has them. --wheel has another wheel.
 
 On a known soil the same relations give the slip of each stride:
 
@@ -44,11 +44,8 @@ with that of torque and vibration, and `slip`, fused by eq. 26. A column slip of
 STRIDES.csv is then passed on as slip_measured.
 
 The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
-another train a file on its strides: soilml train slip_torque. --sinkage-model
-walks fits those of the sinkage to simulated walks (soilml paper walk), which the
-printed ones do not agree with.
+another train a file on its strides: soilml train slip_torque.
 """
-QUANTITIES = ("friction_angle_rad", "normal_stiffness_Pa")
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
 
 
@@ -70,10 +67,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="planar, or linear (default), which needs one stride",
     )
     parser.add_argument(
-        "--sinkage-model",
-        choices=("printed", "walks"),
-        default="printed",
-        help="relations as printed (default), or fitted to simulated walks",
+        "--assume",
+        metavar="NAME=VALUE,...",
+        help="n, cohesion (Pa) or shear_modulus (m) of the soil, where they are known",
+    )
+    parser.add_argument(
+        "--wheel",
+        metavar="R,B,N",
+        help="radius and width (m) and load (N) of the heavy rover's wheel "
+        "(default: 0.15,0.18,490.5)",
     )
     parser.add_argument(
         "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
@@ -117,8 +119,8 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     import numpy as np
 
     from soilml.cli.output import tell, write_columns
-    from soilml.report.column_panels import ColumnPanels
-    from soilml.systems.wheel_legs.slip_of_strides import slip_of_strides
+    from soilml.report.column_figure import column_picture
+    from soilml.systems.wheel_legs import slip_of_strides
 
     sensors = {
         SENSORS[name]: table[name] for name in ("torque_Nm", "vibration_m_s2") if name in table
@@ -130,7 +132,7 @@ def _slip(args: argparse.Namespace, table: Table) -> int:
     columns |= {"slip": found.fused, "slip_std": found.fused_std, "in_range": found.in_range}
     numbered = {**columns, "stride": np.arange(1, len(table) + 1)}
     panel = tuple(name for name in columns if name.startswith("slip") and not name.endswith("_std"))
-    write_columns(columns, args.out, args.picture, ColumnPanels(numbered, "stride", [panel]))
+    write_columns(columns, args.out, args.picture, column_picture(numbered, "stride", [panel]))
     outside = int(np.count_nonzero(~found.in_range & np.isfinite(found.fused)))
     if outside:
         tell(f"{outside} of {len(table)} slips are outside of the 0 to 0.5 of the relations")
@@ -141,8 +143,8 @@ def _known_soil(text: str) -> tuple[float, float]:
     """Friction angle (rad) and stiffness 1 cm deep (Pa) of `--known`."""
     import math
 
-    from soilml.cli.options import parse_numbers
-    from soilml.systems.wheel_legs.resistive_force import GROUNDS
+    from soilml.cli.option_values import parse_numbers
+    from soilml.systems.wheel_legs import GROUNDS
 
     if text.upper() in GROUNDS:
         ground = GROUNDS[text.upper()]
@@ -160,61 +162,48 @@ def _known_soil(text: str) -> tuple[float, float]:
 
 
 def _soil(args: argparse.Namespace, table: Table) -> int:
-    """The soil by each sensor, and fused."""
-    from soilml.cli.output import tell, write_columns
-    from soilml.cli.tables import result_by_group, tell_failures
-    from soilml.systems.wheel_legs.sinkage_fit import (
-        PRINTED_SINKAGE,
-        fit_simulated_sinkage,
-        simulate_sinkage,
-    )
-    from soilml.systems.wheel_legs.soil_of_strides import StrideSoil, soil_of_strides
+    """The soil by each sensor and fused, and what it means for a heavy rover."""
+    from soilml.cli.output import write_rows
+    from soilml.cli.tables import result_by_group
+    from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
+    from soilml.systems.wheel_legs.strides import stride_report
 
-    walks = args.sinkage_model == "walks"
-    relations = fit_simulated_sinkage(simulate_sinkage()) if walks else PRINTED_SINKAGE
+    heavy = _heavy(args)
 
-    def estimate(rows: Table) -> StrideSoil:
+    def estimate(rows: Table) -> tuple[StrideSoil, Mobility]:
         readings = {sensor: rows[name] for name, sensor in SENSORS.items() if name in rows}
-        return soil_of_strides(rows["slip"], readings, sinkage_model=relations, **_options(args))
+        soil = soil_of_strides(rows["slip"], readings, **_options(args))
+        return soil, mobility(soil, **heavy)
 
     found, failed = result_by_group(args, table, "estimating", estimate)
-    columns: dict[str, list[object]] = {args.by: []} if args.by else {}
-    keys = [f"{name}{std}" for name in QUANTITIES for std in ("", "_std")]
-    columns |= {name: [] for name in ("sensor", *keys, "strides")}
-    for name, one in found.items():
-        head = f"{args.by} {name}: " if args.by else ""
-        for k, sensor in enumerate(one.sensors):
-            (angle, stiffness), (angle_std, stiffness_std) = one.mean[k], one.std[k]
-            row = (sensor, angle, angle_std, stiffness, stiffness_std, one.strides[k])
-            for key, value in zip(columns, (*((name,) if args.by else ()), *row), strict=True):
-                columns[key].append(value)
-        for sensor, why in one.unused.items():
-            tell(f"{head}no estimate from {sensor}: {why}")
-        if not one.in_range:
-            ends = f"{1e3 * relations.shallowest:.0f} to {1e3 * relations.deepest:.0f} mm"
-            tell(f"{head}the mean sinkage is outside of the {ends} of its relation")
-    write_columns(columns, args.out, args.picture, _intervals(args.by, columns))
-    tell_failures(args.by, failed)
+    report, rows = stride_report(found, failed, args.by)
+    write_rows(report, rows, args.out, args.picture)
     return 0
 
 
-def _intervals(by: str | None, columns: Mapping[str, list[Any]]) -> ParameterIntervals:
-    """Angle and stiffness by sensor, with their 90 % intervals."""
-    import numpy as np
+def _heavy(args: argparse.Namespace) -> dict[str, Any]:
+    """Arguments of `mobility` by --assume and --wheel."""
+    from soilml.cli.option_values import parse_numbers
+    from soilml.io.cell_text import read_number
+    from soilml.physics.gears import Wheel
+    from soilml.physics.operating_point import Operating
+    from soilml.systems.wheel_legs.strides import UNKNOWN
 
-    from soilml.quantities import Z_90
-    from soilml.report.parameter_figure import ParameterIntervals
-
-    groups = [f"{name}: " for name in columns[by]] if by else [""] * len(columns["sensor"])
-    value, std = (np.stack([columns[f"{n}{end}"] for n in QUANTITIES], -1) for end in ("", "_std"))
-    unknown = np.full(2, np.nan)
-    return ParameterIntervals(
-        names=("friction_angle", "normal_stiffness"),
-        units=("rad", "Pa"),
-        labels=[head + sensor for head, sensor in zip(groups, columns["sensor"], strict=True)],
-        values=value,
-        low=value - Z_90 * std,
-        high=value + Z_90 * std,
-        prior_low=unknown,
-        prior_high=unknown,
-    )
+    found: dict[str, Any] = {}
+    if args.assume is not None:
+        pairs = [part.partition("=")[::2] for part in args.assume.split(",")]
+        try:
+            found["known"] = {name.strip(): read_number(value.strip()) for name, value in pairs}
+        except ValueError:
+            found["known"] = {"": 0.0}
+        if found["known"].keys() - UNKNOWN.keys():
+            raise InputError(
+                f"--assume is {args.assume!r}; needed are {', '.join(UNKNOWN)}, such as n=0.7"
+            )
+    if args.wheel is not None:
+        sizes = parse_numbers("--wheel", args.wheel).tolist()
+        if len(sizes) != 3 or min(sizes) <= 0.0:
+            raise InputError(f"--wheel is {args.wheel!r}; needed are radius, width and load")
+        found["wheel"] = Wheel(radius=sizes[0], width=sizes[1])
+        found["at"] = Operating(slip=0.2, load=sizes[2])
+    return found

@@ -27,10 +27,10 @@ from soilml.io.read_table import Rows, as_table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.remarks import Remark
-from soilml.report.figure_style import AFTER, UNCHANGED, take_axes
+from soilml.results import Result
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+    from soilml.report.report import Report
 
 
 #: Largest difference, in sigma of a reading, of two signatures that count as equal.
@@ -48,8 +48,8 @@ class AddedRun:
     cost: float | None = None
 
 
-@dataclass(frozen=True)
-class Audit:
+@dataclass(frozen=True, repr=False)
+class Audit(Result):
     """The identifiability audit of a design, made by `soilml.gap.audit`.
 
     Attributes
@@ -69,13 +69,17 @@ class Audit:
     untestable: dict[str, Remark]
     added_runs: tuple[AddedRun, ...]
 
-    def plot(self, ax: Any = None) -> Any:
-        """Draw what is left of each effect beside the soil, and what separates it, in sigma.
+    def report(self) -> Report:
+        """Which effects could be named, and the runs that would add most."""
+        from soilml.gap.design.audit_report import audit_report
 
-        `ax`: axes of matplotlib; by default those of a new figure. Returns the axes. Raises
-        `InputError` for several axes.
-        """
-        return plot_audit(self, ax)
+        return audit_report(self, NAMEABLE_SIGMA)
+
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each effect: size and unit, signals in sigma, and whether it could be named."""
+        names = ["name", "nameable", "size", "unit", "residual_signal", "separating_snr"]
+        names += ["detectable_size", "absorbed"]
+        return {key: [getattr(e, key) for e in self.effects] for key in names}
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml plan effects --out` writes."""
@@ -137,7 +141,7 @@ def audit(
     >>> e.name, e.separating_snr > 3.0, round(e.absorbed, 3)
     ('slip-sinkage', True, 0.121)
     """
-    case = case.without_suspected()
+    case = case.without_explanations()
     effects = candidate_effects(case, effects)
     known_costs = check_costs(costs or {})
     design, _ = answered_rows(as_table(design))
@@ -328,24 +332,3 @@ def _whitened(signatures: Sequence[Signature], std: Floats, rows: int) -> Floats
     columns = np.zeros((rows, len(signatures)))
     columns[: len(std)] = np.stack([s.column for s in signatures], axis=1) / std[:, None]
     return columns
-
-
-def plot_audit(found: Audit, ax: Any) -> Axes:
-    """Draw the bars into axes; see `Audit.plot`."""
-    effects = found.effects
-    axes: Axes = take_axes(ax, 1, 1, (5.6, 1.0 + 0.34 * max(len(effects), 1)))[0, 0]
-    y = np.arange(len(effects))
-    left = [e.residual_signal for e in effects]
-    apart = [e.separating_snr for e in effects]
-    axes.barh(y - 0.19, left, 0.36, color=UNCHANGED, label="that the soil cannot imitate")
-    axes.barh(y + 0.19, apart, 0.36, color=AFTER, label="that separates it from its nearest rival")
-    axes.axvline(NAMEABLE_SIGMA, color="black", lw=1.2)
-    axes.set_xscale("symlog", linthresh=1.0)
-    axes.set_xlim(left=0.0)
-    axes.xaxis.set_major_formatter("{x:g}")
-    axes.set_yticks(y, [e.name for e in effects])
-    axes.set_ylim(len(effects) - 0.5, -0.5)
-    axes.set_xlabel(f"signal at the reference size (σ); line: {NAMEABLE_SIGMA:g} σ name an effect")
-    if effects:
-        axes.legend(fontsize=8, loc="lower right")  # the best separated stand above
-    return axes

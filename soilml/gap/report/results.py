@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError
+from soilml.fitting.fitted_readings import FittedReadings
 from soilml.gap.report.remainder_cause import RemainderCause
 from soilml.gap.report.soil_test_agreement import SoilTestAgreement, soil_test_agreement
 from soilml.remarks import Remark
-from soilml.report.numbers import format_log_density, format_residual
+from soilml.report.numbers import format_residual
 from soilml.results import EstimatedValue, Result
+
+if TYPE_CHECKING:
+    from soilml.report.report import Report
 
 #: Metadata of a field that gap.json does not have: it stands in another file.
 ELSEWHERE = {"json": False}
@@ -57,13 +59,6 @@ class Suspect:
     predictive_gain_error: float | None = None
     #: Sizes of its effects that are implausibly large, in usual ones, by name
     times_usual: dict[str, float] = field(default_factory=dict)
-
-    @property
-    def prediction(self) -> str:
-        """The predictive gain with its standard error, for tables; empty where none is known."""
-        if self.predictive_gain is None:
-            return ""
-        return format_log_density(self.predictive_gain, self.predictive_gain_error)
 
 
 @dataclass(frozen=True)
@@ -174,22 +169,6 @@ class SoilTrend:
     change: float
 
 
-@dataclass(frozen=True)
-class ReadingsAndPredictions:
-    """Readings (m,) with the predictions before and after, for figures."""
-
-    channels: tuple[str, ...]
-    channel: NDArray[np.int64]
-    run: tuple[str, ...]  # of each reading
-    slip: Floats
-    load: Floats
-    measured: Floats
-    std: Floats
-    before: Floats
-    after: Floats
-    after_std: Floats
-
-
 #: Status of a report, and its meaning.
 STATUSES = {
     "no-gap": "model and measurements agree within the noise",
@@ -218,8 +197,8 @@ class GapReport(Result):
     lines : tuple of Remark
         At most five below it: what was tried, what is left and where, what to drive next.
     model : Case
-        The fitted model. It contains the effects that are claimed, or those of the first suspect
-        where its `predictive_gain` is above zero; `model.suspected` names the latter.
+        The fitted model, with the effects that are claimed where they are the whole answer. Else it
+        has `explanations` with their weights, and predicts by their mixture.
     effects : tuple of NamedEffect
         The effects that were added.
     cause_set : tuple of tuple of str
@@ -303,18 +282,13 @@ class GapReport(Result):
     gap_probability: float = 0.0
     remainder_probability: float = 0.0
     seed: int = 0
-    curves: ReadingsAndPredictions | None = field(default=None, metadata=ELSEWHERE)
+    curves: FittedReadings | None = field(default=None, metadata=ELSEWHERE)
 
-    def plot(self, ax: Any = None, part: str = "train") -> Any:
-        """Draw the mean squared residuals of all readings and of each channel, before and after.
+    def report(self) -> Report:
+        """Verdict, soil and effects, readings beside the model, where it disagrees, and by what."""
+        from soilml.gap.report.report import gap_report
 
-        `ax`: axes of matplotlib; a new figure where None. `part`: a key of `gap`: the fitted rows
-        (`train`), or a held-out part. Returns the axes. Raises `InputError` for a part that the
-        report does not have, or several axes.
-        """
-        from soilml.gap.report.gap_figure import plot_gap
-
-        return plot_gap(self.gap, ax, part)
+        return gap_report(self)
 
     def __getitem__(self, name: str) -> EstimatedValue:
         """A parameter of the soil after, or of an effect by EFFECT.PARAMETER.
@@ -330,10 +304,6 @@ class GapReport(Result):
         """Parameters of the soil after, and of the effects that were added."""
         added = {f"{e.name}.{k}": v for e in self.effects for k, v in e.parameters.items()}
         return {**(self.soil_after or self.soil_before), **added}
-
-    def summary(self) -> str:
-        """The verdict, then at most five lines."""
-        return "\n".join([self.sentence, *(line.text for line in self.lines)])
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each parameter, SI units; `_before` is that of the soil alone."""

@@ -29,8 +29,8 @@ from soilml.report.numbers import (
     decimal,
     format_probability,
     format_residual,
+    shown_unit,
 )
-from soilml.report.terminal import shown_unit
 
 #: Why nothing is named where the evidence for the suspects is weak.
 NOT_DECISIVE = Remark("not-decisive", "the evidence is not decisive beside the model's usual error")
@@ -84,15 +84,15 @@ def headline(report: GapReport) -> str:
             first = report.suspects[0] if report.suspects else None
             names = " + ".join(report.best_unclaimed or (first.effects if first else ()))
             sure = f" ({_probability(first)})" if first else ""
-            return f"A gap of uncertain cause: {_first(report)} {names}{sure}{_shrinks(report)}."
+            return f"Cause not certain: {_first(report)} {names}{sure}{_shrinks(report)}."
     names = " + ".join(e.name for e in report.effects)
     sure = _sure(report)
     if report.status == "class":
         return _one_of_several(report, names, sure)
     if report.status == "partly-named":
-        return f"{names} explains a part of the gap{sure}{_shrinks(report)}."
+        return f"Missing effect, among others: {names}{sure}{_shrinks(report)}."
     law = ", by another law than the catalogue's" if report.status == "form-open" else ""
-    return f"{names} explains the gap{law}{sure}{_shrinks(report)}."
+    return f"Missing effect: {names}{law}{sure}{_shrinks(report)}."
 
 
 def _one_of_several(report: GapReport, names: str, sure: str) -> str:
@@ -101,7 +101,7 @@ def _one_of_several(report: GapReport, names: str, sure: str) -> str:
     chance = min((e.probability for e in report.effects), default=1.0)
     if chance < UNLIKELY_SUSPECT:
         return f"No effect is likely; the first of {count} explanations is {names}{sure}{end}."
-    begin = f"The cause may be {names}, the likeliest of {count} explanations{sure}"
+    begin = f"Missing effect: one of {count} explanations, likeliest {names}{sure}"
     first = report.suspects[0] if report.suspects else None
     parts = {name for own in report.cause_set for name in own}
     if first and first.probability > chance and not parts & set(first.effects):
@@ -151,7 +151,7 @@ def _no_gap(report: GapReport) -> str:
             f"Model and measurements agree within the noise{declared}: mean squared residual "
             f"{residual}, {p}"
         )
-    return f"No gap beyond noise{beside}, granting the soil {_scatter(report.misfit)}: {p}"
+    return f"No gap beyond noise{beside}, with {_scatter(report.misfit)}: {p}"
 
 
 def _scatter(found: NoiseAgreement) -> str:
@@ -292,7 +292,7 @@ _NOT_SUPPORTED_BY = {
     "suspected": [
         (
             "cause",
-            "any cause: an effect that model.toml marks as suspected predicts, and is not named",
+            "any cause: model.toml predicts by a mixture of the explanations",
         )
     ],
 }

@@ -11,35 +11,13 @@ from soilml.fitting.least_squares import Solution
 from soilml.gap.evidence.held_out import PredictiveGain
 from soilml.gap.report.results import Suspect
 from soilml.gap.report.sentences import NOT_DECISIVE
-from soilml.inference.constants import LARGEST_SIZE
+from soilml.inference import constants
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
 from soilml.quantities import column
 from soilml.remarks import Remark
 
-#: Probability of no gap from which none is stated: more likely than not.
-NO_GAP = 0.5
-#: Probability, causes outside the catalogue included, from which a single explanation is named.
-NAMED_PROBABILITY = 0.9
-#: Probability that no effect is present from which none is claimed, and from which no class is.
-UNCERTAIN, CHANCE = 0.2, 0.05
-#: The same up to which suspects are named all the same where runs cannot name a cause.
-HOPELESS = 0.8
-#: Odds against the likeliest set below which another one is rejected, and probability below which
-#: a set is no suspect.
-REJECTED, LEAST_SUSPECTED = 0.03, 0.005
-#: Probability that the members of a class hold together; else no cause is stated.
-CLASS_PROBABILITY = 0.5
-#: Amplitude of a remaining discrepancy, in usual ones, beside which nothing is named: 8 % of a
-#: range.
-LARGE_REMAINDER = 4.0
-#: Size of a sensor's or the rig's fault, in prior standard deviations, above which it explains
-#: nothing: a gain error of 24 % without calibration.
-MAX_SIZE_DEVIATION = 4.0
 LISTED_SUSPECTS = 8  # Suspects that are listed
-#: Difference of the predictions of two laws, as a fraction of a channel's range, below which the
-#: law does not matter: that of a usual model error.
-NEGLIGIBLE_FRACTION = 0.02
 #: Code of the reason that the soil alone explains the rows where its priors are opened.
 OUTSIDE_PRIORS = "soil-outside-priors"
 #: Why an explanation that the evidence supports is not claimed.
@@ -105,7 +83,7 @@ def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, 
     if not ranked:
         return ()
     sets, first = posterior.sets, ranked[0]
-    least = REJECTED * max(sets[names] for names in ranked)
+    least = constants.REJECTED * max(sets[names] for names in ranked)
     kept = [n for n in ranked[1:] if sets[n] >= least and not set(first) < set(n)]
     kept = [first, *kept]
     return tuple(n for n in kept if not any(set(other) < set(n) for other in kept))
@@ -124,14 +102,14 @@ def decide(
     disagreements: Measurements that disagree with each other, which forbid a verdict without a gap.
     """
     none = posterior.no_effect
-    if posterior.no_gap > NO_GAP:
+    if posterior.no_gap > constants.NO_GAP:
         return Decision("undecided" if disagreements else "no-gap")
     ranked = ranked_sets(posterior)
     chance = posterior.probability(*ranked[0]) if ranked else 0.0
-    if _is_other_soil(posterior) and none > max(UNCERTAIN, chance):
+    if _is_other_soil(posterior) and none > max(constants.UNCERTAIN, chance):
         return Decision("undecided")
-    hopeless = HOPELESS if obstacles else 0.0
-    if not ranked or (none > UNCERTAIN and none > max(chance, hopeless)):
+    hopeless = constants.HOPELESS if obstacles else 0.0
+    if not ranked or (none > constants.UNCERTAIN and none > max(chance, hopeless)):
         return Decision("not-testable" if obstacles else "unknown")
     listed = not_rejected(posterior, ranked)
     best = listed[0]
@@ -142,19 +120,19 @@ def decide(
         return suspected
     if reason := _doubt(posterior, node, gains.get(best)):
         return replace(suspected, reason=reason)
-    if none > UNCERTAIN:
+    if none > constants.UNCERTAIN:
         return replace(suspected, reason=NOT_DECISIVE)
-    if chance >= NAMED_PROBABILITY and (unchecked := _unchecked_faults(posterior, best)):
+    if chance >= constants.NAMED_PROBABILITY and (unchecked := _unchecked_faults(posterior, best)):
         text = UNCHECKED_FAULT.format(" + ".join(unchecked))
         return replace(suspected, reason=Remark("unchecked-fault", text, unchecked))
-    if chance >= NAMED_PROBABILITY:
+    if chance >= constants.NAMED_PROBABILITY:
         if node.share_without < 0.5:
             return Decision("partly-named", (best,), listed[:1], node)
         if node.hypothesis.free_law and law_matters(posterior, node):
             return Decision("form-open", (best,), listed[:1], node)
         return Decision("named", (best,), listed[:1], node)
     together = sum(posterior.sets[names] for names in listed)
-    if none <= CHANCE and len(listed) > 1 and together >= CLASS_PROBABILITY:
+    if none <= constants.CHANCE and len(listed) > 1 and together >= constants.CLASS_PROBABILITY:
         return Decision("class", listed, listed, node)
     return replace(suspected, reason=NOT_DECISIVE)
 
@@ -176,7 +154,7 @@ def _doubt(posterior: Posterior, node: Explanation, gain: PredictiveGain | None)
     if gain is not None and not gain.is_better:
         return Remark("not-predictive", NOT_PREDICTIVE.format(text), names)
     amplitude = posterior.terms.amplitude(node.at)
-    if amplitude.max(initial=0.0) >= LARGE_REMAINDER:
+    if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
         left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
         text = NOT_CATALOGUED.format(text, left.replace("_", " "))
         return Remark("not-catalogued", text, (*names, column(left)))
@@ -202,7 +180,7 @@ def implausible_faults(fit: Solution) -> tuple[str, ...]:
     return tuple(
         c.effect
         for c, d in zip(fit.coordinates, deviation, strict=True)
-        if c.effect and not c.is_shape and d > MAX_SIZE_DEVIATION
+        if c.effect and not c.is_shape and d > constants.MAX_SIZE_DEVIATION
     )
 
 
@@ -211,7 +189,7 @@ def implausible_sizes(fit: Solution) -> dict[str, float]:
     return {
         c.effect: float(abs(x))
         for c, x in zip(fit.coordinates, fit.x, strict=True)
-        if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > LARGEST_SIZE
+        if c.effect and not c.is_shape and np.isinf(c.std) and abs(x) > constants.LARGEST_SIZE
     }
 
 
@@ -221,7 +199,7 @@ def suspects(
     """Explanations with their odds against all others, the first one that is shown first."""
     ranked = ranked_sets(posterior)
     first = decision.listed[:1] or tuple(ranked[:1])
-    rest = [n for n in ranked if posterior.within(n) > LEAST_SUSPECTED]
+    rest = [n for n in ranked if posterior.within(n) > constants.LEAST_SUSPECTED]
     rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
@@ -262,27 +240,12 @@ def reasons(
     return (decision.reason,) if decision.reason else ()
 
 
-def predictive_suspect(decision: Decision, gains: Mapping[Names, PredictiveGain]) -> Names:
-    """The effects of the first suspect where it predicts rows kept back better than the soil alone.
-
-    Or of the likeliest of a class. What is wrong with a model and what predicts best are two
-    questions: this one is no name.
-    """
-    if decision.status == "class":
-        return decision.claimed[0]
-    if decision.status != "suspected" or decision.shown is None:
-        return ()
-    names = decision.shown.hypothesis.effects
-    gain = gains.get(names)
-    return names if gain is not None and gain.is_better else ()
-
-
 def law_matters(posterior: Posterior, node: Explanation) -> bool:
     """Whether the free law and the catalogue's differ in the measured range by more than matters.
 
     They differ if, in some channel, the root mean square difference of their predictions exceeds
     both the standard error of a mean over the readings of that channel and the range of the channel
-    times `NEGLIGIBLE_FRACTION`. Without a fit of the catalogue's law they do.
+    times `constants.NEGLIGIBLE_FRACTION`. Without a fit of the catalogue's law they do.
     """
     readings, own = posterior.terms.readings, node.hypothesis
     catalogue = posterior.search.nodes.get(replace(own, free_law=False))
@@ -295,6 +258,6 @@ def law_matters(posterior: Posterior, node: Explanation) -> bool:
         rms = float(np.sqrt(np.mean(difference[in_channel] ** 2)))
         mean_error = float(np.sqrt(np.mean(posterior.std[in_channel] ** 2) / values.size))
         span = max(float(values.max()), 0.0) - min(float(values.min()), 0.0)
-        if rms > max(mean_error, NEGLIGIBLE_FRACTION * span):
+        if rms > max(mean_error, constants.NEGLIGIBLE_FRACTION * span):
             return True
     return False

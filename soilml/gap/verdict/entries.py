@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from soilml.fitting.effect_signatures import effect_signatures
+from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.least_squares import Solution
 from soilml.gap.checks import ONE_LOAD
-from soilml.gap.evidence.held_out import PredictiveGain
 from soilml.gap.evidence.repeats import overstated_noise_notes
 from soilml.gap.evidence.similarity import SignatureSimilarity
 from soilml.gap.report.listed_explanations import SUSPECTS_IN_LINE
 from soilml.gap.report.results import (
     CandidateSummary,
     NamedEffect,
-    ReadingsAndPredictions,
     Suspect,
 )
 from soilml.gap.report.sentences import outliers_in_words
@@ -32,10 +31,10 @@ from soilml.gap.verdict.fit_notes import (
 from soilml.identification.fit import disagreeing_soil_tests
 from soilml.inference.constants import NEAR, SCATTER_UNITS
 from soilml.inference.explanation import Explanation
-from soilml.inference.posterior import Names, Posterior
+from soilml.inference.posterior import Posterior
 from soilml.quantities import column
-from soilml.remarks import Remark, texts
-from soilml.report.numbers import LEAST_STATED, format_log_density
+from soilml.remarks import Remark
+from soilml.report.numbers import LEAST_STATED
 
 LISTED_OUTLIERS = 6  # Outliers that a note lists by name
 NOTABLE_NOISE_SCALE = 1.25  # Factor on the declared noise above which a note is made
@@ -75,28 +74,6 @@ def candidate_summaries(posterior: Posterior, decision: Decision) -> list[Candid
             )
         )
     return summaries
-
-
-def prediction_notes(
-    names: Names, gains: Mapping[Names, PredictiveGain], not_reduced: Sequence[Remark]
-) -> list[Remark]:
-    """A note on effects that the model contains because they predict, or else on figures.
-
-    not_reduced: Figures that do not shrink without a remainder, which that note contains.
-    """
-    gain = gains.get(names)
-    if not names or gain is None:
-        return list(not_reduced)
-    how = "better" if gain.is_clearly_better else "no worse"
-    text = (
-        f"model.toml contains {' + '.join(names)}, which is suspected and not named. Beside a "
-        f"smooth remainder, it predicts rows kept back {how} than the soil alone does "
-        f"(ln density {format_log_density(gain.value, gain.std_error)})"
-    )
-    if not_reduced:
-        each = [f"{figure[:1].upper()}{figure[1:]}" for figure in texts(not_reduced)]
-        text = ". ".join([text, "Without a remainder it does not", *each])
-    return [Remark("suspect-predicts", text, tuple(names), "note")]
 
 
 def conditions_of_suspects(
@@ -186,7 +163,7 @@ def analysis_notes(
     if 1 < len(readings.runs) < FEW_RUNS:
         found = variance_component_entries(posterior)
         text = (
-            f"run-to-run variation of the soil is hardly told by fewer than {FEW_RUNS} runs. "
+            f"run-to-run variation of the soil is poorly known from fewer than {FEW_RUNS} runs. "
             f"Assumed are {np.degrees(found['friction_angle_std']):.2g} deg of friction angle and "
             f"{100.0 * found['bearing_std']:.2g} % of bearing strength, so mean squared residuals "
             "may be below 1"
@@ -227,11 +204,11 @@ def variance_component_entries(posterior: Posterior) -> dict[str, float]:
 
 def readings_and_predictions(
     posterior: Posterior, before: Solution, after: Solution
-) -> ReadingsAndPredictions:
+) -> FittedReadings:
     """Readings, predictions by the soil alone and by the fit shown, and standard deviations."""
     readings, jacobian = posterior.terms.readings, after.derivatives
     variance = np.einsum("ij,jk,ik->i", jacobian, after.covariance, jacobian)
-    return ReadingsAndPredictions(
+    return FittedReadings(
         channels=tuple(column(n) for n in readings.channels),
         channel=readings.channel,
         run=tuple(readings.runs[readings.run[r]] for r in readings.row),

@@ -7,15 +7,20 @@ from dataclasses import replace
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.config.explanations import CaseExplanation
 from soilml.config.measurement_noise import Discrepancy, unestimated_bias
 from soilml.config.remainder import Remainder
 from soilml.fitting.coordinates import rates_at
 from soilml.fitting.least_squares import Solution
+from soilml.gap.verdict.decision import Decision
+from soilml.gap.verdict.learned_remainder import learned_remainder
+from soilml.gap.verdict.remainder import discrepancy_amplitudes
+from soilml.inference import constants
 from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.numerics.prior import Prior
-from soilml.report.numbers import significant
+from soilml.report.numbers import round_significant
 from soilml.results import EstimatedValue
 
 PRIOR_HALF_WIDTH = 3.0  # Half width of the prior of an effect's size, in standard deviations
@@ -45,7 +50,7 @@ def updated_case(
     what the fit leaves and was learned; None keeps that of the case.
     """
     fit, stds = node.fit, stds_of(node)
-    values = {path: significant(v) for path, v in fit.values().items()}
+    values = {path: round_significant(v) for path, v in fit.values().items()}
     case = fit.case.with_values(values)
     prior = dict(fit.case.prior)
     bounds = {path: parameter for path, (parameter, _) in case.parameters().items()}
@@ -53,15 +58,15 @@ def updated_case(
         if not c.effect or c.is_shape:
             continue
         value, reach = values[c.path], PRIOR_HALF_WIDTH * stds[c.path]
-        lower = max(bounds[c.path].lower, significant(value - reach))
-        upper = min(bounds[c.path].upper, significant(value + reach))
+        lower = max(bounds[c.path].lower, round_significant(value - reach))
+        upper = min(bounds[c.path].upper, round_significant(value + reach))
         if lower < upper:
             prior[c.path] = Prior(lower, upper)
     remaining = dict(fit.case.discrepancy)
     if discrepancy is not None:
         declared = next(iter(remaining.values()), Discrepancy())
         remaining = {
-            name: replace(declared, share=0.0, constant=significant(std), learned=True)
+            name: replace(declared, share=0.0, constant=round_significant(std), learned=True)
             for name, std in discrepancy.items()
         }
     return replace(
@@ -72,6 +77,49 @@ def updated_case(
         bias=unestimated_bias(fit.case.bias, set(fit.effects)),
         remainder=case.remainder if remainder is None else remainder,
     )
+
+
+def whole_answer(posterior: Posterior, decision: Decision) -> Explanation | None:
+    """The only explanation of the returned model; None where it is a mixture of several.
+
+    Effects are the whole answer where they are claimed, the soil alone where that is as likely.
+    """
+    if decision.claimed and decision.status != "class":
+        return decision.shown
+    if posterior.no_effect > constants.NAMED_PROBABILITY:
+        return next(node for node in posterior.nodes if not node.hypothesis.effects)
+    return None
+
+
+def weighed_explanations(posterior: Posterior) -> list[tuple[float, Explanation]]:
+    """The likeliest explanations that together hold `constants.HELD`, with their probabilities."""
+    found: list[tuple[float, Explanation]] = []
+    for node in posterior.nodes:
+        if len(found) == constants.MOST_RETURNED or sum(w for w, _ in found) >= constants.HELD:
+            break
+        found.append((posterior.node_weight(node), node))
+    return found
+
+
+def returned_case(posterior: Posterior, whole: Explanation | None, seed: int) -> Case:
+    """What predicts: the case of the whole answer, else the mixture of all that is likely.
+
+    Of a mixture, the case itself has the mean soil and no effect; each explanation has its own.
+    The smooth remainder is that of the mixture.
+    """
+    parts = [(1.0, whole)] if whole is not None else weighed_explanations(posterior)
+    left = discrepancy_amplitudes(posterior, parts)
+    learned = learned_remainder(posterior, parts)
+    if whole is not None:
+        return updated_case(whole, left, learned)
+    alone = updated_case(posterior.soil, left, learned)
+    mean = {p: round_significant(m.mean) for p, m in posterior.soil_marginals(seed).items()}
+    each = []
+    for weight, node in parts:
+        own = updated_case(node)
+        each.append(CaseExplanation.of(round(weight, 4), own))
+    case = replace(alone, prior=dict(posterior.problem.case.prior), explanations=tuple(each))
+    return case.with_values(mean)
 
 
 def soil_before(fit: Solution) -> dict[str, EstimatedValue]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.config.remainder import MOST_POINTS, Remainder, RemainderPart
 from soilml.fitting.covariance import USUAL
@@ -27,8 +26,13 @@ LEAST_INFORMATION = 0.01
 DECIMALS = 5
 
 
-def learned_remainder(posterior: Posterior, node: Explanation) -> Remainder | None:
-    r"""Posterior of the remainder given the fit, at the amplitudes that its evidence supports.
+def learned_remainder(
+    posterior: Posterior, parts: Sequence[tuple[float, Explanation]]
+) -> Remainder | None:
+    r"""Posterior of the remainder beside weighted explanations, at the amplitudes they support.
+
+    Residuals are those of the mean prediction, squared amplitudes the mean ones; noise, scatter and
+    the uncertainty of soil and effects are those of the likeliest.
 
     With columns C of the functions at the readings, residuals r and the covariance V of noise and
     scatter, the weights of all channels are normal:
@@ -42,14 +46,22 @@ def learned_remainder(posterior: Posterior, node: Explanation) -> Remainder | No
     References: Rasmussen and Williams, Gaussian Processes for Machine Learning, 2006, eqs. 2.8 and
     2.11; Kennedy and O'Hagan, J. R. Statist. Soc. B 63(3), 2001.
     """
-    terms, at, case = posterior.terms, node.at, posterior.problem.case
-    blanks = _blank_parts(posterior, node)
+    terms, case, total = posterior.terms, posterior.problem.case, sum(w for w, _ in parts)
+    _, node = max(parts, key=lambda part: part[0])
+    size = np.sqrt(sum(w * terms.amplitude(one.at) ** 2 for w, one in parts) / total)
+    at = replace(
+        node.at,
+        log=np.append(np.log(np.maximum(size, 1e-9)), node.at.log[len(size) :]),
+        present=bool(size.any()),
+    )
+    blanks = _blank_parts(posterior, size, terms.std(node.at))
     if not blanks:
         return case.remainder
     columns = np.concatenate([own for _, own in blanks], axis=1)
     whiten = terms.whiten(terms.without_discrepancy(at), node.outliers)
     white = np.asarray(whiten @ columns)
-    residual = np.asarray(whiten @ node.linear.residual)
+    mean_residual = np.sum([w * one.linear.residual for w, one in parts], axis=0) / total
+    residual = np.asarray(whiten @ mean_residual)
     information = white.T @ white
     spread = np.linalg.inv(np.eye(len(information)) + information)
     mean = spread @ (white.T @ residual)
@@ -58,12 +70,12 @@ def learned_remainder(posterior: Posterior, node: Explanation) -> Remainder | No
     of_tests = fit.soil_tests.rates(fit.x)
     root = np.linalg.inv(np.linalg.cholesky(normal + of_tests.T @ of_tests)).T
     moved = spread @ (white.T @ (whiten @ fit.derivatives)) @ root
-    parts, first = [], 0
+    written, first = [], 0
     for blank, own in blanks:
         these = slice(first, first + own.shape[1])
         first = these.stop
         known = _factor(np.eye(own.shape[1]) - spread[these, these])
-        parts.append(
+        written.append(
             replace(
                 blank,
                 mean=tuple(mean[these].round(DECIMALS).tolist()),
@@ -72,23 +84,15 @@ def learned_remainder(posterior: Posterior, node: Explanation) -> Remainder | No
             )
         )
     earlier = () if case.remainder is None else case.remainder.parts
-    return Remainder((*earlier, *parts))
+    return Remainder((*earlier, *written))
 
 
-def without_learned_discrepancy(case: Case) -> Case:
-    """The case without the discrepancy that an earlier analysis learned.
-
-    A further one starts from the mean of the remainder, and finds anew how large an error is left.
-    """
-    known = [] if case.remainder is None else case.remainder.columns
-    left = {k: own for k, own in case.discrepancy.items() if not own.learned and k not in known}
-    return replace(case, discrepancy=left)
-
-
-def _blank_parts(posterior: Posterior, node: Explanation) -> list[tuple[RemainderPart, Floats]]:
+def _blank_parts(
+    posterior: Posterior, amplitude: Floats, std: Floats
+) -> list[tuple[RemainderPart, Floats]]:
     """Range and points of each channel and gear with a remainder, and columns (m, k) of it."""
     terms, case, found = posterior.terms, posterior.problem.case, []
-    readings, amplitude, std = terms.readings, terms.amplitude(node.at), terms.std(node.at)
+    readings = terms.readings
     gears = list(case.gears) or [""]
     driven = np.broadcast_to(
         np.asarray(gears[0] if readings.at.gear is None else readings.at.gear), len(readings.run)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from soilml.arrays import Floats
@@ -13,8 +15,7 @@ from soilml.inference.constants import INTERVAL_FACTOR
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Posterior
 from soilml.quantities import QUANTITIES, column
-from soilml.report.numbers import decimal
-from soilml.report.terminal import shown_unit
+from soilml.report.numbers import decimal, shown_unit
 
 #: Amplitude in usual ones below which no discrepancy of a channel is stated.
 LEAST_AMPLITUDE = 0.1
@@ -65,17 +66,21 @@ def _largest(values: Floats, slip: Floats, load: Floats, unit: str) -> str:
     )
 
 
-def discrepancy_amplitudes(posterior: Posterior, node: Explanation) -> dict[str, float]:
+def discrepancy_amplitudes(
+    posterior: Posterior, parts: Sequence[tuple[float, Explanation]]
+) -> dict[str, float]:
     """Standard deviation of the discrepancy of each channel, by column, in the column's unit.
 
-    Root mean square over its probability and that of its amplitude, with the factor of intervals;
-    a channel with hardly any is left out.
+    Root mean square over the weighted explanations, the probability that it is present and that of
+    its amplitude, with the factor of intervals; a channel with hardly any is left out.
     """
-    terms, at = posterior.terms, node.beside.at
-    curvature = node.linear.evaluate(at).curvature[: terms.channels]
-    spread = np.minimum(1.0 / np.maximum(curvature, 1e-9), MOST_LOG_VARIANCE)
-    present = np.sqrt(1.0 - node.share_without)
-    amplitude = INTERVAL_FACTOR * present * terms.amplitude(at) * np.exp(spread)
+    terms, square = posterior.terms, np.zeros(posterior.terms.channels)
+    for weight, node in parts:
+        at = node.beside.at
+        curvature = node.linear.evaluate(at).curvature[: terms.channels]
+        spread = np.minimum(1.0 / np.maximum(curvature, 1e-9), MOST_LOG_VARIANCE)
+        square += weight * (1.0 - node.share_without) * (terms.amplitude(at) * np.exp(spread)) ** 2
+    amplitude = INTERVAL_FACTOR * np.sqrt(square / sum(weight for weight, _ in parts))
     return {
         column(name): float(a * usual)
         for name, a, usual in zip(terms.readings.channels, amplitude, terms.usual, strict=True)

@@ -27,7 +27,7 @@ from soilml.io.read_table import Rows, as_table
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import SoilTest
 from soilml.remarks import Remark
-from soilml.report.numbers import significant
+from soilml.report.numbers import round_significant
 
 
 def bevameter(
@@ -91,7 +91,7 @@ def bevameter(
         soil, prior = soil | values, prior | priors
         remarks += [*shear_remarks(shear_fit), *notes]
         tests.append(strength_test(shear_fit))
-    soil = within_bounds({name: significant(value) for name, value in soil.items()})
+    soil = within_bounds({name: round_significant(value) for name, value in soil.items()})
     kept = tuple(test for test in tests if test is not None)
     return BevameterResult(plate_fit, shear_fit, soil, prior, tuple(remarks), kept)
 

@@ -3,27 +3,28 @@
 from __future__ import annotations
 
 import math
-import os
 from dataclasses import asdict, dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from soilml.identification.bevameter.plate_tests import PressureSinkageFit
 from soilml.identification.bevameter.scatter import SpreadEstimate
 from soilml.identification.bevameter.shear_tests import ShearFit
-from soilml.io.atomic_files import atomic_output
 from soilml.numerics.prior import Prior
 from soilml.physics.soils.soil_tests import SoilTest
 from soilml.remarks import Remark
-from soilml.report.figure_style import save_png, short_label, take_axes
+from soilml.report.figure_style import short_label
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
+from soilml.results import Result
 
 LISTED = 6  # Tests that a legend lists
 
 
-@dataclass(frozen=True)
-class BevameterResult:
+@dataclass(frozen=True, repr=False)
+class BevameterResult(Result):
     """What plate and shear tests say of a soil, made by `bevameter`.
 
     Attributes
@@ -56,24 +57,50 @@ class BevameterResult:
             found |= fit.estimates() if fit is not None else {}
         return found
 
-    def plot(self, ax: Any = None) -> NDArray[Any]:
-        """Draw pressure against sinkage, shear curves, and strengths with their line.
+    def report(self) -> Report:
+        """What the tests determine, with ranges, beside their curves."""
+        found = self.estimates()
+        values, units = [e.value for e in found.values()], [e.unit for e in found.values()]
+        mean = [e.mean_95 for e in found.values()]
+        place = [e.another_place_95 for e in found.values()]
+        columns = [
+            Column("parameter", list(found)),
+            Column("value", values, units, digits=3),
+            Column.of_ranges("95 % of the mean", mean, units, values),
+            Column.of_ranges("95 % elsewhere", place, units, values),
+        ]
+        count = sum(len(fit.tests) for fit in (self.plates, self.shear) if fit is not None)
+        names = ", ".join(name.replace("_", " ") for name in found)
+        open_ = self.shear is not None and self.shear.shear_modulus is None
+        verdict = f"{count} tests determine {names}."
+        size = (4.6 * _panels(self), 3.9)
+        return Report(
+            kind="bevameter",
+            verdict=verdict,
+            lines=["The shear modulus was not measured."] if open_ else [],
+            tables=[ReportTable("Soil by tests", columns, "Elsewhere: another place.")],
+            pictures=[
+                Picture(
+                    "Tests", partial(_draw, self), 1, _panels(self), size, verdict,
+                    "Dots: measured. Thin lines: fitted to each test. Thick lines: the result.",
+                )
+            ],
+            remarks=self.remarks,
+            title="Soil of plate and shear tests",
+        )  # fmt: skip
 
-        Dots are measured, thin lines fitted to each test, thick lines the law of the result.
-
-        `ax`: axes of matplotlib: one for plate tests, one for shear curves and one for strengths;
-        by default a new figure. Returns the axes, (panels,). Raises `InputError` for another number
-        of axes.
-        """
-        axes = take_axes(ax, 1, _panels(self), _size(self))[0]
-        panels = list(axes)
-        if self.plates is not None:
-            _draw_plates(panels.pop(0), self.plates)
-        if self.shear is not None:
-            if _has_curves(self):
-                _draw_curves(panels.pop(0), self.shear)
-            _draw_strengths(panels.pop(0), self.shear)
-        return np.asarray(axes)
+    def frame_columns(self) -> dict[str, Any]:
+        """A row for each parameter: value, unit, 95 % of the mean and at another place."""
+        found = self.estimates()
+        return {
+            "parameter": list(found),
+            "value": [e.value for e in found.values()],
+            "unit": [e.unit for e in found.values()],
+        } | {
+            f"{name}_{end}": [getattr(e, f"{name}_95")[i] for e in found.values()]
+            for name in ("mean", "another_place")
+            for i, end in enumerate(("p025", "p975"))
+        }
 
     def as_json(self) -> dict[str, Any]:
         """The content of the file that `soilml bevameter --json` writes."""
@@ -114,10 +141,15 @@ def _shear_entries(fit: ShearFit) -> list[dict[str, Any]]:
     ]
 
 
-def save_picture(path: str | os.PathLike[str], result: BevameterResult) -> None:
-    """Write `BevameterResult.plot` to a PNG file."""
-    with atomic_output(path) as part:
-        save_png(result.plot, 1, _panels(result), _size(result), part)
+def _draw(result: BevameterResult, axes: Any) -> None:
+    """Draw pressure against sinkage, shear curves, and strengths with their line."""
+    panels = list(np.ravel(axes))
+    if result.plates is not None:
+        _draw_plates(panels.pop(0), result.plates)
+    if result.shear is not None:
+        if _has_curves(result):
+            _draw_curves(panels.pop(0), result.shear)
+        _draw_strengths(panels.pop(0), result.shear)
 
 
 def _panels(result: BevameterResult) -> int:
@@ -126,10 +158,6 @@ def _panels(result: BevameterResult) -> int:
 
 def _has_curves(result: BevameterResult) -> bool:
     return result.shear is not None and any(test.has_curve for test in result.shear.tests)
-
-
-def _size(result: BevameterResult) -> tuple[float, float]:
-    return 4.6 * _panels(result), 3.9
 
 
 def _draw_plates(panel: Any, fit: PressureSinkageFit) -> None:
@@ -185,6 +213,5 @@ def _draw_strengths(panel: Any, fit: ShearFit) -> None:
 
 
 def _finish(panel: Any, tests: int) -> None:
-    panel.grid(alpha=0.3)
     if tests <= LISTED:
-        panel.legend(fontsize=8)
+        panel.legend()

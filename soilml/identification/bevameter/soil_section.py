@@ -19,7 +19,7 @@ from soilml.parameters import declared
 from soilml.physics.soils import Soil
 from soilml.physics.soils.soil_tests import PlatePressure, ShearStrength
 from soilml.remarks import Remark, texts
-from soilml.report.numbers import significant
+from soilml.report.numbers import round_significant
 
 #: Soil parameters that plates determine, and those that shear tests determine.
 BEARING, SHEARING = ("kc", "kphi", "n"), ("cohesion", "friction_angle", "shear_modulus")
@@ -134,7 +134,7 @@ def _prior(name: str, value: float, span: tuple[float, float]) -> Prior:
     lower = min(max(lower, bounds.lower), bounds.upper - least)
     upper = max(min(upper, bounds.upper), lower + least)
     log = 0.0 < LOG_FACTOR * lower <= upper
-    return Prior(significant(lower), significant(upper), log=log)
+    return Prior(round_significant(lower), round_significant(upper), log=log)
 
 
 def pressure_test(fit: PressureSinkageFit, case: Case | None) -> PlatePressure | None:
@@ -156,9 +156,9 @@ def pressure_test(fit: PressureSinkageFit, case: Case | None) -> PlatePressure |
     if scatter is None:
         return None
     return PlatePressure(
-        plate_width=significant(width),
-        sinkage=significant(fit.depth),
-        pressure=significant(pressure.value),
+        plate_width=round_significant(width),
+        sinkage=round_significant(fit.depth),
+        pressure=round_significant(pressure.value),
         scatter=scatter,
     )
 
@@ -170,7 +170,9 @@ def strength_test(fit: ShearFit) -> ShearStrength | None:
         return None
     stress = float(np.mean([test.normal_stress for test in fit.tests]))
     return ShearStrength(
-        normal_stress=significant(stress), strength=significant(fit.strength.value), scatter=scatter
+        normal_stress=round_significant(stress),
+        strength=round_significant(fit.strength.value),
+        scatter=scatter,
     )
 
 
@@ -179,7 +181,7 @@ def _scatter(estimate: SpreadEstimate) -> float | None:
     low, high = estimate.another_place_95
     if not 0.0 < low < estimate.value < high:
         return None
-    return significant(max(math.log(high / low) / (2.0 * Z_95), LEAST_SCATTER), 2)
+    return round_significant(max(math.log(high / low) / (2.0 * Z_95), LEAST_SCATTER), 2)
 
 
 def updated_soil(case: Case, result: BevameterResult) -> Case:

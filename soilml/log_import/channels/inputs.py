@@ -119,9 +119,7 @@ def _despiked(
 def _add(inputs: Inputs, channel: ChannelMap, sampled: list[Floats]) -> None:
     """Add a channel in the units of soilml; places are added with their rate."""
     role, grid = channel.role, inputs.time
-    if role == "slope":
-        inputs.values[role] = channel.scale * slope_of(sampled)
-    elif role == "position":
+    if role == "position":
         place = channel.scale * along_path(sampled)
         inputs.places[role] = place
         inputs.values.setdefault("ground_speed", derivative(grid, place, SMOOTH))
@@ -132,9 +130,18 @@ def _add(inputs: Inputs, channel: ChannelMap, sampled: list[Floats]) -> None:
     elif role == "slip":
         inputs.values[role] = our_slip(channel.scale * sampled[0], channel.definition)
     else:
-        # cells that carry the wheel together add up, sensors of one sinkage are averaged
-        total = channel.scale * sum(sampled[1:], start=sampled[0])
-        inputs.values[role] = total / len(sampled) if role == "sinkage" else total
+        inputs.values[role] = combined(channel, sampled)
+
+
+def combined(channel: ChannelMap, columns: list[Floats]) -> Floats:
+    """A channel (n,) in the unit of soilml, of its columns (n,).
+
+    Cells that carry the wheel together add up, sensors of one sinkage are averaged.
+    """
+    if channel.role == "slope":
+        return channel.scale * slope_of(columns)
+    total = channel.scale * sum(columns[1:], start=columns[0])
+    return total / len(columns) if channel.role == "sinkage" else total
 
 
 def our_slip(given: Any, definition: str) -> Any:

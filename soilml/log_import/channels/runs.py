@@ -7,6 +7,7 @@ import fnmatch
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -99,6 +100,34 @@ def runs_of(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
         _with_times(label if labels.count(label) == 1 else f"{name}_{label}", part, log_map)
         for name, label, part in found
     ]
+
+
+def as_rows(log: Sequence[Recording], name: str) -> Run:
+    """A log whose lines are numbered instead of timed."""
+    return Run(name, tuple(log), tuple(np.arange(float(len(own))) for own in log))
+
+
+def runs_of_rows(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[Run]:
+    """Tables whose rows are steady runs, as runs of rows with one name that follow each other.
+
+    The name is that of the column of [runs], or of the file; the time of a row is its number.
+    """
+    runs, key = [], log_map.runs.column
+    for name, log in zip(run_names([log[0].file for log in logs]), logs, strict=True):
+        for recording in log:
+            whole = as_rows([recording], name)
+            if not key:
+                labels = [name] * len(recording)
+            elif key in recording.texts:
+                labels = [cell or "unnamed" for cell in recording.texts[key]]
+            else:
+                labels = [f"{value:g}" for value in whole.find(key)[1]]
+            number = whole.times[0]
+            starts = [i for i, label in enumerate(labels) if i == 0 or label != labels[i - 1]]
+            for start, stop in pairwise([*starts, len(labels)]):
+                keep = (number >= start) & (number < stop)
+                runs.append(Run(labels[start], (recording.rows(keep),), (number[keep],)))
+    return runs
 
 
 def matched_files(
@@ -196,7 +225,7 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
             "'100 Hz'"
         )
     common = [clock[0] for clock, same in clocks if same]
-    divided = log_map.run_column or log_map.splits_by_time
+    divided = log_map.runs.column or log_map.runs.by_time
     start = (common[0] if divided else min(common)) if common else 0.0
     times = tuple(clock - start if same else clock for clock, same in clocks)
     return Run(name, tuple(recordings), times, tuple(dict.fromkeys(notes)))
@@ -204,11 +233,11 @@ def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:
 
 def _clock(recording: Recording, log_map: LogMap, kind: FileKind | None) -> Floats | None:
     """Time of the samples in s; None where the recording has no time."""
-    name = (kind.time_column if kind else "") or log_map.time_column
+    name = (kind.time_column if kind else "") or log_map.time.column
     if name:
         column = _column_in(recording, name)
         if column:
-            unit = (kind.time_unit if kind else "") or log_map.time_unit
+            unit = (kind.time_unit if kind else "") or log_map.time.unit
             return recording.columns[column] * factor(unit, "s", "[time] unit")
         if name in recording.texts:
             raise InputError(
@@ -217,8 +246,8 @@ def _clock(recording: Recording, log_map: LogMap, kind: FileKind | None) -> Floa
             )
     if recording.clock is not None:
         return recording.clock
-    if log_map.rate:
-        return np.arange(len(recording)) / log_map.rate
+    if log_map.time.rate:
+        return np.arange(len(recording)) / log_map.time.rate
     return None
 
 
@@ -246,15 +275,15 @@ def _divided(
 
     Recordings without the column take part in every run, where they overlap in time.
     """
-    if log_map.run_column:
+    if log_map.runs.column:
         recordings = [recording for recording, _ in members]
-        column = log_map.run_column
+        column = log_map.runs.column
         at = [i for i, r in enumerate(recordings) if column in r.texts or column in r.columns]
         if len(at) != 1:
             raise InputError(f"[runs] column: {_missing(recordings, column)}")
         own = recordings[at[0]]
         labels = own.texts.get(column) or [f"{value:g}" for value in own.columns[column]]
-    elif log_map.each_struct:
+    elif log_map.runs.each_struct:
         alike = alike_structs([recording for recording, _ in members])
         if not alike:
             raise InputError(
@@ -265,20 +294,20 @@ def _divided(
             (f"{name}_{members[i][0].name.rpartition('.')[2]}", [members[i], *shared])
             for i in alike
         ]
-    elif log_map.splits_by_time:
+    elif log_map.runs.by_time:
         at = [0]
         clock = _clock(members[0][0], log_map, members[0][1])
         if clock is None:
             return [(name, list(members))]
         steps = np.diff(clock)
-        ends = (steps < 0.0) & log_map.split_at_reset | (steps > log_map.split_at_pause)
+        ends = (steps < 0.0) & log_map.runs.at_reset | (steps > log_map.runs.at_pause)
         parts = np.concatenate([[0], np.cumsum(ends)])
         labels = [f"{name}_{part + 1:02d}" for part in parts]
     else:
         return [(name, list(members))]
-    found = []
+    found, every = [], np.asarray(labels)
     for label in dict.fromkeys(labels):
-        keep = np.asarray([cell == label for cell in labels])
+        keep = every == label
         part = [
             (r.rows(keep), kind) if i == at[0] else (r, kind) for i, (r, kind) in enumerate(members)
         ]

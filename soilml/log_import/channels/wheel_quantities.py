@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,32 @@ from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.log_import.mapping.uncertain_value import Uncertain
 
 Constants = Callable[[str], float]  # Value of a constant of the map by name, such as "vehicle.mass"
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """From channels of a wheel to its quantities, by the constants of its map."""
+
+    wheel: WheelMap
+    vehicle: Vehicle | None
+
+    @cached_property
+    def constants(self) -> dict[str, Uncertain]:
+        """Every constant that acts on the wheel, by name; see `constants_of`."""
+        return constants_of(self.wheel, self.vehicle)
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """The constants without their standard deviations."""
+        return {name: constant.value for name, constant in self.constants.items()}
+
+    def of(
+        self, channels: Mapping[str, Any], constants: Mapping[str, float] | None = None
+    ) -> dict[str, Floats]:
+        """Quantities (...) of channels (...); see `wheel_quantities`."""
+        own = self.values if constants is None else constants
+        found = wheel_quantities(channels, self.wheel, self.vehicle, own)
+        return {name: np.asarray(values, dtype=np.float64) for name, values in found.items()}
 
 
 def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertain]:
@@ -32,7 +60,7 @@ def constants_of(wheel: WheelMap, vehicle: Vehicle | None) -> dict[str, Uncertai
             found[f"{role}.gear_ratio"] = channel.gear_ratio
         if role in ("torque", "motor_current"):
             found[f"{role}.efficiency"] = channel.efficiency
-        if role == "motor_current":
+        if channel.torque_constant is not None:
             found[f"{role}.torque_constant"] = channel.torque_constant
             found[f"{role}.idle_current"] = channel.idle_current
     if wheel.leg is not None:

@@ -10,7 +10,7 @@ import numpy as np
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
 from soilml.log_import.guesses.constants import stated_radius, stated_scale
-from soilml.log_import.guesses.draft import Draft, Marked, inputs_of
+from soilml.log_import.guesses.draft import Draft, inputs_of
 from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.guesses.signs_and_tares import (
@@ -22,6 +22,7 @@ from soilml.log_import.guesses.signs_and_tares import (
     tares,
 )
 from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
 
 #: Radius of the wheels of rovers and rigs, m: the usual one, and its range.

@@ -13,8 +13,8 @@ from soilml.errors import InputError
 from soilml.log_import.channels.runs import alike_structs, key_words, matched_files, run_names
 from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.columns import WHEEL_WORDS, candidates_of, name_scores, words_of
-from soilml.log_import.guesses.draft import Marked
 from soilml.log_import.mapping.log_map import FileKind
+from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 

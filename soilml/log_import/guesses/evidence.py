@@ -14,8 +14,9 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.log_import.channels.inputs import Inputs, moving
 from soilml.log_import.guesses.columns import Candidate, says_role
-from soilml.log_import.guesses.draft import Draft, Marked
+from soilml.log_import.guesses.draft import Draft
 from soilml.log_import.mapping.channel_map import UNITS
+from soilml.log_import.mapping.written_map import Marked
 
 #: What no wheel exceeds and what confirms a guess. Lever arm of torque over load, over the radius
 #: and in m where no radius is known; pull over load; sinkage in m.
@@ -255,23 +256,3 @@ def _impossible(inputs: Inputs, radius: float) -> dict[str, str]:
     if sizes.get("sinkage", 0.0) > most and "sinkage" not in inputs.tare:
         found["sinkage"] = f"{sizes['sinkage']:.3g} m is no sinkage of a wheel"
     return found
-
-
-def unused_of(role: str, kind: str, columns: Sequence[Candidate], used: set[str]) -> list[str]:
-    """Columns of the unit of a role that nothing uses and that vary: one may be the role."""
-    return [
-        c.address
-        for c in columns
-        if c.kind == kind
-        and c.address not in used
-        and not c.about.constant
-        and not (role == "sinkage" and c.about.travel > 0.6)
-    ]
-
-
-def used_columns(
-    chosen: Mapping[str, Candidate], parts: Mapping[str, Sequence[Candidate]]
-) -> set[str]:
-    """The addresses of the columns of channels."""
-    every = [*chosen.values(), *(c for own in parts.values() for c in own)]
-    return {c.address for c in every}

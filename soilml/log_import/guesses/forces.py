@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from soilml.arrays import Floats
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate, words_of
-from soilml.log_import.guesses.draft import Marked
 from soilml.log_import.guesses.vertical_axis import axis_in, families, with_sinkage_along
+from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import factor
 
 _FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "effort", "力"}
@@ -148,9 +148,11 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
     for role, address, others in (("drawbar_pull", pair[0], forces), ("torque", pair[1], moments)):
         if address and role not in named and any(c.address == address for c in others):
             given[role] = address
-            reasons[role] = "of its kind it varies most as the wheel drives"
-            if pair[2] >= _TOGETHER_FROM:
-                reasons[role] = "pull and torque vary together"
+            reasons[role] = "pull and torque vary together"
+            if pair[2] < _TOGETHER_FROM:
+                reasons[role] = Marked(
+                    "CHANGE: of its kind it varies most as the wheel drives, which says little"
+                )
     known = [c.address for c in moments]
     if len(known) == 1 and given.get("torque") == known[0] and pair[2] < _TOGETHER_FROM:
         given.pop("torque"), reasons.pop("torque")

@@ -8,7 +8,8 @@ import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, moving, resting
 from soilml.log_import.guesses.columns import words_of
-from soilml.log_import.guesses.draft import Draft, Marked
+from soilml.log_import.guesses.draft import Draft
+from soilml.log_import.mapping.written_map import Marked
 
 _OFFSET = 0.01  # Share of the reading while driving from which a reading at rest is an offset
 #: A sensor that reads more than this, m, has its zero elsewhere; how far a wheel sinks at rest, m.

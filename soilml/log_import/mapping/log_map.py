@@ -7,53 +7,26 @@ import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
-from soilml.io.toml_settings import Settings, read_settings
-from soilml.log_import.mapping.channel_map import LEG_ROLES, ROLES, ChannelMap, take_channel
-from soilml.log_import.mapping.uncertain_value import Uncertain, take_uncertain
-from soilml.log_import.mapping.wheel_leg import WheelLegMap, take_wheel_leg
-from soilml.log_import.mapping.window_settings import (
-    LeaveOut,
-    WindowSettings,
-    take_left_out,
-    take_windows,
+from soilml.errors import InputError
+from soilml.io.declared_settings import (
+    For,
+    Key,
+    Numbers,
+    OneOf,
+    Pattern,
+    named_tables,
+    take_declared,
 )
+from soilml.io.toml_settings import Settings, read_settings
+from soilml.log_import.mapping.channel_map import LEG_ROLES, NOTHING, ROLES, ChannelMap
+from soilml.log_import.mapping.uncertain_value import Uncertain, UncertainIn
+from soilml.parameters import Parameter
 
 #: Keys that say where samples come from, of which a table has one.
 _SOURCES = ("column", "value", "file_name", "head")
-_ZERO = Uncertain(0.0)
-
-
-def shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """ChannelMap tables outside of the wheels, by role, of roles that some wheel has of its own.
-
-    A table that names no source of samples is taken out of `settings`: it serves the wheels only.
-    """
-    own = {role for wheel in wheels.values() if isinstance(wheel, dict) for role in wheel}
-    found = {}
-    for role in ROLES:
-        if role in own and role in settings:
-            content = settings.content[role]
-            if isinstance(content, dict):
-                found[role] = content
-                if not {*_SOURCES} & content.keys():
-                    settings.take(role, dict, f"a table [{role}]")
-    return found
-
-
-def with_shared_keys(
-    wheel: Mapping[str, Any], shared: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Any]:
-    """The table of a wheel, whose channels have the shared keys that they do not state."""
-    content = dict(wheel)
-    for role, keys in shared.items():
-        own = content.get(role)
-        if isinstance(own, dict):
-            sourced = {*_SOURCES} & own.keys()
-            kept = {k: v for k, v in keys.items() if not (sourced and k in _SOURCES)}
-            content[role] = kept | own
-    return content
+_SECONDS = UncertainIn("s", exact=True)
 
 
 @dataclass(frozen=True)
@@ -65,10 +38,37 @@ class FileKind:
 
     name: str
     pattern: str
-    clock: str = "same"
-    delay: float = 0.0
-    time_column: str = ""
+    clock: Annotated[str, OneOf(("same", "start"))] = "same"
+    delay: Annotated[float, _SECONDS] = 0.0
+    time_column: Annotated[str, Key("time")] = ""
     time_unit: str = ""
+
+
+@dataclass(frozen=True)
+class TimeMap:
+    """[time]: the clock of the samples, a column or a rate in Hz."""
+
+    column: str = ""
+    unit: str = "s"
+    rate: Annotated[float, UncertainIn("Hz", exact=True)] = 0.0
+
+
+@dataclass(frozen=True)
+class RunsMap:
+    """[runs]: what divides a file into runs; whether each row is one already."""
+
+    column: str = ""
+    at_reset: Annotated[bool, Key("split_where_time_restarts")] = False
+    each_struct: bool = False
+    each_row: bool = False
+    at_pause: Annotated[
+        float, Key("split_at_pauses_over"), UncertainIn("s", above=0.0, exact=True)
+    ] = math.inf  # s
+
+    @property
+    def by_time(self) -> bool:
+        """Whether one file holds several runs, one after the other."""
+        return self.at_reset or math.isfinite(self.at_pause)
 
 
 @dataclass(frozen=True)
@@ -78,12 +78,89 @@ class Vehicle:
     `behind_front` is the distance of the centre of mass behind the front axle.
     """
 
-    mass: Uncertain
+    mass: Annotated[Uncertain, UncertainIn("kg", above=0.0)]
     wheels: int = 1
-    gravity: float = 9.80665
-    wheelbase: Uncertain = _ZERO
-    behind_front: Uncertain = _ZERO
-    height: Uncertain = _ZERO
+    gravity: Annotated[float, UncertainIn("m/s^2", above=0.0, exact=True)] = 9.80665
+    wheelbase: Annotated[Uncertain, UncertainIn("m")] = NOTHING
+    behind_front: Annotated[Uncertain, UncertainIn("m")] = NOTHING
+    height: Annotated[Uncertain, UncertainIn("m")] = NOTHING
+
+
+@dataclass(frozen=True)
+class WindowSettings:
+    """[windows]: how steady windows are found; times in s."""
+
+    shortest: Annotated[float, UncertainIn("s", above=0.0, exact=True)] = 2.0
+    settle: Annotated[float, _SECONDS] = 0.5
+    sensitivity: Annotated[float, Parameter("1", 1e-9, 1e9, "2 finds smaller changes")] = 1.0
+    largest_slip_change: Annotated[float, UncertainIn("1", exact=True)] = 0.05
+    largest_torque_change: Annotated[float, UncertainIn("1", exact=True)] = 0.15
+    within: Annotated[
+        tuple[float, float], Numbers("two times in s after the start of a run, such as [5, 20]", 2)
+    ] = (-math.inf, math.inf)
+
+
+@dataclass(frozen=True)
+class LeaveOut:
+    """[[leave_out]]: a stretch of a run that the user leaves out, in s after its start."""
+
+    run: str = ""
+    start: Annotated[float, Key("from"), _SECONDS] = 0.0
+    stop: Annotated[float, Key("until"), _SECONDS] = math.inf
+    why: str = "left out by the map"
+
+
+@dataclass(frozen=True)
+class WheelLegMap:
+    """[wheel_leg]: a wheel with legs, each stance of which is a row.
+
+    length: From the axle to the end of a leg, m.
+    zero: Angle at which a leg points straight down, rad; None where the log is to say.
+    sensor_height: Height of the range-finder of [clearance] above the axle, m.
+    half_width: Half of the angle around midstance over which sensors are averaged, rad.
+    """
+
+    legs: Annotated[int, Parameter("1", 3, 12, "how many legs it has")]
+    length: Annotated[Uncertain, UncertainIn("m", above=0.0)]
+    zero: Annotated[float | None, UncertainIn("rad", exact=True)] = None
+    sensor_height: Annotated[Uncertain, UncertainIn("m")] = NOTHING
+    half_width: Annotated[float, UncertainIn("rad", above=0.0, exact=True)] = 0.1
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for a width that reaches the neighbouring leg."""
+        if not self.half_width < self.spacing / 4.0:
+            raise InputError(
+                f"half_width is {self.half_width:g} rad; needed is a number above 0 and below a "
+                f"quarter of the {self.spacing:.3g} rad between legs"
+            )
+
+    @property
+    def spacing(self) -> float:
+        """Angle between neighbouring legs, rad: that of a stance."""
+        return 2.0 * math.pi / self.legs
+
+
+@dataclass(frozen=True)
+class WheelKeys:
+    """[wheel], [wheels.NAME] and [gears.NAME]: radius and gear."""
+
+    radius: Annotated[Uncertain | None, UncertainIn("m", above=0.0)] = None
+    diameter: Annotated[Uncertain | None, UncertainIn("m", above=0.0)] = None
+    gear: Annotated[str, For(("", "wheel"))] = ""
+    gear_from: Annotated[
+        re.Pattern[str] | None, For(("", "wheel")), Pattern((0, 1), "the name of the gear")
+    ] = None
+    axle: Annotated[str, For(("wheel",)), OneOf(("front", "middle", "rear", ""))] = ""
+
+    def __post_init__(self) -> None:
+        """Raise `InputError` for a gear that is given twice."""
+        if self.gear and self.gear_from:
+            raise InputError("has gear and gear_from; give one of them")
+
+    @property
+    def size(self) -> Uncertain | None:
+        """The radius, m; None where the table has none."""
+        return self.radius if self.diameter is None else self.diameter.times(0.5)
 
 
 @dataclass(frozen=True)
@@ -107,212 +184,126 @@ class LogMap:
     """How a log is read; see docs/how-to/import.md for the file."""
 
     source: str
-    wheels: tuple[WheelMap, ...]
+    wheels: tuple[WheelMap, ...] = ()
     files: tuple[FileKind, ...] = ()
-    time_column: str = ""
-    time_unit: str = "s"
-    rate: float = 0.0
-    run_column: str = ""
-    split_at_reset: bool = False
-    each_struct: bool = False
-    split_at_pause: float = math.inf
+    time: TimeMap = field(default_factory=TimeMap)
+    runs: RunsMap = field(default_factory=RunsMap)
     vehicle: Vehicle | None = None
     windows: WindowSettings = field(default_factory=WindowSettings)
     left_out: tuple[LeaveOut, ...] = ()
-    each_row: bool = False
-    # Radius (m) of each gear of [gears.NAME]
-    gears: Mapping[str, Uncertain] = field(default_factory=dict)
-
-    @property
-    def splits_by_time(self) -> bool:
-        """Whether one file holds several runs, one after the other."""
-        return self.split_at_reset or math.isfinite(self.split_at_pause)
+    gears: Mapping[str, Uncertain] = field(default_factory=dict)  # Radius (m) of each gear
 
 
 def read_map(path: str | os.PathLike[str]) -> LogMap:
     """Read a map; raises `InputError`, naming file, table and key, for what is wrong in it."""
-    settings = read_settings(path, f"soilml import --init LOG... --out {path}")
-    found = _take_map(settings, str(path))
-    settings.finish()
-    return found
+    return _take_map(read_settings(path, f"soilml import --init LOG... --out {path}"))
 
 
-def map_from(content: Mapping[str, Any]) -> LogMap:
+def map_from(content: Mapping[str, Any], source: str = "map") -> LogMap:
     """A map from a dictionary with the content of the file; raises `InputError` likewise."""
-    settings = Settings(dict(content), "map")
-    found = _take_map(settings, "map")
-    settings.finish()
-    return found
+    return _take_map(Settings(dict(content), source))
 
 
-def _take_map(settings: Settings, source: str) -> LogMap:
-    files = _take_files(settings.table("files"))
-    time = settings.table("time")
-    time_column, time_unit = time.text("column", ""), time.text("unit", "s")
-    rate = take_uncertain(time, "rate", "Hz", _ZERO).value
-    time.finish()
-    runs = settings.table("runs")
-    run_column = runs.text("column", "")
-    at_reset = bool(runs.take("split_where_time_restarts", bool, "true or false", False))
-    each_struct = bool(runs.take("each_struct", bool, "true or false", False))
-    each_row = bool(runs.take("each_row", bool, "true or false", False))
-    pause = take_uncertain(runs, "split_at_pauses_over", "s", Uncertain(math.inf), 0.0).value
-    runs.finish()
-    vehicle = _take_vehicle(settings.table("vehicle")) if "vehicle" in settings else None
-    shared_wheel = settings.table("wheel")
-    radius = _take_radius(shared_wheel)
-    pattern = _take_gear_pattern(shared_wheel)
-    gear = shared_wheel.text("gear", "")
-    shared_wheel.finish()
-    leg = take_wheel_leg(settings.table("wheel_leg")) if "wheel_leg" in settings else None
-    if leg is not None:
-        if radius is not None or each_row:
+def _take_map(settings: Settings) -> LogMap:
+    files = named_tables(settings, "files", FileKind)
+    time = take_declared(TimeMap, settings.table("time"))
+    runs = take_declared(RunsMap, settings.table("runs"))
+    vehicle = leg = None
+    if "vehicle" in settings:
+        vehicle = take_declared(Vehicle, settings.table("vehicle"))
+    common = take_declared(WheelKeys, settings.table("wheel"))
+    radius = common.size
+    if "wheel_leg" in settings:
+        leg = take_declared(WheelLegMap, settings.table("wheel_leg"))
+        if radius is not None or runs.each_row:
             settings.fail("has [wheel_leg] beside [wheel] radius or [runs] each_row; remove one")
         radius = leg.length
-    gears = _take_gears(settings)
+    gears = {}
+    for name, gear in named_tables(settings, "gears", WheelKeys, "gear").items():
+        if gear.size is None:
+            settings.fail(
+                f"[gears.{name}]: the radius is missing; needed is radius or diameter, such as "
+                "'0.15 m +- 1 %'"
+            )
+        gears[name] = gear.size
     named = settings.table("wheels")
-    defaults = shared_keys(settings, named.content)
+    defaults = _shared_keys(settings, named.content)
     shared = _take_channels(settings, leg is not None)
     wheels = []
     for name in named.content:
-        content = named.take(name, dict, f"a table [wheels.{name}]")
-        own = Settings(
-            with_shared_keys(content, defaults),
-            f"{settings.where} [wheels.{name}]",
-            settings.files,
-        )
-        own_pattern = _take_gear_pattern(own) or pattern
-        own_gear = own.text("gear", gear)
+        table = named.table(name)
+        own = Settings(_with_shared_keys(table.content, defaults), table.where, settings.files)
+        channels = shared | _take_channels(own, leg is not None)
+        keys = take_declared(WheelKeys, own, "wheel")
         wheels.append(
             WheelMap(
                 name,
-                _take_radius(own) or gears.get(own_gear) or radius,
-                shared | _take_channels(own, leg is not None),
-                own_gear,
-                _take_axle(own),
-                own_pattern,
+                keys.size or gears.get(keys.gear or common.gear) or radius,
+                channels,
+                keys.gear or common.gear,
+                keys.axle,
+                keys.gear_from or common.gear_from,
                 leg,
             )
         )
-        own.finish()
     if not wheels:
-        wheels = [WheelMap("", gears.get(gear) or radius, shared, gear, "", pattern, leg)]
+        size = gears.get(common.gear) or radius
+        wheels = [WheelMap("", size, shared, common.gear, "", common.gear_from, leg)]
     for wheel in wheels:
         _check_wheel(settings, wheel, vehicle, bool(gears))
-    return LogMap(
-        source=source,
+    found = LogMap(
+        source=settings.where,
         wheels=tuple(wheels),
-        files=files,
-        time_column=time_column,
-        time_unit=time_unit,
-        rate=rate,
-        run_column=run_column,
-        split_at_reset=at_reset,
-        each_struct=each_struct,
-        split_at_pause=pause,
+        files=tuple(files.values()),
+        time=time,
+        runs=runs,
         vehicle=vehicle,
-        windows=take_windows(settings.table("windows")),
-        left_out=tuple(take_left_out(entry) for entry in settings.tables("leave_out")),
-        each_row=each_row,
+        windows=take_declared(WindowSettings, settings.table("windows")),
+        left_out=tuple(take_declared(LeaveOut, one) for one in settings.tables("leave_out")),
         gears=gears,
     )
-
-
-def _take_gears(settings: Settings) -> dict[str, Uncertain]:
-    """The radius of each gear of [gears.NAME], m."""
-    named = settings.table("gears")
-    found: dict[str, Uncertain] = {}
-    for name in named.content:
-        own = Settings(
-            named.take(name, dict, f"a table [gears.{name}]"),
-            f"{settings.where} [gears.{name}]",
-            settings.files,
-        )
-        radius = _take_radius(own)
-        if radius is not None:
-            found[name] = radius
-        else:
-            own.fail("the radius is missing; needed is radius or diameter, such as '0.15 m +- 1 %'")
-        own.finish()
+    settings.finish()
     return found
+
+
+def _shared_keys(settings: Settings, wheels: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Tables outside of the wheels, by role, of roles that some wheel has of its own.
+
+    A table that names no source of samples is taken out of `settings`: it serves the wheels only.
+    """
+    own = {role for wheel in wheels.values() if isinstance(wheel, dict) for role in wheel}
+    found = {}
+    for role in ROLES:
+        content = settings.content.get(role)
+        if role in own and isinstance(content, dict):
+            found[role] = content
+            if not {*_SOURCES} & content.keys():
+                settings.take(role, dict, f"a table [{role}]")
+    return found
+
+
+def _with_shared_keys(
+    wheel: Mapping[str, Any], shared: Mapping[str, Mapping[str, Any]]
+) -> dict[str, Any]:
+    """The table of a wheel, whose channels have the shared keys that they do not state."""
+    content = dict(wheel)
+    for role, keys in shared.items():
+        own = content.get(role)
+        if isinstance(own, dict):
+            sourced = {*_SOURCES} & own.keys()
+            kept = {k: v for k, v in keys.items() if not (sourced and k in _SOURCES)}
+            content[role] = kept | own
+    return content
 
 
 def _take_channels(settings: Settings, with_legs: bool) -> dict[str, ChannelMap]:
     roles = (*ROLES, *LEG_ROLES) if with_legs else tuple(ROLES)
     settings.permit(roles)
-    return {role: take_channel(settings.table(role), role) for role in roles if role in settings}
-
-
-def _take_radius(settings: Settings) -> Uncertain | None:
-    if "diameter" in settings:
-        diameter = take_uncertain(settings, "diameter", "m", lower=0.0)
-        return Uncertain(diameter.value / 2.0, diameter.std / 2.0)
-    if "radius" in settings:
-        return take_uncertain(settings, "radius", "m", lower=0.0)
-    settings.permit(["radius", "diameter"])
-    return None
-
-
-def _take_gear_pattern(settings: Settings) -> re.Pattern[str] | None:
-    if "gear_from" not in settings:
-        settings.permit(["gear_from"])
-        return None
-    text = settings.text("gear_from")
-    if "gear" in settings:
-        settings.fail("has gear and gear_from; give one of them")
-    try:
-        pattern = re.compile(text, re.IGNORECASE)
-    except re.error as error:
-        settings.fail(f"gear_from {text!r} is no regular expression: {error}")
-    if pattern.groups > 1:
-        settings.fail(f"gear_from is {text!r}; needed is at most one group, the name of the gear")
-    return pattern
-
-
-def _take_axle(settings: Settings) -> str:
-    axle = settings.text("axle", "")
-    if axle not in ("", "front", "rear", "middle"):
-        settings.fail(f"axle is {axle!r}; needed is 'front', 'middle' or 'rear'")
-    return axle
-
-
-def _take_files(settings: Settings) -> tuple[FileKind, ...]:
-    kinds = []
-    for name in settings.content:
-        own = Settings(
-            settings.take(name, dict, f"a table [files.{name}]"),
-            f"{settings.where} [files.{name}]",
-            settings.files,
-        )
-        pattern, clock, delay = own.text("pattern"), own.text("clock", "same"), 0.0
-        if clock not in ("same", "start"):
-            own.fail(f"clock is {clock!r}; needed is 'same' or 'start'")
-        if "delay" in own:
-            delay = take_uncertain(own, "delay", "s").value
-        kinds.append(
-            FileKind(
-                name=name,
-                pattern=pattern,
-                clock=clock,
-                delay=delay,
-                time_column=own.text("time", ""),
-                time_unit=own.text("time_unit", ""),
-            )
-        )
-        own.finish()
-    return tuple(kinds)
-
-
-def _take_vehicle(settings: Settings) -> Vehicle:
-    mass = take_uncertain(settings, "mass", "kg", lower=0.0)
-    lengths = {
-        key: take_uncertain(settings, key, "m", _ZERO)
-        for key in ("wheelbase", "behind_front", "height")
+    return {
+        role: take_declared(ChannelMap, settings.table(role), role, role=role)
+        for role in roles
+        if role in settings
     }
-    gravity = take_uncertain(settings, "gravity", "m/s^2", Uncertain(9.80665), lower=0.0).value
-    vehicle = Vehicle(mass, settings.count("wheels", 1), gravity, **lengths)
-    settings.finish()
-    return vehicle
 
 
 def _check_wheel(
@@ -321,12 +312,9 @@ def _check_wheel(
     """Raise `InputError` where slip or load cannot follow from the channels of a wheel."""
     has = wheel.channels.keys()
     of = f" of the wheel {wheel.name!r}" if wheel.name else ""
-    wheel_side, ground_side = (
-        ("wheel_speed", "wheel_angle", "rim_speed"),
-        ("ground_speed", "position"),
-    )
+    rotation, travel = ("wheel_speed", "wheel_angle", "rim_speed"), ("ground_speed", "position")
     if "slip" not in has and wheel.leg is None:
-        for needed, words in ((wheel_side, "rotation"), (ground_side, "travel")):
+        for needed, words in ((rotation, "rotation"), (travel, "travel")):
             if not has & {*needed}:
                 settings.fail(
                     f"the {words}{of} is missing, from which slip follows; needed is one of "

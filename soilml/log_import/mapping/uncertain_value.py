@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from soilml.io.cell_text import read_number
 from soilml.io.toml_settings import Settings
@@ -25,6 +26,31 @@ class Uncertain:
     def relative(self) -> float:
         """Standard deviation as a share of the value."""
         return self.std / abs(self.value) if self.value else 0.0
+
+    def times(self, share: float) -> Uncertain:
+        """The value and its standard deviation, multiplied."""
+        return Uncertain(share * self.value, share * self.std)
+
+
+@dataclass(frozen=True)
+class UncertainIn:
+    """A number or a text such as `"0.15 m +- 1 %"`, above `above`; without its error if `exact`."""
+
+    unit: str
+    above: float = -math.inf
+    exact: bool = False
+
+    def take(self, settings: Settings, key: str, kind: str) -> Any:
+        """The value; raises `InputError` for a wrong form and for one that is too small."""
+        example = f"'0.15 {self.unit} +- 1 %'" if self.unit != "1" else "'0.7 +- 0.05'"
+        needed = f"a number in {self.unit}, or a text such as {example}"
+        given = settings.take(key, (int, float, str), needed)
+        found = parse_uncertain(given, self.unit, f"{settings.where} {key}")
+        if found is None or found.std < 0.0:
+            settings.fail(f"{key} is {given!r}; needed is {needed}")
+        if not found.value > self.above:
+            settings.fail(f"{key} is {given!r}; needed is a value above {self.above:g}")
+        return found.value if self.exact else found
 
 
 def parse_uncertain(text: str | int | float, ours: str, where: str) -> Uncertain | None:
@@ -49,26 +75,3 @@ def parse_uncertain(text: str | int | float, ours: str, where: str) -> Uncertain
     if unit == "%" and match[2] != "%":
         return Uncertain(value, std / 100.0 * abs(value))
     return Uncertain(value, std * (factor(unit, ours, where) if unit else scale))
-
-
-def take_uncertain(
-    settings: Settings,
-    key: str,
-    ours: str,
-    default: Uncertain | None = None,
-    lower: float = -math.inf,
-) -> Uncertain:
-    """The value of `key`; raises `InputError` for a wrong form and for one not above `lower`."""
-    example = f"'0.15 {ours} +- 1 %'" if ours != "1" else "'0.7 +- 0.05'"
-    needed = f"a number in {ours}, or a text such as {example}"
-    if key not in settings and default is not None:
-        settings.permit([key])
-        return default
-    given = settings.take(key, (int, float, str), needed)
-    found = parse_uncertain(given, ours, f"{settings.where} {key}")
-    if found is None or found.std < 0.0:
-        settings.fail(f"{key} is {given!r}; needed is {needed}")
-    elif not found.value > lower:
-        settings.fail(f"{key} is {given!r}; needed is a value above {lower:g}")
-    assert found is not None
-    return found

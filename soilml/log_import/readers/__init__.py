@@ -30,6 +30,7 @@ _READERS = {
     ".mcap": ("bags", "read_bag"),
     ".bag": ("bags", "read_bag"),
 }
+_LONG = ("delimited_text", "bags")  # Modules whose readers show their progress
 #: What to do with files of other kinds, by their ending.
 _OTHERS = {
     **dict.fromkeys((".xls", ".xlsb", ".ods"), "is a spreadsheet; save it as .xlsx"),
@@ -38,10 +39,11 @@ _OTHERS = {
 }
 
 
-def read_log(path: str | Path) -> list[Recording]:
+def read_log(path: str | Path, progress: Callable[[int], None] | None = None) -> list[Recording]:
     """The recordings of a log, with what files beside it state.
 
     path: A file, the folder of a bag, or a sheet of a spreadsheet as `BOOK.xlsx#SHEET`.
+    progress: Called with the number of bytes read, of text logs and bags.
 
     Raises `InputError` where it is missing or cannot be read.
     """
@@ -68,11 +70,12 @@ def read_log(path: str | Path) -> list[Recording]:
         suffix = ".bag"
     module, function = _READERS.get(suffix, ("delimited_text", "read_delimited_text"))
     found = import_module(f"soilml.log_import.readers.{module}")
-    read: Callable[[Path], list[Recording]] = getattr(found, function)
+    read: Callable[..., list[Recording]] = getattr(found, function)
+    told = (progress,) if module in _LONG else ()
     try:
         refuse_device(file)
         beside = side_lines(file)
-        found_in = map(without_codes, read(Path(path) if sheet else file))
+        found_in = map(without_codes, read(Path(path) if sheet else file, *told))
         return [replace(own, about=(*own.about, *beside)) for own in found_in]
     except OSError as error:
         raise InputError(f"{file} cannot be read: {error.strerror or error}") from None

@@ -9,13 +9,15 @@ from typing import Any
 
 from soilml.errors import InputError, MissingLibraryError
 from soilml.log_import.readers.bag_blocks import check_blocks
-from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields
+from soilml.log_import.readers.message_fields import TopicColumns, protobuf_fields, thin_largest
 from soilml.log_import.recording import Recording
 from soilml.optional_imports import need
 from soilml.remarks import Remark, texts
 
+_BETWEEN = 2000  # Messages between two looks at memory and progress
 
-def read_bag(path: Path) -> list[Recording]:
+
+def read_bag(path: Path, progress: Callable[[int], None] | None = None) -> list[Recording]:
     """One recording for each topic of a bag: a .bag file, a folder of ROS 2, or an MCAP file.
 
     Raises `InputError` for a damaged bag and one without numbers, `MissingLibraryError` where the
@@ -26,18 +28,24 @@ def read_bag(path: Path) -> list[Recording]:
     topics: dict[str, TopicColumns] = {}
     messages = _mcap_messages if path.suffix == ".mcap" else _ros_messages
     notes: list[Remark] = []
+    read = 0
     try:
         if path.is_file():
             check_blocks(path)
-        for topic, seconds, message in messages(path, notes):
+        for i, (topic, seconds, message, size) in enumerate(messages(path, notes)):
             topics.setdefault(topic, TopicColumns(path)).add(seconds, message)
+            read += size
+            if i % _BETWEEN == 0:
+                thin_largest(topics.values())
+                if progress is not None:
+                    progress(read)
     except (InputError, MissingLibraryError):
         raise
     except Exception as error:  # the libraries raise many kinds for damaged files
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InputError(f"{path} cannot be read as a bag: {first}") from None
     found = [
-        Recording(topic, path, columns, clock=held.times(), notes=tuple(notes))
+        Recording(topic, path, columns, clock=held.times(), notes=(*notes, *held.notes(topic)))
         for topic, held in topics.items()
         if (columns := held.columns())
     ]
@@ -48,7 +56,7 @@ def read_bag(path: Path) -> list[Recording]:
     return found
 
 
-def _ros_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float, Any]]:
+def _ros_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float, Any, int]]:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -65,10 +73,10 @@ def _ros_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float,
                 text = f"{connection.topic}: type {connection.msgtype} is not known"
                 notes.append(Remark("unknown-type", text, (connection.topic,)))
                 continue
-            yield connection.topic, 1e-9 * nanoseconds, message
+            yield connection.topic, 1e-9 * nanoseconds, message, len(raw)
 
 
-def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float, Any]]:
+def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float, Any, int]]:
     from mcap.reader import make_reader
 
     decoders: dict[int, Callable[[bytes], Any] | None] = {}
@@ -84,7 +92,12 @@ def _mcap_messages(path: Path, notes: list[Remark]) -> Iterator[tuple[str, float
                     notes.append(Remark("unknown-encoding", text, (channel.topic,)))
             decode = decoders[channel.id]
             if decode is not None:
-                yield channel.topic, 1e-9 * message.log_time, decode(message.data)
+                yield (
+                    channel.topic,
+                    1e-9 * message.log_time,
+                    decode(message.data),
+                    len(message.data),
+                )
 
 
 def _decoder(schema: Any, encoding: str) -> Callable[[bytes], Any] | None:

@@ -15,8 +15,8 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.io.bounds import LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
-from soilml.log_import.readers.lines_by_arrow import read_by_arrow
 from soilml.log_import.readers.program_heads import known_header, with_labview_head
+from soilml.log_import.readers.text_by_arrow import SMALLEST, read_by_arrow
 from soilml.log_import.readers.text_layout import (
     BLOCK,
     MISSING,
@@ -30,6 +30,7 @@ from soilml.log_import.readers.text_layout import (
 from soilml.log_import.recording import Recording
 from soilml.remarks import Remark
 
+_HEAD = 1 << 15  # Bytes by which the layout of a long log is found
 #: Cells of a column looked at to tell text from numbers, and the share that must be numbers.
 _LOOKED, _NUMBERS = 300, 0.5
 _COMMAS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+(\.\d*)?", re.ASCII)
@@ -43,15 +44,22 @@ _MOST, _FEWEST = 200, 8  # Most signals, and fewest readings of each
 _CHANGES = 0.2  # Share of the lines at which the name changes; runs and states change seldom
 
 
-def read_delimited_text(path: Path) -> list[Recording]:
+def read_delimited_text(
+    path: Path, progress: Callable[[int], None] | None = None
+) -> list[Recording]:
     """The table of a text log.
 
     Encoding, separator, decimal mark, header, line of units and the first sample are found. Cells
     that are not a number count as missing. Lines with a wrong number of cells are left out.
 
-    Raises `InputError` where the file has no samples.
+    progress: Called with the number of bytes read.
+
+    Raises `InputError` where the file has no samples, or is long and not plain.
     """
-    LOG_BYTES.check(path, path.stat().st_size)
+    size = path.stat().st_size
+    if size >= SMALLEST and (plain := _plain_recording(path, progress)) is not None:
+        return signals_of(plain)
+    LOG_BYTES.check(path, size)
     text, encoding = decode_text(path.read_bytes(), path)
     if any(mark in text for mark in _MARKS):
         text = _GROUPED.sub("", text)
@@ -59,6 +67,55 @@ def read_delimited_text(path: Path) -> list[Recording]:
     if encoding not in ("utf-8", "utf-8-sig"):
         notes.append(Remark("encoding", f"read as {encoding}", severity="note"))
     return recordings_of(path, text.splitlines(), notes)
+
+
+def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Recording | None:
+    """A long log of plain cells, read in blocks; None for any other."""
+    with path.open("rb") as opened:
+        data = opened.read(_HEAD).rpartition(b"\n")[0]
+    if any(mark in data for mark in (b'"', b"\r\r")) or data.count(b"\r") > data.count(b"\r\n"):
+        return None
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        return None
+    lines = text.removeprefix("\ufeff").splitlines()
+    check_columns(path, lines)
+    try:
+        layout = find_layout(lines)
+    except csv.Error:
+        return None
+    if layout is None or layout.separator == " ":
+        return None
+    layout = with_labview_head(known_header(path, layout))
+    samples, blocks = find_blocks(lines[layout.first :], layout)
+    rows, bad = _rows(samples, layout)
+    if bad or blocks or not rows:
+        return None
+    _, texts = _columns([row for row, _ in rows], layout, as_time=False)
+    start = sum(len(line) for line in data.splitlines(keepends=True)[: layout.first])
+    usual = (len(data) - start) / len(rows)
+    found = read_by_arrow(path, start, layout, texts, usual, progress)
+    if found is None:
+        return None
+    notes = []
+    if layout.decimal_comma:
+        notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
+    if found.every > 1:
+        said = f"it is long: one sample in {found.every} is read, evenly over the whole"
+        notes.append(Remark("thinned", said))
+    if found.bad:
+        said = f"{found.bad} lines have a wrong number of cells and are left out"
+        notes.append(Remark("lines-left-out", said))
+    columns, kept = {}, {}
+    for name in layout.names:
+        seconds = time_of_day(found.texts[name]) if name in found.texts else found.columns[name]
+        if seconds is not None:
+            columns[name] = seconds
+        else:
+            kept[name] = found.texts[name]
+    units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
+    return Recording("", path, columns, kept, units, about=layout.about, notes=tuple(notes))
 
 
 def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> list[Recording]:
@@ -78,12 +135,6 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
         )
     layout = with_labview_head(known_header(path, layout))
     LOG_VALUES.check(path, len(lines) * len(layout.names))
-    if (columns := read_by_arrow(lines, layout)) is not None:
-        if layout.decimal_comma:
-            notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
-        units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
-        own = Recording("", path, columns, {}, units, about=layout.about, notes=tuple(notes))
-        return signals_of(own)
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
     if layout.decimal_comma:
@@ -129,7 +180,7 @@ def _rows(lines: list[str], layout: TextLayout) -> tuple[list[tuple[list[str], i
 
 
 def _columns(
-    rows: list[list[str]], layout: TextLayout
+    rows: list[list[str]], layout: TextLayout, as_time: bool = True
 ) -> tuple[dict[str, Floats], dict[str, list[str]]]:
     columns: dict[str, Floats] = {}
     texts: dict[str, list[str]] = {}
@@ -140,7 +191,7 @@ def _columns(
         if present == 0 or numbers >= _NUMBERS * present:
             columns[name] = values
             continue
-        seconds = time_of_day(cells)
+        seconds = time_of_day(cells) if as_time else None
         if seconds is not None:
             columns[name] = seconds
         else:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from array import array
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.io.bounds import COLUMNS, LOG_VALUES
+from soilml.io.bounds import COLUMNS, KEPT_VALUES
+from soilml.remarks import Remark
 
 _DEEPEST = 6
 _LONGEST = 24  # Longer arrays (images, point clouds, laser scans) are no channels
@@ -20,33 +22,54 @@ _LONGEST = 24  # Longer arrays (images, point clouds, laser scans) are no channe
 class TopicColumns:
     """The columns of one topic of a file, filled message by message.
 
-    `add` raises `InputError` for more columns or values than a log may have.
+    `add` raises `InputError` for more columns than a log may have; `thin` makes room for values.
     """
 
     def __init__(self, file: Path) -> None:
         self._file = file
-        self.clock: list[float] = []
-        self._stamps: list[float] = []
-        self._cells: dict[str, list[float]] = {}
+        self.every, self._seen = 1, 0
+        self.clock = array("d")
+        self._stamps = array("d")
+        self._cells: dict[str, array[float]] = {}
 
     def add(self, received: float, message: Any) -> None:
         """Append a message: an object with fields, or a dictionary; `received` in s."""
+        self._seen += 1
+        if (self._seen - 1) % self.every:
+            return
         row = dict(fields_of(message))
         seconds = row.pop("header.stamp.sec", math.nan)
         stamp = seconds + 1e-9 * row.pop("header.stamp.nanosec", math.nan)
         row.pop("header.seq", None)
         n = len(self.clock)
         COLUMNS.check(self._file, len(self._cells.keys() | row.keys()))
-        LOG_VALUES.check(self._file, (n + 1) * len(self._cells))
         for name, value in row.items():
             if name not in self._cells:
-                self._cells[name] = [math.nan] * n
+                self._cells[name] = array("d", [math.nan]) * n
             self._cells[name].append(value)
         self.clock.append(received)
         self._stamps.append(stamp)
         for cells in self._cells.values():
             if len(cells) <= n:
                 cells.append(math.nan)
+
+    @property
+    def size(self) -> int:
+        """How many values it has."""
+        return len(self.clock) * (len(self._cells) + 2)
+
+    def thin(self) -> None:
+        """Keep every second message, of those to come too."""
+        self.every *= 2
+        self.clock, self._stamps = self.clock[::2], self._stamps[::2]
+        self._cells = {name: cells[::2] for name, cells in self._cells.items()}
+
+    def notes(self, topic: str) -> list[Remark]:
+        """What was left out."""
+        if self.every == 1:
+            return []
+        text = f"{topic}: it is long: one message in {self.every} is read, evenly over the whole"
+        return [Remark("thinned", text, (topic,))]
 
     def columns(self) -> dict[str, Floats]:
         """The columns as arrays in order of time; those without a number are left out."""
@@ -73,6 +96,13 @@ class TopicColumns:
         if set_.all() and np.ptp(stamps) > 0.5 * np.ptp(clock):
             return stamps
         return clock
+
+
+def thin_largest(topics: Iterable[TopicColumns]) -> None:
+    """Thin the topics with most values until all have as many as are kept."""
+    held = list(topics)
+    while sum(own.size for own in held) > KEPT_VALUES:
+        max(held, key=lambda own: own.size).thin()
 
 
 def fields_of(message: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:

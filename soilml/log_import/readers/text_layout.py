@@ -113,7 +113,9 @@ def find_layout(lines: Sequence[str]) -> TextLayout | None:
     Raises `csv.Error`, with the line, for a line before the samples that has no cells.
     """
     head = list(lines[:_LOOKED])
-    found = [(s, d, *_samples(head, s, d)) for s in (*_SEPARATORS, " ") for d in (False, True)]
+    text = "".join(head)
+    possible = [s for s in _SEPARATORS if text.count(s) >= _IN_A_ROW]
+    found = [(s, d, *_samples(head, s, d)) for s in (*possible, " ") for d in (False, True)]
     # a comma cannot separate cells and be the decimal mark
     found = [f for f in found if f[3] > 0 and not (f[0] == "," and f[1])]
     if not found:

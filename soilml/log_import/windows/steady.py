@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.log_import.mapping.window_settings import LeaveOut, WindowSettings
+from soilml.log_import.mapping.log_map import LeaveOut, WindowSettings
 from soilml.log_import.windows.change_points import steady_pieces, without_transients
 from soilml.log_import.windows.mean_errors import mean_error
 from soilml.remarks import Remark

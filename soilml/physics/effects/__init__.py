@@ -26,6 +26,7 @@ from soilml.physics.effects.elliptic_pressure import EllipticPressure as Ellipti
 from soilml.physics.effects.parabolic_pressure import ParabolicPressure as ParabolicPressure
 from soilml.physics.effects.saturating_pressure import SaturatingPressure as SaturatingPressure
 from soilml.physics.effects.firm_base import FirmBase as FirmBase
+from soilml.physics.effects.soft_crust import SoftCrust as SoftCrust
 from soilml.physics.effects.reece_width import ReeceWidth as ReeceWidth
 from soilml.physics.effects.sidewall_shear import SidewallShear as SidewallShear
 from soilml.physics.effects.depth_cohesion import DepthCohesion as DepthCohesion

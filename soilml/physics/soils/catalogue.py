@@ -114,7 +114,8 @@ def soil(name: str, **changes: Real) -> Soil:
     catalogue = soil_catalogue()
     if name not in catalogue:
         raise InputError(
-            f"no soil {name!r}; {did_you_mean(name, catalogue)}`soilml soils` lists the catalogue"
+            f"no soil {name!r}; {did_you_mean(name, catalogue)}"
+            "`soilml show soils` lists the catalogue"
         )
     try:
         return replace(catalogue[name].soil, **changes)

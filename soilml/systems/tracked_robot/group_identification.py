@@ -17,7 +17,6 @@ from soilml.fitting.predictions import forces_of_one_gear
 from soilml.identification import Fit, identify
 from soilml.identification.fit import identifiability_remarks
 from soilml.io.table import Table
-from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, WEAKLY_IDENTIFIED_ABOVE, Z_90, column
 
 #: Parameters that the source identifies from the pull alone, in its order.
@@ -130,19 +129,6 @@ def _refuse_one(count: int) -> None:
         raise InputError(f"{count} groups of data are given; an average needs two or more")
 
 
-def simulate_group(case: Case, slips: Floats, load: float, rng: np.random.Generator) -> Table:
-    """Simulate a group of data: pull (N) at slips (n,) with the noise declared in the case."""
-    force = case.model(case.soil, Operating(slip=slips, load=load))
-    key = column("drawbar_pull")
-    pull = np.asarray(force.drawbar_pull)
-    if np.isnan(pull).any() or key not in case.noise:
-        raise InputError(
-            f"the soil must carry {load:g} N, and the case must declare noise of {key}"
-        )
-    noisy = pull + case.noise[key].std(pull) * rng.standard_normal(len(slips))
-    return Table({"slip": slips, "load_N": np.full(len(slips), load), key: noisy})
-
-
 def predicted(case: Case, fit: Fit, table: Table, channel: str = "drawbar_pull") -> Floats:
     """A channel (SI units) predicted with the fitted values for the rows of a table, (n,)."""
     fitted = case.with_values(dict(zip(fit.names, fit.values.tolist(), strict=True)))
@@ -180,24 +166,24 @@ def linear_regression(x: ArrayLike, y: ArrayLike) -> Regression:
     (2.0, 1.0, 3)
     """
     a, b = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
-    if a.ndim != 1 or a.shape != b.shape:
+    if a.ndim != 1 or a.shape != b.shape or len(a) < 3:
         raise InputError(
-            f"x has the shape {a.shape} and y {b.shape}; two rows of one length needed"
+            f"x has the shape {a.shape} and y {b.shape}; needed are two rows of one length, of "
+            "three points or more"
         )
-    if len(a) < 3 or not (np.isfinite(a).all() and np.isfinite(b).all()):
-        raise InputError(f"{len(a)} points are given; three or more are needed, all of them finite")
-    da, db = a - a.mean(), b - b.mean()
-    xx, xy, yy = float(da @ da), float(da @ db), float(db @ db)
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        raise InputError("a point is not finite; leave it out")
+    xx, xy, yy = np.cov(a, b)[[0, 0, 1], [0, 1, 1]].tolist()
     if xx == 0.0 or yy == 0.0:
         raise FitError("all points have the same x, or the same y: there is no regression line")
-    r2, freedom = xy * xy / (xx * yy), len(a) - 2
-    unexplained = max(1.0 - r2, 0.0)
+    slope, r2, freedom = xy / xx, xy * xy / (xx * yy), len(a) - 2
+    left = max(1.0 - r2, 0.0)
     return Regression(
-        slope=xy / xx,
-        slope_std=math.sqrt(yy * unexplained / (freedom * xx)),
-        intercept=float(b.mean() - xy / xx * a.mean()),
+        slope=slope,
+        slope_std=math.sqrt(yy * left / (freedom * xx)),
+        intercept=float(b.mean() - slope * a.mean()),
         r2=r2,
-        f=r2 / unexplained * freedom if unexplained > 0.0 else math.inf,
+        f=r2 / left * freedom if left > 0.0 else math.inf,
         points=len(a),
     )
 

@@ -14,6 +14,7 @@ from soilml.errors import InputError
 from soilml.fitting.operating_points import operating_points
 from soilml.fitting.simulation import simulate
 from soilml.io.table import Table
+from soilml.physics.contact import stress
 from soilml.physics.effects import Effect, ShearSoftening, TrackGrousers
 from soilml.physics.gears import Track
 from soilml.physics.gears.track_belt import FRONT, MIDDLE, REAR, distance_along
@@ -22,6 +23,7 @@ from soilml.physics.operating_point import Operating
 from soilml.physics.soils import Soil
 
 GRAVITY = 9.81
+PHASES = 16  # Places of the first grouser over which discrete ones are averaged
 BISECTIONS = 16  # Bisection steps for the settling between 0 and 0.5: 0.5 / 2^16 is below 1e-5
 
 
@@ -55,6 +57,77 @@ BEYOND_PEAK: dict[str, tuple[Effect, ...]] = {
     "sand": (),
     "clay": (ShearSoftening(share=1.0, residual=0.7, peak=1.0),),
 }
+
+
+@dataclass(frozen=True, kw_only=True)
+class DiscreteGrousers:
+    """DiscreteGrousers of a track one by one, as eqs. 10 to 14 of Wang et al. 2018 have them.
+
+    pitch, tip: Distance from one to the next, l_l, and length of its top, l_w, m.
+    friction: f_g, coefficient of friction of soil that has yielded.
+    yielding: j_k, displacement at which it yields, m; it differs by soil.
+    power: d, exponent of the compression F = a j^d, which meets the friction at j_k.
+    """
+
+    pitch: float
+    tip: float
+    friction: float
+    yielding: float
+    power: float = 0.5
+
+    def __post_init__(self) -> None:
+        sizes = (self.pitch, self.tip, self.friction, self.yielding, self.power)
+        if not all(0.0 < size < np.inf for size in sizes) or self.tip >= self.pitch:
+            raise InputError(
+                f"grousers {sizes}; needed are sizes above 0, with a tip below a pitch"
+            )
+
+
+def grouser_pull(
+    robot: TrackedRobot,
+    soil: Soil,
+    slip: float,
+    grousers: DiscreteGrousers,
+    effects: tuple[Effect, ...] = (),
+    points: int = 801,
+) -> Floats:
+    r"""Pull (N) of both tracks with discrete grousers, at `PHASES` places of the first one.
+
+    .. math::
+        DP = \sum_n (F_{xn} \cos\theta - F_{ztn} \sin\theta) + \frac{l_w}{l_l} DP_0, \quad
+        F_{ztn} = b (l_l - l_w) \sigma, \quad
+        F_{xn} = F_{ztn} f_g \min(1, j_n / j_k)^d
+
+    with DP_0 the pull without grousers. References: Wang et al. 2018, eqs. 10 to 14; friction acts
+    along the belt, where the paper multiplies it by another cosine. Soil between grousers has no
+    cohesion here, unlike in the effect `track-grousers`, which is the mean over all places with
+    f_g = tan(phi).
+
+    Examples
+    --------
+    >>> from soilml import soil
+    >>> twelve = DiscreteGrousers(pitch=0.05, tip=0.01, friction=0.6, yielding=0.1)
+    >>> round(float(grouser_pull(WANG2018, soil("wang2018/clay"), 0.7, twelve).mean()), -1)
+    740.0
+    """
+    at = Operating(slip=np.asarray([slip]), load=np.asarray([robot.load]))
+    model, track = Model(robot.track, effects), robot.track
+    belt = track.contact_geometry(np.asarray(model(soil, at).sinkage), soil, at)
+    inclination, contact = track.profile_contact(belt, at, points)
+    angle, travel, moved = (
+        np.asarray(v)[:, 0]
+        for v in (inclination, contact.surface_travel, contact.shear_displacement)
+    )
+    normal = np.asarray(stress(contact, soil, at).normal)[:, 0]
+    count = int(travel[-1] / grousers.pitch) + 1
+    place = grousers.pitch * (np.arange(count) + np.arange(PHASES)[:, None] / PHASES)
+    angle, moved, normal = (np.interp(place, travel, v) for v in (angle, moved, normal))
+    pressed = np.where(place <= travel[-1], track.width * (grousers.pitch - grousers.tip), 0.0)
+    pressed = pressed * normal
+    mobilised = np.clip(moved / grousers.yielding, 0.0, 1.0) ** grousers.power
+    each = pressed * (grousers.friction * mobilised * np.cos(angle) - np.sin(angle))
+    bare = float(robot.pull(soil, slip, effects))
+    return np.asarray(2.0 * each.sum(axis=1) + grousers.tip / grousers.pitch * bare)
 
 
 @dataclass(frozen=True)
@@ -109,7 +182,7 @@ def track_balance(model: Model, soil: Soil, at: Operating, points: int = 2001) -
     >>> [round(float(share), 2) for share in (balance.front, balance.middle, balance.rear)]
     [0.14, 0.8, 0.05]
     """
-    track, force = _track(model), model(soil, at)
+    track, force = track_of(model), model(soil, at)
     if points < 3:
         raise InputError(f"points is {points}; needed are 3 or more along the belt")
     belt = track.contact_geometry(force.sinkage, soil, at)
@@ -159,7 +232,7 @@ def settling_from_moments(
     """
     if not np.isfinite([behind, hitch]).all():
         raise InputError(f"behind is {behind:g} m and hitch {hitch:g} m; both must be numbers")
-    track = _track(model)
+    track = track_of(model)
     shape = np.broadcast_shapes(np.shape(at.slip), np.shape(at.load))
     conditions = replace(
         at, slip=np.broadcast_to(at.slip, shape), load=np.broadcast_to(at.load, shape)
@@ -198,7 +271,7 @@ def settled_rows(
     settling = settling_from_moments(case.model, case.soil, at, behind=behind, hitch=hitch)
     parts = []
     for one, s, w in zip(np.nan_to_num(settling), slip, load, strict=True):
-        gear = replace(_track(case.model), settling=float(one))
+        gear = replace(track_of(case.model), settling=float(one))
         own = replace(case, model=replace(case.model, gear=gear))
         parts.append(simulate(own, s, w, **options).columns)
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -218,7 +291,7 @@ def balanced_rows(case: Case, table: Table, settling: Floats | None = None) -> T
     the middle (m); `settling` (n,) too, where it is not the track's own. Raises `InputError` for
     another gear.
     """
-    track, at = _track(case.model), operating_points(table)
+    track, at = track_of(case.model), operating_points(table)
     columns = dict(table.columns)
     if settling is not None:
         track = replace(track, settling=np.nan_to_num(settling))
@@ -240,7 +313,7 @@ def balanced_rows(case: Case, table: Table, settling: Floats | None = None) -> T
     return replace(table, columns=columns)
 
 
-def _track(model: Model) -> Track:
+def track_of(model: Model) -> Track:
     """The model's track; raises `InputError` for another gear."""
     if not isinstance(model.gear, Track):
         raise InputError(f"the gear is a {model.gear.name}; this needs a track")

@@ -1,50 +1,57 @@
-"""Wheel-legs: walking by resistive-force theory, slip models, and soil parameters from both.
+"""Wheel-legs: walking by resistive-force theory, and soil and slip from their strides.
 
-`walk` simulates `WheelLeg`s on `LinearGround`s over time and `gait_metrics` summarises a turn; the
-slip models `TORQUE_SLIP` and `VIBRATION_SLIP`, `soil_from_torque`, `soil_from_vibration`,
-`PRINTED_SINKAGE` and `fit_sinkage` estimate slip and soil from torque, vibration and sinkage.
-Source: Comin and Saaj, IEEE Transactions on Robotics 33(6), 2017.
+`walk` simulates `WheelLeg`s on `LinearGround`s over time and `gait_metrics` summarises a turn.
+`soil_of_strides` estimates the soil from torque, vibration and sinkage, `mobility` says what it
+means for a heavy rover, and `slip_of_strides` gives the slip on a known soil. Source: Comin and
+Saaj, IEEE Transactions on Robotics 33(6), 2017.
 """
 
-from soilml.systems.wheel_legs.gait_metrics import GaitMetrics, gait_metrics
+from soilml.systems.wheel_legs.gaits import gait_metrics
 from soilml.systems.wheel_legs.geometry import FEET, WheelLeg, wheel_leg
-from soilml.systems.wheel_legs.integrator import WalkStatus
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
-from soilml.systems.wheel_legs.sinkage_fit import PRINTED_SINKAGE, SinkageFit, fit_sinkage
-from soilml.systems.wheel_legs.slip_models import (
+from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
+from soilml.systems.wheel_legs.stride_relations import (
     TORQUE_SLIP,
     VIBRATION_SLIP,
-    TorqueSlip,
-    VibrationSlip,
+    LegSoil,
+    SlipRelation,
+    soil_of_sinkage,
+    soil_spring,
+    spring_soil,
 )
-from soilml.systems.wheel_legs.slip_of_strides import StrideSlip, slip_of_strides
-from soilml.systems.wheel_legs.soil_from_slip import LegSoil, soil_from_torque, soil_from_vibration
-from soilml.systems.wheel_legs.stances import SpringLeg, simulate_stance, vibration_amplitude
-from soilml.systems.wheel_legs.walk import Walk, walk
+from soilml.systems.wheel_legs.strides import (
+    Mobility,
+    StrideSlip,
+    StrideSoil,
+    mobility,
+    slip_of_strides,
+    soil_of_strides,
+)
+from soilml.systems.wheel_legs.walk import Walk, WalkStatus, walk
 
 __all__ = [
     "FEET",
     "GROUNDS",
-    "PRINTED_SINKAGE",
     "TORQUE_SLIP",
     "VIBRATION_SLIP",
-    "GaitMetrics",
     "LegSoil",
     "LinearGround",
-    "SinkageFit",
+    "Mobility",
+    "SlipRelation",
     "SpringLeg",
     "StrideSlip",
-    "TorqueSlip",
-    "VibrationSlip",
+    "StrideSoil",
     "Walk",
     "WalkStatus",
     "WheelLeg",
-    "fit_sinkage",
     "gait_metrics",
+    "mobility",
     "simulate_stance",
     "slip_of_strides",
-    "soil_from_torque",
-    "soil_from_vibration",
+    "soil_of_sinkage",
+    "soil_of_strides",
+    "soil_spring",
+    "spring_soil",
     "vibration_amplitude",
     "walk",
     "wheel_leg",

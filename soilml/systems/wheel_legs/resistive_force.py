@@ -61,23 +61,16 @@ def stress_gains(attack: Array, intrusion: Array) -> tuple[Array, Array]:
     return ahead * series(C, D), series(A, B)
 
 
-def resistance(c2: Array, s2: Array, ux: Array, uz: Array) -> tuple[Array, Array]:
-    r"""Stress per depth on plates, (forward, upward), for the generic medium.
-
-    `c2`, `s2` are cos 2 beta and sin 2 beta, beta anticlockwise from the direction of travel x;
-    (ux, uz) the direction of motion, a unit vector with z upwards. The same law as
-    `stress_gains`, which is linear in that vector once its angles are written out:
+def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
+    r"""Stress per depth on plates, forward and upward, for the generic medium, in six terms.
 
     .. math:: (\sigma_x, \sigma_z) / z = \sigma_{rest}(\beta) - R(\beta) \hat v
 
-    so that no angle is wrapped, no mirror image is chosen, and the Jacobian is explicit.
+    Static part (x, z) and matrix R (xx, xz, zx, zz) at cos 2 beta and sin 2 beta, beta
+    anticlockwise from the direction of travel x; v is the direction of motion, a unit vector with
+    z upwards. The same law as `stress_gains`, linear in that vector once its angles are written
+    out: no angle is wrapped, no mirror image is chosen, and the Jacobian is explicit.
     """
-    rest_x, rest_z, xx, xz, zx, zz = resistance_terms(c2, s2)
-    return rest_x - xx * ux - xz * uz, rest_z - zx * ux - zz * uz
-
-
-def resistance_terms(c2: Array, s2: Array) -> tuple[Array, Array, Array, Array, Array, Array]:
-    """Terms of `resistance`: the static part (x, z) and the matrix R (xx, xz, zx, zz)."""
     return (
         -D[1, 0] * s2,
         A[0, 0] + A[1, 0] * c2,

@@ -1,26 +1,58 @@
-"""Simulation of walking wheel-legs, many cases at once, and the stress on their plates."""
+"""Simulation of walking wheel-legs, many cases at once, by implicit steps."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from enum import IntEnum
 
 import numpy as np
 
 from soilml.arrays import Array, Real
 from soilml.errors import InputError
 from soilml.systems.wheel_legs.geometry import WheelLeg
-from soilml.systems.wheel_legs.ground_reaction import SKIN, batch_plates
-from soilml.systems.wheel_legs.integrator import (
-    FADING,
-    DriveParameters,
-    StepMethod,
-    WalkSimulation,
-    WalkStatus,
-    implicit_step,
-    nearest_attack,
-)
-from soilml.systems.wheel_legs.resistive_force import LinearGround, resistance
+from soilml.systems.wheel_legs.ground_reaction import WalkingLegs
+from soilml.systems.wheel_legs.resistive_force import LinearGround
+
+GRAVITY = 9.81
+TOLERANCE = 1e-6  # A step has converged when the forces balance to this fraction of the weight
+#: Newton iterations of a step, and halvings of one Newton update that does not reduce the
+#: imbalance.
+MAX_NEWTON_STEPS, MAX_HALVINGS = 25, 8
+#: Largest change of velocity by a Newton update, as a fraction of the speed of the leg's end: the
+#: force is a function of the direction of motion and nearly singular at rest.
+MAX_UPDATE = 0.3
+#: How often a step that does not converge is halved, and a step with an abrupt change of velocity.
+MAX_BISECTIONS, MAX_ABRUPT_BISECTIONS = 16, 5
+#: Change of the vertical velocity that counts as abrupt (a fall or an impact), as a fraction of the
+#: speed of the leg's end.
+ABRUPT_CHANGE = 0.2
+HALVINGS = 40  # Bisection steps for the height of the hub at the start
+
+
+class WalkStatus(IntEnum):
+    """Status of a case of a batch."""
+
+    OK = 0
+    INVALID = 1
+    NO_CONTACT = 2
+    SUNK = 3
+    NOT_CONVERGED = 4
+
+    @property
+    def reason(self) -> str:
+        """Description of the status."""
+        return _REASONS[self]
+
+
+_REASONS: dict[WalkStatus, str] = {
+    WalkStatus.OK: "ok",
+    WalkStatus.INVALID: "no walk: the wheel-leg, the ground or the commanded slip is invalid",
+    WalkStatus.NO_CONTACT: "no walk: no leg ever reaches the ground; the legs are shorter than the "
+    "clearance of the body",
+    WalkStatus.SUNK: "stopped: the ground is too soft, the hub reaches its surface",
+    WalkStatus.NOT_CONVERGED: "stopped: no motion of the hub satisfies the force balance",
+}
 
 
 @dataclass(frozen=True)
@@ -63,25 +95,26 @@ class Walk:
         slip = 1.0 - self.vx / np.where(in_contact, rolling, 1.0)
         return np.where(in_contact | np.isnan(self.vx), slip, 1.0)
 
-    @property
-    def midstance(self) -> Array:
-        """Whether a leg passes the vertical at the instant, (instants, cases)."""
-        step = self.angle[1] - self.angle[0]
-        return np.abs(self.attack - 0.5 * np.pi) <= 0.5001 * step
-
     def at_midstance(self, values: Array) -> Array:
         """Mean over the midstances of values at every instant, (instants, cases) -> (cases,)."""
-        midstance = self.midstance
+        step = self.angle[1] - self.angle[0]
+        midstance = np.abs(self.attack - 0.5 * np.pi) <= 0.5001 * step
         return np.sum(np.where(midstance, values, 0.0), axis=0) / np.sum(midstance, axis=0)
 
     def after(self, angle: float) -> Walk:
         """The part of the walk after the wheel has turned by `angle`, rad."""
         late = self.angle >= angle - 1e-9
         parts = ("time", "angle", "x", "z", "vx", "vz", "torque")
-        return Walk(
-            **{name: getattr(self, name)[late] for name in parts},
-            **{name: getattr(self, name) for name in ("status", "length", "legs", "speed")},
-        )
+        return replace(self, **{name: getattr(self, name)[late] for name in parts})
+
+
+def nearest_attack(angle: Array | float, legs: Array) -> Array:
+    """Attack angle, rad, of the leg closest to vertical; pi/2 where it points straight down.
+
+    `angle`: rotation of the wheel since a leg pointed straight down, rad.
+    """
+    pitch = 2.0 * np.pi / legs
+    return 0.5 * np.pi + angle - pitch * np.round(angle / pitch)
 
 
 def walk(
@@ -91,9 +124,6 @@ def walk(
     slip: Real | None = None,
     turns: float = 2.0,
     steps: int = 1000,
-    height: float | None = None,
-    fading: float = FADING,
-    step: StepMethod = implicit_step,
 ) -> Walk:
     r"""Simulate the walk of every case from rest, with a leg pointing straight down (eqs. 7, 8).
 
@@ -112,13 +142,6 @@ def walk(
         Duration in turns of the wheel.
     steps
         Steps per turn, at least 100.
-    height
-        Height of the hub at the start, m; by default where the ground carries it.
-    fading
-        Speed below which the direction of motion is regularised, as a fraction of the speed of the
-        leg's end; see `ground_reaction`.
-    step
-        Integration method.
 
     Returns
     -------
@@ -140,110 +163,158 @@ def walk(
     >>> ground = LinearGround(stiffness=0.7e6)
     >>> result = walk(wheel_leg("LTF"), ground, slip=0.25, turns=1.0, steps=200)
     >>> metrics = gait_metrics(result)
-    >>> round(float(metrics.mean_slip[0]), 2), round(float(metrics.mean_sinkage[0]), 2)  # 1, m
-    (0.25, 0.06)
+    >>> [round(float(metrics[name][0]), 2) for name in ("slip_mean", "sinkage_mean_m")]
+    [0.25, 0.06]
     """
-    if not (steps >= 100 and 0.0 < turns < np.inf and fading > 0.0):
+    if not (steps >= 100 and 0.0 < turns < np.inf):
         raise InputError(
-            f"steps {steps}, turns {turns:g}, fading {fading:g}: a walk needs at least 100 steps "
-            "per turn, and turns and fading above 0"
+            f"steps {steps}, turns {turns:g}: a walk needs at least 100 steps per turn, and turns "
+            "above 0"
         )
-    if height is not None and not np.isfinite(height):
-        raise InputError(f"the start height is {height:g} m; it must be a number")
-    legs_, grounds_, slips = _cases(wheel_legs, grounds, slip)
-    status = np.array([_status(*case) for case in zip(legs_, grounds_, slips, strict=True)])
+    wheels = [wheel_legs] if isinstance(wheel_legs, WheelLeg) else list(wheel_legs)
+    under = [grounds] if isinstance(grounds, LinearGround) else list(grounds)
+    slips = np.atleast_1d(np.asarray(np.nan if slip is None else slip, float))
+    cases = max(len(wheels), len(under), slips.size)
+    if min(len(wheels), len(under), slips.size) == 0:
+        raise InputError("no case to walk: give at least one wheel-leg and one ground")
+    for name, size in (("wheel-legs", len(wheels)), ("grounds", len(under)), ("slips", slips.size)):
+        if size not in (1, cases):
+            raise InputError(f"{size} {name} for {cases} cases: give one, or one for each case")
+    wheels, under = wheels * (cases // len(wheels)), under * (cases // len(under))
+    slips = np.broadcast_to(slips, (cases,))
+    invalid = [
+        bool(wheel.invalid_reason or ground.invalid_reason or abs(s) > 1.0)
+        for wheel, ground, s in zip(wheels, under, slips, strict=True)
+    ]
+    status = np.where(invalid, int(WalkStatus.INVALID), int(WalkStatus.OK))
     count = round(turns * steps) + 1
-    history = np.full((5, count, len(legs_)), np.nan)
-    valid = np.flatnonzero(status == WalkStatus.OK)
+    history = np.full((5, count, cases), np.nan)
+    valid = np.flatnonzero(~np.asarray(invalid))
     if valid.size:
-        valid_legs, valid_grounds = [legs_[i] for i in valid], [grounds_[i] for i in valid]
-        drive = DriveParameters(
-            mass=np.array([w.mass for w in valid_legs]),
-            tip_speed=np.array([w.speed * w.leg.length for w in valid_legs]),
-            legs=np.array([w.legs for w in valid_legs]),
-            slip=slips[valid],
-            fading=np.array([fading * w.speed * w.leg.length for w in valid_legs]),
-        )
-        simulation = WalkSimulation(
-            batch_plates(valid_legs, valid_grounds), drive, 2.0 * np.pi / steps, step
-        )
-        status[valid], history[:, :, valid] = simulation.run(count, height)
+        legs = WalkingLegs.of([wheels[i] for i in valid], [under[i] for i in valid], slips[valid])
+        status[valid], history[:, :, valid] = _simulated(legs, count, 2.0 * np.pi / steps)
     angle = 2.0 * np.pi / steps * np.arange(count)
-    speed = np.array([np.nan if w.invalid_reason else w.speed for w in legs_])
+    speed = np.array([np.nan if w.invalid_reason else w.speed for w in wheels])
+    x, z, vx, vz, torque = history
     return Walk(
         time=angle[:, None] / speed,
         angle=angle,
-        x=history[0],
-        z=history[1],
-        vx=history[2],
-        vz=history[3],
-        torque=history[4],
+        x=x,
+        z=z,
+        vx=vx,
+        vz=vz,
+        torque=torque,
         status=status,
-        length=np.array([w.leg.length for w in legs_]),
-        legs=np.array([max(w.legs, 1) for w in legs_]),
+        length=np.array([w.leg.length for w in wheels]),
+        legs=np.array([max(w.legs, 1) for w in wheels]),
         speed=speed,
     )
 
 
-def _cases(
-    wheel_legs: Sequence[WheelLeg] | WheelLeg,
-    grounds: Sequence[LinearGround] | LinearGround,
-    slip: Real | None,
-) -> tuple[list[WheelLeg], list[LinearGround], Array]:
-    """Lists of one entry per case; a single entry is used for all."""
-    legs = [wheel_legs] if isinstance(wheel_legs, WheelLeg) else list(wheel_legs)
-    under = [grounds] if isinstance(grounds, LinearGround) else list(grounds)
-    slips = np.atleast_1d(np.asarray(np.nan if slip is None else slip, float))
-    count = max(len(legs), len(under), slips.size)
-    if min(len(legs), len(under), slips.size) == 0:
-        raise InputError("no case to walk: give at least one wheel-leg and one ground")
-    for name, size in (("wheel-legs", len(legs)), ("grounds", len(under)), ("slips", slips.size)):
-        if size not in (1, count):
-            raise InputError(f"{size} {name} for {count} cases: give one, or one for each case")
-    return (
-        legs * (count // len(legs)),
-        under * (count // len(under)),
-        np.broadcast_to(slips, (count,)).copy(),
-    )
+def _simulated(legs: WalkingLegs, count: int, step: float) -> tuple[Array, Array]:
+    """Status, (cases,), and x, z, vx, vz, torque at `count` instants, (5, instants, cases).
 
-
-def _status(wheel_leg: WheelLeg, ground: LinearGround, slip: float) -> WalkStatus:
-    commanded = not np.isnan(slip)
-    invalid_slip = commanded and not -1.0 <= slip <= 1.0
-    invalid = wheel_leg.invalid_reason or ground.invalid_reason or invalid_slip
-    return WalkStatus.INVALID if invalid else WalkStatus.OK
-
-
-@dataclass(frozen=True)
-class PlateStress:
-    """Positions of the plates (m, x along the walk, z up from the surface) and their stress (Pa).
-
-    Arrays (plates,), ordered by leg (leg, tip, heel), with the body last. `ahead` and `up` are the
-    components of the stress on the plate, 0 above the ground.
+    The values of a case that stops are NaN from then on.
     """
+    cases = legs.mass.size
+    status, touched = np.full(cases, int(WalkStatus.OK)), np.zeros(cases, bool)
+    history = np.full((5, count, cases), np.nan)
+    active, hub = np.arange(cases), _start(legs)
+    history[:, 0] = *hub, 0.0 * hub[0]
+    for i in range(1, count):
+        hub, forces, balanced = implicit_step(legs, hub, (i - 1) * step, i * step)
+        if not np.all(touched[active]):
+            low = (legs.at(i * step)[1] + hub[1] < 0.0) & (legs.area > 0.0)
+            touched[active] |= np.any(low & (legs.turns > 0.0), axis=0)
+        status[active[~balanced]] = WalkStatus.NOT_CONVERGED
+        status[active[balanced & (hub[1] <= 0.0)]] = WalkStatus.SUNK
+        kept = balanced & (hub[1] > 0.0)
+        history[:, i, active[kept]] = np.vstack([hub, forces[2:]])[:, kept]
+        if not np.all(kept):
+            active, legs, hub = active[kept], legs.select(kept), hub[:, kept]
+            if not active.size:
+                break
+    status[(status == WalkStatus.OK) & ~touched] = WalkStatus.NO_CONTACT
+    return status, history
 
-    x: Array
-    z: Array
-    ahead: Array
-    up: Array
-    area: Array  # m^2
+
+def _start(legs: WalkingLegs) -> Array:
+    """Hubs (x, z, vx, vz), (4, cases), at rest where the ground carries them pushed down."""
+    pose, still = legs.at(0.0), np.zeros(legs.mass.size)
+    high = np.where(legs.area > 0.0, -pose[1], -np.inf).max(axis=0)
+    low, pressed = still, replace(legs, speed=still)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        carries = pressed.reaction(pose, middle, still, still - 1.0)[0][1] > legs.mass * GRAVITY
+        low, high = np.where(carries, middle, low), np.where(carries, high, middle)
+    return np.stack([still, low, still, still])
 
 
-def plate_stresses(
-    walked: Walk, instant: int, wheel: WheelLeg, ground: LinearGround, case: int = 0
-) -> PlateStress:
-    """Stress on every plate at an instant of a case of a walk (Comin and Saaj 2017, eq. 4)."""
-    plates = batch_plates([wheel], [ground])
-    pose = plates.at(float(walked.angle[instant]))
-    x, z, vx, vz = (
-        float(part[instant, case]) for part in (walked.x, walked.z, walked.vx, walked.vz)
-    )
-    turning = plates.speed * plates.turns
-    across, upwards = vx + turning * pose.z, vz - turning * pose.x
-    fading = FADING * wheel.speed * wheel.leg.length
-    pace = np.sqrt(across**2 + upwards**2 + fading**2)
-    sx, sz = resistance(pose.c2, pose.s2, across / pace, upwards / pace)
-    depth = np.maximum(-(z + pose.z), 0.0)
-    pressure = ground.stiffness * depth + ground.offset * (1.0 - np.exp(-depth / SKIN))
-    parts = (x + pose.x, z + pose.z, pressure * sx, pressure * sz, plates.area)
-    return PlateStress(*(part[:, 0] for part in parts))
+def implicit_step(
+    legs: WalkingLegs, hub: Array, start: float, stop: float, depth: int = 0
+) -> tuple[Array, Array, Array]:
+    r"""Advance hubs (x, z, vx, vz) from one wheel angle to another by an implicit Euler step.
+
+    .. math:: M (v' - v) / dt = F(v', z + v'_z dt) - M g
+
+    is solved by a damped Newton method in both velocities. Cases that do not converge, or whose
+    velocity changes abruptly, take the step in two halves, recursively (`depth`). A case with a
+    commanded slip has its horizontal velocity prescribed.
+
+    Returns hubs (4, cases), forces (3, cases) at the end, and whether they balance there, (cases,).
+    """
+    end, forces, converged = _newton(legs, hub, start, stop)
+    abrupt = np.abs(end[3] - hub[3]) > ABRUPT_CHANGE * legs.tip_speed
+    repeated = np.flatnonzero(~converged | (abrupt & (depth < MAX_ABRUPT_BISECTIONS)))
+    if repeated.size and depth < MAX_BISECTIONS:
+        middle, some = 0.5 * (start + stop), legs.select(repeated)
+        halfway, _, first = implicit_step(some, hub[:, repeated], start, middle, depth + 1)
+        converged[repeated] = False
+        later = repeated[first]
+        if later.size:
+            kept = np.flatnonzero(first)
+            end[:, later], forces[:, later], converged[later] = implicit_step(
+                some.select(kept), halfway[:, kept], middle, stop, depth + 1
+            )
+    return end, forces, converged
+
+
+def _newton(legs: WalkingLegs, hub: Array, start: float, stop: float) -> tuple[Array, Array, Array]:
+    """Newton's method for the velocities at the end of one step."""
+    pose, dt = legs.at(stop), (stop - start) / legs.speed
+    commanded = ~np.isnan(legs.slip)
+    weight, inertia = legs.mass * GRAVITY, legs.mass / dt
+
+    def imbalance(v: Array) -> tuple[Array, Array, Array, Array]:
+        """Residual forces (x, z), N, their norm over the weight, forces and rates."""
+        forces, rates = legs.reaction(pose, hub[1] + v[1] * dt, v[0], v[1])
+        residual = inertia * (v - hub[2:]) - forces[:2]
+        residual[0] = np.where(commanded, 0.0, residual[0])
+        residual[1] += weight
+        return residual, np.hypot(*residual) / weight, forces, rates
+
+    # eq. 11: horizontal velocity at the commanded slip
+    target = (1.0 - legs.slip) * legs.tip_speed * np.sin(nearest_attack(stop, legs.legs))
+    v = np.stack([np.where(commanded, target, hub[2]), hub[3]])
+    residual, norm, forces, rates = imbalance(v)
+    for _ in range(MAX_NEWTON_STEPS):
+        if np.all(norm < TOLERANCE):
+            break
+        # the Jacobian of the residual, with the rate by height in the column of vz
+        xx, xz = inertia - rates[0, 0], -rates[0, 1] - rates[0, 2] * dt
+        zx, zz = -rates[1, 0], inertia - rates[1, 1] - rates[1, 2] * dt
+        xx, xz, zx = (np.where(commanded, a, b) for a, b in ((1, xx), (0, xz), (0, zx)))
+        rx, rz = residual
+        update = np.stack([xz * rz - zz * rx, zx * rx - xx * rz]) / (xx * zz - xz * zx)
+        length = np.maximum(np.hypot(*update), 1e-300)
+        share = np.minimum(1.0, MAX_UPDATE * legs.tip_speed / length)
+        share = np.where(norm < TOLERANCE, 0.0, share)
+        for halving in range(MAX_HALVINGS):
+            trial = imbalance(v + share * update)
+            worse = ~(trial[1] < norm) & (share > 0.0)
+            if halving == MAX_HALVINGS - 1 or not np.any(worse):
+                break
+            share = np.where(worse, 0.5 * share, share)
+        v = v + share * update
+        residual, norm, forces, rates = trial
+    return np.concatenate([hub[:2] + v * dt, v]), forces, norm < TOLERANCE

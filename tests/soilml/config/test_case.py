@@ -117,7 +117,7 @@ MISTAKES = {
     "law of another gear": ('"wheel"', '"track"\nbase = 0.5\nbraking = "slip-sign"', "unknown key"),
     "text for a number": ("radius = 0.15", 'radius = "big"', "needed is a number"),
     "degrees": ("[soil.prior]", "friction_angle = 34\n[soil.prior]", "write 0.5934"),
-    "unknown soil": ("wong1989/dry_sand", "wong1989/dry_sands", "soilml soils"),
+    "unknown soil": ("wong1989/dry_sand", "wong1989/dry_sands", "soilml show soils"),
     "unknown prior": ("cohesion = [", "cohesoin = [", "did you mean 'cohesion'"),
     "normal prior of a positive value": (
         "cohesion = [0.0, 3000.0]",

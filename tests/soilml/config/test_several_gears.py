@@ -7,6 +7,7 @@ from soilml import Operating, read_case
 from soilml.config.case import read_case_of_one_gear
 from soilml.config.write_case import case_as_toml
 from soilml.errors import InputError
+from soilml.fitting.predictions import forces
 from soilml.numerics.prior import Prior
 
 GEARS = """\
@@ -56,23 +57,53 @@ def test_each_gear_has_its_dimensions_and_effects_and_shares_the_rest(tmp_path):
     assert case.prior["grousers@lugged.height"] == Prior(0.0, 0.02)
 
 
-def test_suspected_effects_are_marked_and_left_out_with_their_priors(tmp_path):
-    marked = (GEARS + REST).replace("height = 0.01", "suspected = true\nheight = 0.01")
-    case = case_of(tmp_path, marked)
-    assert case.suspected == ("grousers@lugged",)
-    assert case.of_gear("lugged").suspected == ("grousers",)
-    assert case.of_gear("smooth").suspected == ()
-    again = case_of(tmp_path, case_as_toml(case))
-    assert again == case
-    known = case.without_suspected()
-    assert known.gears["lugged"].effects == () and known.suspected == ()
-    assert [e.name for e in known.model.effects] == ["slip-sinkage"]
-    assert known.prior.keys() == {"friction_angle", "slip-sinkage.n1"}
-    shared = case_of(tmp_path, (GEARS + REST).replace("n1 = 0.3", "suspected = true\nn1 = 0.3"))
-    assert shared.suspected == shared.of_gear("smooth").suspected == ("slip-sinkage",)
-    assert shared.without_suspected().model.effects == ()
-    with pytest.raises(InputError, match="suspected is 1; needed is true or false"):
-        case_of(tmp_path, (GEARS + REST).replace("n1 = 0.3", "suspected = 1\nn1 = 0.3"))
+def test_explanations_of_gears_are_read_and_written_and_mixed(tmp_path):
+    several = """
+[[explanation]]
+weight = 0.6
+[[explanation.effect]]
+name = "grousers"
+gear = "lugged"
+height = 0.008
+[explanation.effect.prior]
+height = [0.004, 0.012]
+[[explanation]]
+weight = 0.3
+[explanation.soil]
+friction_angle = 0.5
+[[explanation.effect]]
+name = "bulldozing"
+"""
+    path = tmp_path / "mixed.toml"
+    path.write_text(GEARS + REST + several)
+    with pytest.raises(InputError, match=r"has 2 explanations .* keep one"):
+        read_case(path)
+    case = read_case(path, with_explanations=True)
+    first, second = (case.of_explanation(one) for one in case.explanations)
+    assert first.gears["lugged"].effects[0].height == 0.008
+    assert first.prior["grousers@lugged.height"] == Prior(0.004, 0.012)
+    assert [e.name for e in second.model.effects] == ["slip-sinkage", "bulldozing"]
+    path.write_text(case_as_toml(case))
+    assert read_case(path, with_explanations=True) == case
+    at = Operating(slip=np.asarray([0.1, 0.4]), load=60.0)
+    pull = [
+        np.asarray(forces(one.of_gear("lugged"), at).drawbar_pull) for one in (case, first, second)
+    ]
+    np.testing.assert_allclose(pull[0], (0.6 * pull[1] + 0.3 * pull[2]) / 0.9, rtol=1e-12)
+    assert case.without_explanations().gears == case.gears
+    for wrong in ("weight = 0.9", "weight = 1.5"):
+        path.write_text(GEARS + REST + several.replace("weight = 0.6", wrong))
+        with pytest.raises(InputError, match="weight"):
+            read_case(path)
+
+
+def test_a_suspected_effect_of_an_earlier_file_is_its_only_explanation(tmp_path):
+    marked = (GEARS + REST).replace("n1 = 0.3", "suspected = true\nn1 = 0.3")
+    path = tmp_path / "old.toml"
+    path.write_text(marked)
+    case = read_case(path, with_explanations=True)
+    assert case.model.effects == () and [e.weight for e in case.explanations] == [1.0]
+    assert [e.name for e in read_case(path).model.effects] == ["slip-sinkage"]
 
 
 def test_parameters_of_gears_are_set_by_path(tmp_path):

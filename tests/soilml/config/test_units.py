@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from soilml import read_case
-from soilml.config.model_settings import UNITS
 from soilml.errors import InputError
+from soilml.io.declared_settings import UNITS
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS
 from soilml.physics.gears import GEARS

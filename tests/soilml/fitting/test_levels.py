@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from soilml.fitting.levels import (
-    covariate_levels,
     is_one_load,
     load_levels,
     replicate_rows,
@@ -63,33 +62,6 @@ def test_repeats_show_levels_that_are_set_more_finely():
     repeated = np.repeat(np.arange(4), 8)
     assert load_levels(load, repeated).count == 2
     assert load_levels(load, repeated % 2).count == 1  # one run of each: may be its scatter
-
-
-def test_declared_noise_of_the_load_widens_a_level():
-    load = np.repeat([50.0, 60.0], 4)
-    assert load_levels(load).count == 2
-    assert load_levels(load, std=5.0).count == 1
-
-
-@pytest.mark.parametrize(
-    "slips, count",
-    [
-        (np.tile(np.linspace(0.05, 0.6, 8), 3), 8),
-        (np.asarray([0.30, 0.305, 0.295, 0.31]), 1),
-        (np.asarray([0.02, 0.04, 0.06, -0.1]), 4),
-        (np.asarray([0.2]), 1),
-    ],
-)
-def test_slips_are_counted(slips, count):
-    levels = slip_levels(slips)
-    assert levels.count == count and levels.index.max() == count - 1
-
-
-def test_covariates_have_levels_on_their_own_scales():
-    assert covariate_levels("speed", np.asarray([0.05, 0.051, 0.049])).count == 1
-    assert covariate_levels("speed", np.asarray([0.05, -0.05, 0.5, 0.05])).count == 3
-    assert covariate_levels("pass_number", np.asarray([1.0, 2.0, 1.0, 2.0])).count == 2
-    assert covariate_levels("slip_angle", np.zeros(5)).count == 1
 
 
 def test_rows_are_driven_alike_where_all_that_is_set_agrees():

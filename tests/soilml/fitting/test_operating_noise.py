@@ -36,19 +36,6 @@ def test_exact_slip_and_load_add_nothing():
     assert not noise_of_operation(case, readings).any()
 
 
-def test_noise_is_added_once():
-    case = case_of(NOISY)
-    readings = stack_readings(case, driven(case))
-    extra = 0.3 * readings.std
-    once = readings.with_noise_of_operation(extra)
-    assert once.std == pytest.approx(np.hypot(readings.std, extra))
-    again = once.with_noise_at(readings.measured).with_noise_of_operation(extra)
-    fresh = readings.with_noise_at(readings.measured).with_noise_of_operation(extra)
-    assert again.std == pytest.approx(fresh.std, rel=1e-12)
-    own = np.arange(len(readings)) % 3 == 0
-    assert once.subset(own).sensor_std == pytest.approx(readings.std[own])
-
-
 def test_a_row_that_nothing_carries_beside_it_counts_as_exact():
     case = case_of(MODEL.replace('torque_Nm = "1 %"', 'torque_Nm = "1 %"\nload_N = 30.0'))
     readings = stack_readings(case, driven(case, loads=(50.0, 70.0, 90.0)))

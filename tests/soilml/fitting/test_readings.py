@@ -10,7 +10,6 @@ from soilml.errors import InputError
 from soilml.fitting.readings import stack_readings, typical_std
 from soilml.gap.workflow import MOST_READINGS, _check_size
 from soilml.io.table import Table
-from soilml.physics.effects.base import REFERENCE_LOAD, log_relative_slip
 
 SMALL = Table(
     {
@@ -30,50 +29,12 @@ def stacked(table=SMALL):
     return stack_readings(case_of(), table)
 
 
-def test_finite_readings_are_stacked_by_channel():
-    found = stacked()
-    assert found.channels == ("torque", "sinkage") and len(found) == 8
-    assert found.row.tolist() == [0, 1, 3, 4, 0, 1, 2, 3]
-    assert found.channel.tolist() == [0] * 4 + [1] * 4
-    assert found.measured.tolist() == [1.0, 2.0, 4.0, 5.0, 0.01, 0.02, 0.03, 0.04]
-    assert (found.runs, found.run.tolist()) == (("a", "b"), [1, 0, 1, 0, 0])
-    assert found.order.tolist() == [1, 2, 0, 0, 1]  # by time within a run
-    assert found.slip.tolist() == [0.1, 0.2, 0.4, 0.5, 0.1, 0.2, 0.3, 0.4]
-    assert found.load.tolist() == [40.0, 50.0, 70.0, 80.0, 40.0, 50.0, 60.0, 70.0]
-    slip, load = found.log_slip_and_load
-    assert load == pytest.approx(np.log(found.load) - np.log(REFERENCE_LOAD))
-    assert slip == pytest.approx(log_relative_slip(found.slip))
-    force = {"torque": np.arange(5.0), "sinkage": 10.0 + np.arange(5.0)}
-    assert found.stack(force).tolist() == [0.0, 1.0, 3.0, 4.0, 10.0, 11.0, 12.0, 13.0]
-    both = found.stack({name: np.stack([v, -v]) for name, v in force.items()})
-    assert both.tolist() == [found.stack(force).tolist(), (-found.stack(force)).tolist()]
-
-
-def test_rows_without_time_are_in_their_order():
-    table = Table({name: SMALL[name] for name in ("run", "slip", "load_N", "torque_Nm")})
-    assert stacked(table).order.tolist() == [0, 0, 1, 1, 2]
-    several = Table({**table.columns, "run": np.asarray(["c", "a", "b", "c", "a"])})
-    assert stacked(several).order.tolist() == [0, 0, 0, 1, 1]
-
-
 def test_a_table_without_a_reading_has_none():
     table = Table({name: SMALL[name] for name in ("run", "slip", "load_N")})
     found = stacked(table)
     assert (len(found), found.channels, found.noise) == (0, (), ())
     assert found.row.size == found.channel.size == found.std.size == 0
     assert found.slip_std.tolist() == found.load_std.tolist() == [0.0] * 5
-
-
-def test_levels_are_those_of_each_reading():
-    found = stack_readings(case_of(), driven(case_of(), loads=(40.0, 60.0, 90.0), slips=4))
-    part = found.subset(found.load > 50.0)  # rows without a reading have no level
-    for levels, values, count in (
-        (part.load_levels, part.load, 2),
-        (part.slip_levels, part.slip, 4),
-    ):
-        assert levels.count == count and levels.index.shape == values.shape
-        expected = np.unique(values, return_inverse=True)[1]
-        assert levels.index.tolist() == expected.tolist()
 
 
 def test_noise_that_is_not_positive_is_not_declared():
@@ -128,17 +89,6 @@ def test_a_channel_of_unknown_noise_is_left_out_with_a_note():
     assert note.text.startswith("drawbar_pull_N is excluded: its noise is not declared")
     nothing = replace(found, std=np.full(len(found), np.nan))
     assert nothing.with_known_noise() == (nothing, [])
-
-
-def test_readings_of_some_rows_are_numbered_anew():
-    found = stacked()
-    rows = np.asarray([4, 1])
-    at = replace(found.at, slip=np.asarray(found.at.slip)[rows], load=np.asarray([80.0, 50.0]))
-    selected, part = found.of_rows(rows, at)
-    assert np.flatnonzero(selected).tolist() == [1, 3, 5]
-    assert part.measured.tolist() == [2.0, 5.0, 0.02] and part.row.tolist() == [1, 0, 1]
-    assert part.load.tolist() == [50.0, 80.0, 50.0] and part.run.tolist() == [0, 0]
-    assert part.order.tolist() == [1, 2] and part.slip_std.tolist() == [0.05, 0.02]
 
 
 @pytest.mark.parametrize("more, every", [(0, None), (1, 2), (MOST_READINGS, 2)])

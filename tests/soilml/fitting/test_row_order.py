@@ -1,12 +1,11 @@
 """Progress of a campaign and direction of its loads, from the order of the rows."""
 
 import numpy as np
-import pytest
 
 from soilml import EFFECTS, Case, Model, Wheel, simulate, soil
 from soilml.fitting.levels import replicate_rows
 from soilml.fitting.operating_points import operating_points
-from soilml.fitting.row_order import campaign_progress, load_directions, with_order_columns
+from soilml.fitting.row_order import campaign_progress, with_order_columns
 from soilml.io.table import Table
 from soilml.physics.operating_point import FROM_ORDER
 
@@ -23,18 +22,6 @@ def rows(count=16, **more):
         "load_N": RNG.permutation(np.repeat([40.0, 60.0], count // 2)),
     }
     return Table(columns | more)
-
-
-@pytest.mark.parametrize(
-    "loads, directions",
-    [
-        ([40, 41, 60, 58, 59, 40, 39, 41, 60], [1, 1, 1, 1, 1, -1, -1, -1, 1]),
-        ([60, 40, 40, 60], [1, -1, -1, 1]),
-        ([60], [1]),
-    ],
-)
-def test_a_load_falls_where_it_is_clearly_below_the_last_largest(loads, directions):
-    assert load_directions(np.asarray(loads, dtype=float)).tolist() == directions
 
 
 def test_progress_is_that_of_one_clock_else_that_of_the_rows():
@@ -80,13 +67,6 @@ def test_rows_of_runs_that_alternate_have_no_order_unless_they_were_timed():
         PLAIN, rows(run=np.repeat(["a"], 16), time_s=np.arange(16.0)), FROM_ORDER
     )
     assert {"progress", "load_direction"} <= timed.columns.keys()
-
-
-def test_loads_of_one_level_neither_rise_nor_fall():
-    """One of them is 15 % below the others, as a load cell scatters."""
-    load = np.linspace(24.3, 26.1, 16)
-    load[9] = 21.6
-    assert "load_direction" not in with_order_columns(PLAIN, rows(load_N=load), FROM_ORDER)
 
 
 def test_simulated_rows_say_that_the_campaign_is_over():

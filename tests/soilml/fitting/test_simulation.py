@@ -1,13 +1,11 @@
 """Rows that a case predicts, and the names that users import."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from soilml import Midstance, Noise, Prior, gap, identify, read_case, simulate
+from soilml import Noise, Prior, gap, identify, read_case, simulate
 from soilml.cli.output import save_columns
 from soilml.errors import InputError
 from soilml.fitting import simulation
@@ -42,13 +40,6 @@ def test_efficiencies_are_of_driving_rows_and_are_passed_over_by_readers(case, t
     assert "pull_efficiency" not in read_table(file)
 
 
-def test_a_leg_that_does_not_roll_has_no_efficiency(case):
-    foot = Midstance.of_foot(length=0.04, height=0.0055, width=0.029, leg_length=0.18)
-    leg = replace(case, model=replace(case.model, gear=foot))
-    with pytest.raises(InputError, match="does not roll"):
-        simulate(leg, 0.3, 12.0, with_efficiency=True)
-
-
 def test_noise_is_that_of_the_case_and_its_seed(case):
     case = replace(case, noise={"torque_Nm": Noise(share=0.1)})
     slip = np.full(2000, 0.3)
@@ -79,10 +70,3 @@ def test_a_case_of_several_gears_is_refused(case):
     two = replace(case, gears={"a": case.model, "b": case.model})
     with pytest.raises(InputError, match="one gear; this case has a, b"):
         simulate(two, 0.1, 60.0)
-
-
-def test_the_names_of_the_readme_can_be_imported_together():
-    names = "gap, identify, simulate, read_case, read_table, Prior, Noise"
-    code = f"from soilml import {names}; print(all(map(callable, ({names}))))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "True\n"

@@ -9,7 +9,6 @@ from conftest import MODEL
 from soilml import Noise, Operating, gap, identify, read_case, simulate
 from soilml.errors import FitError, InputError, TableError
 from soilml.fitting.usable_readings import usable_readings
-from soilml.identification.posterior_density import PosteriorDensity
 from soilml.io.table import Table
 from soilml.remarks import about, texts
 
@@ -56,18 +55,6 @@ def test_a_closed_form_says_that_it_leaves_out_noise_of_slip_or_of_load(case, ta
     assert "not propagate noise" not in " ".join(
         texts(identify(case, table, SHEAR, "newton").warnings)
     )
-
-
-def test_noise_of_slip_is_linearised_at_the_mean_of_the_posterior(case, table, monkeypatch):
-    means, linearise = [], PosteriorDensity.linearise_at_mean
-
-    def at_mean(density, sample):
-        means.append(sample.mean(sample.u))
-        return linearise(density, sample)
-
-    monkeypatch.setattr(PosteriorDensity, "linearise_at_mean", at_mean)
-    identify(case, changed(table, slip_std=np.full(12, 0.02)), SHEAR, "posterior")
-    assert means and np.isfinite(means).all()
 
 
 @pytest.mark.slow

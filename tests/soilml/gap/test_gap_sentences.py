@@ -64,7 +64,7 @@ def test_agreement_is_within_the_noise_and_what_was_declared():
 def test_granted_scatter_is_named_with_its_size():
     granted = "a scatter of 0.60 deg and 6 % from run to run"
     assert said("no-gap", misfit=SCATTER) == (
-        f"No gap beyond noise, granting the soil {granted}: probability of a gap 0.12."
+        f"No gap beyond noise, with {granted}: probability of a gap 0.12."
     )
     assert lines("no-gap", misfit=SCATTER)["tried"] == (
         f"Residuals are 1.7 times the declared noise by the soil alone, 0.9 times with {granted}."
@@ -181,8 +181,7 @@ def test_suspects_have_their_odds_and_the_first_three_are_listed():
     odds = {"a": 3.0, "b": 0.0, "c": -1.0, "d": -2.0}
     suspects = tuple(Suspect((n,), v, 0.9 / (1.0 + math.exp(-v))) for n, v in odds.items())
     assert said("suspected", suspects=suspects) == (
-        "A gap of uncertain cause: first suspect is a (probability 0.86); the gap shrinks "
-        "8.80 -> 1.10."
+        "Cause not certain: first suspect is a (probability 0.86); the gap shrinks 8.80 -> 1.10."
     )
     found = lines("suspected", suspects=suspects)
     assert found["suspects"] == (
@@ -198,7 +197,7 @@ def test_suspects_have_their_odds_and_the_first_three_are_listed():
 def test_a_first_suspect_of_little_probability_is_doubted():
     for probability, words in ((0.1, "first suspect is a"), (0.01, "no effect is likely, the")):
         suspects = (Suspect(("a",), -3.0, probability),)
-        assert said("suspected", suspects=suspects).startswith(f"A gap of uncertain cause: {words}")
+        assert said("suspected", suspects=suspects).startswith(f"Cause not certain: {words}")
 
 
 def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
@@ -208,7 +207,7 @@ def test_a_likelier_suspect_of_implausible_size_follows_and_the_line_says_why():
     )
     parts = {"suspects": (usual, large), "best_unclaimed": ("a",)}
     assert said("suspected", **parts).startswith(
-        "A gap of uncertain cause: first suspect of usual size is a (probability 0.07); "
+        "Cause not certain: first suspect of usual size is a (probability 0.07); "
     )
     assert lines("suspected", **parts)["suspects"] == (
         "Suspects, the likeliest of usual size first, within the catalogue: a (odds 1 to 12); "
@@ -240,15 +239,15 @@ def test_odds_in_words(log_odds, words):
 def test_explanations_by_what_is_claimed():
     parts = {"effects": (effect("dig"), effect("plough", 0.95)), "discrepancy": LEFT}
     shrinks = "(probability 0.91); the gap shrinks 8.80 -> 1.10."
-    assert said("named", **parts) == f"dig + plough explains the gap {shrinks}"
-    assert said("partly-named", **parts) == f"dig + plough explains a part of the gap {shrinks}"
+    assert said("named", **parts) == f"Missing effect: dig + plough {shrinks}"
+    assert said("partly-named", **parts) == f"Missing effect, among others: dig + plough {shrinks}"
     assert said("form-open", **parts) == (
-        f"dig + plough explains the gap, by another law than the catalogue's {shrinks}"
+        f"Missing effect: dig + plough, by another law than the catalogue's {shrinks}"
     )
     sets = (("dig",), ("plough", "rate"))
     alone = {"effects": (effect("dig"),), "cause_set": sets}
     assert said("class", **alone) == (
-        f"The cause may be dig, the likeliest of 2 explanations {shrinks}"
+        f"Missing effect: one of 2 explanations, likeliest dig {shrinks}"
     )
     assert lines("class", **alone)["suspects"].endswith("first: dig, or plough + rate.")
     outside = "A cause outside the catalogue is possible."
@@ -278,7 +277,7 @@ def test_what_is_likelier_than_each_of_a_class_is_named_beside_it():
     for name, also in (("drift", ", maybe beside drift (0.93)"), ("rate", "")):
         suspects = (Suspect((name,), 2.6, 0.93), Suspect(("dig",), 2.3, 0.912))
         assert said("class", **alone, suspects=suspects) == (
-            f"The cause may be dig, the likeliest of 2 explanations (probability 0.91){also}; the "
+            f"Missing effect: one of 2 explanations, likeliest dig (probability 0.91){also}; the "
             "gap shrinks 8.80 -> 1.10."
         )
 
@@ -305,7 +304,7 @@ def test_an_all_clear_is_no_proof():
         ("partly-named", ["no cause outside the catalogue", "cause of the remaining discrepancy"]),
         ("class", ["which of the effects is present"]),
         ("unknown", ["any cause: model.toml contains the refitted soil and no new effect"]),
-        ("suspected", ["any cause: an effect that model.toml marks as suspected"]),
+        ("suspected", ["any cause: model.toml predicts by a mixture"]),
         ("not-testable", []),
     ],
 )

@@ -14,7 +14,6 @@ from soilml.experiment_design import samples_of_rows
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import condensing as condensing_rows
-from soilml.identification.condensing import cells_of
 from soilml.io.table import Table
 from soilml.traction.soil_draws import posterior_draws
 
@@ -97,22 +96,6 @@ def test_residuals_within_the_cells_count_as_misfit(case, condensing):
     assert remarked(fit.warnings, "times the declared noise")
 
 
-def test_condensed_rows_are_as_many_as_said_and_hold_every_reading(case, condensing):
-    table = measured(case, np.random.default_rng(15), ROWS)
-    data = usable_readings(case, table)
-    few = condensing_rows.condensed(case, data, select_free(case, None))
-    assert len(few.row_slip) == condensing_rows.CELLS
-    assert few.reading_count == data.reading_count == 3 * ROWS
-    assert few.channels == data.channels
-    assert data.at.progress is not None and few.at.progress is None  # no effect uses the order
-    for i in range(3):
-        all_std = data.noise_at(data.measured)
-        weights = [
-            (std[one.channel == i] ** -2.0).sum() for one, std in ((few, few.std), (data, all_std))
-        ]
-        assert weights[0] == pytest.approx(weights[1], rel=0.01)
-
-
 def test_rows_without_equilibrium_stay(case, condensing):
     table = measured(case, np.random.default_rng(16), ROWS)
     load = np.where(np.arange(ROWS) == 5, 1e6, table["load_N"])
@@ -127,32 +110,12 @@ def test_rows_without_equilibrium_stay(case, condensing):
     assert first[-1] == data.measured[data.channel == 0][5]
 
 
-def test_few_rows_are_left_as_they_are(case):
-    data = usable_readings(case, measured(case, np.random.default_rng(17), 20))
-    assert condensing_rows.condensed(case, data, select_free(case, None)) is data
-
-
 def test_closed_forms_refuse_more_rows_than_they_hold(case, monkeypatch):
     monkeypatch.setattr(identification, "MOST_ROWS", 19)
     table = measured(case, np.random.default_rng(18), 20)
     for method in identification.CLOSED_FORM:
         with pytest.raises(FitError, match=r"20 rows in one fit; .* at most 19: take nonlinear"):
             identify(case, table, method=method)
-
-
-def test_cells_are_divided_where_rows_scatter_and_groups_stay_apart():
-    rng = np.random.default_rng(0)
-    points = np.stack([rng.random(5000), rng.choice([0.0, 3.0], 5000)], axis=1)
-    groups = (np.arange(5000) % 2).astype(np.int64)
-    cell = cells_of(points, groups, 64)
-    assert np.unique(cell).tolist() == list(range(64))
-    for number in range(64):
-        own = cell == number
-        assert len(np.unique(groups[own])) == 1
-        assert len(np.unique(points[own, 1])) == 1  # two levels are not mixed
-        assert np.ptp(points[own, 0]) < 4.0 / 16.0
-    equal = cells_of(np.repeat([[0.1, 0.2], [0.3, 0.4]], 10, axis=0), np.zeros(20, np.int64), 64)
-    assert len(np.unique(equal)) == 2
 
 
 @pytest.mark.long

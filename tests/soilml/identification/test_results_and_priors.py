@@ -7,19 +7,14 @@ import pytest
 from channel_readings import channel_readings
 
 from soilml import identify, read_case
-from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import FitError, InputError
-from soilml.fitting.coordinates import Coordinate, rates_at, select_free, values_at
+from soilml.fitting.coordinates import select_free
 from soilml.fitting.misfit import misfit_limit
-from soilml.identification.fit import Fit, at_prior_bound, with_warnings
+from soilml.identification.fit import Fit, with_warnings
 from soilml.identification.linear import with_fixed_parameter
-from soilml.identification.posterior import _misfit, _sampling_warnings
 from soilml.io.table import Table
-from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.numerics.prior import Prior
-from soilml.parameters import declared
 from soilml.physics.operating_point import Operating
-from soilml.physics.soils import Soil
 from soilml.remarks import Remark, texts
 
 COVARIANCE = np.asarray([[4.0, 1.2], [1.2, 1.0]])
@@ -50,53 +45,6 @@ def case(model_file):
     return read_case(model_file)
 
 
-def test_a_fit_has_gaussian_intervals_unless_the_method_gives_others():
-    fit = fit_of()
-    assert fit.std.tolist() == [2.0, 1.0]
-    np.testing.assert_allclose(fit.correlation, [[1.0, 0.6], [0.6, 1.0]])
-    low, high = fit.interval
-    np.testing.assert_allclose(low, [10.0 - 1.645 * 2.0, 0.5 - 1.645], rtol=1e-3)
-    np.testing.assert_allclose(high, [10.0 + 1.645 * 2.0, 0.5 + 1.645], rtol=1e-3)
-    assert fit["friction_angle"] == 0.5
-    low, high = np.asarray([9.0, 0.1]), np.asarray([12.0, 0.7])
-    own = replace(fit, low=low, high=high)
-    assert own.interval[0] is low and own.interval[1] is high
-    assert replace(fit, low=low).interval[0] == pytest.approx(fit.interval[0])
-    assert "samples" not in repr(replace(fit, samples=1))
-    assert replace(fit_of(low=None), samples=1).samples == 1
-
-
-def test_intervals_for_a_figure_have_the_ranges_of_the_priors():
-    fit = fit_of(low=np.asarray([9.0, 0.1]), high=np.asarray([12.0, 0.7]))
-    shown = fit.intervals({"friction_angle": Prior.normal(0.2)}, "a label")
-    assert shown.names == fit.names and shown.units == fit.units
-    rows = [np.asarray(v) for v in vars(shown).values() if isinstance(v, np.ndarray)]
-    values, low, high, prior_low, prior_high = rows
-    assert values.tolist() == [[10.0, 0.5]]
-    assert low.tolist() == [[9.0, 0.1]] and high.tolist() == [[12.0, 0.7]]
-    np.testing.assert_allclose(prior_low, [np.nan, -2.5758 * 0.2], rtol=1e-3)
-    np.testing.assert_allclose(prior_high, [np.nan, 2.5758 * 0.2], rtol=1e-3)
-    uniform = fit.intervals({"cohesion": Prior(1.0, 20.0)})
-    ends = [v for v in vars(uniform).values() if isinstance(v, np.ndarray)][3:]
-    assert [e[0] for e in ends] == [1.0, 20.0] and np.isnan([e[1] for e in ends]).all()
-    none = [v for v in vars(fit.intervals()).values() if isinstance(v, np.ndarray)][3:]
-    assert np.isnan(none).all()
-
-
-def test_json_of_a_fit_names_every_number():
-    content = fit_of(remaining_fraction={"cohesion": 0.3}, channels=("torque_Nm",)).as_json()
-    assert content["parameters"]["cohesion"]["remaining_fraction"] == 0.3
-    assert "remaining_fraction" not in content["parameters"]["friction_angle"]
-    assert content["parameters"]["friction_angle"]["std"] == 1.0
-    assert content["correlation"]["cohesion"] == {"friction_angle": pytest.approx(0.6)}
-    assert content["correlation"]["friction_angle"] == {"cohesion": pytest.approx(0.6)}
-    assert content["misfit"] is None and content["rows_used"] == 3
-    assert fit_of(misfit=1.5).as_json()["misfit"] == 1.5
-    assert content["channels_used"] == ["torque_Nm"] and [
-        w["code"] for w in content["warnings"]
-    ] == ["first"]
-
-
 def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
     bare = replace(case, prior={"cohesion": Prior(0.0, 500.0)})
     names = ["cohesion", "friction_angle", "shear_modulus", "n", "friction_angle"]
@@ -115,35 +63,11 @@ def test_priors_that_nobody_gave_are_those_of_natural_soils(case):
     assert [f.path for f in select_free(case, None)] == list(case.prior)
 
 
-def test_a_prior_of_a_wide_parameter_lies_about_its_value(case):
-    soil = replace(case.soil, kphi=1e6, kc=0.0, a0=0.5, unit_weight=1000.0)
-    known = replace(case, soil=soil)
-    kphi, kc, a0, weight = select_free(known, ["kphi", "kc", "a0", "unit_weight"])
-    assert kphi.prior == Prior(1e6 / 30.0, 30e6, log=True)
-    bounds = declared(Soil)["kc"]
-    assert kc.prior == Prior(bounds.lower, bounds.upper)
-    assert a0.prior == Prior(0.0, 1.0)
-    assert weight.prior == Prior(0.0, 5e4)  # fifty times the value
-    near = select_free(replace(case, soil=replace(soil, unit_weight=499.0)), ["unit_weight"])[0]
-    assert near.prior == Prior(499.0 / 30.0, 499.0 * 30.0, log=True)
-
-
 def test_unknown_or_no_parameters_are_refused(case):
     with pytest.raises(InputError, match="nothing to identify"):
         select_free(replace(case, prior={}), None)
     with pytest.raises(InputError, match=r"'cohesoin'.*cohesion.*this model has: "):
         select_free(case, ["cohesoin"])
-
-
-def test_values_and_rates_at_fractions_are_those_of_the_priors():
-    priors = [Prior(1.0, 3.0), Prior(0.01, 1.0, log=True)]
-    free = [Coordinate(str(i), "1", p, 1.0, False) for i, p in enumerate(priors)]
-    x = np.asarray([0.25, 0.5])
-    np.testing.assert_allclose(values_at(free, x), [1.5, 0.1])
-    np.testing.assert_allclose(rates_at(free, x), [2.0, 0.1 * np.log(100.0)])
-    assert free[0].fraction_precision == 12.0
-    error = Coordinate("e", "1", Prior(-4.0, 4.0), 0.0, False, normal_std=0.5)
-    assert error.fraction_precision == pytest.approx((8.0 / 0.5) ** 2)
 
 
 def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
@@ -153,70 +77,6 @@ def warned(case, fit, data, u=(0.5, 0.5), *, excess=False, undeclared=False):
     )
     assert found.warnings[0].code == "first"
     return tuple(texts(found.warnings[1:]))
-
-
-def test_a_sound_fit_has_no_warnings(case):
-    assert warned(case, fit_of(), rows_of()) == ()
-    some = {"cohesion": 0.5, "friction_angle": 0.5}
-    assert warned(case, fit_of(remaining_fraction=some), rows_of()) == ()
-
-
-def test_what_the_rows_leave_open_is_said_by_how_much_of_the_prior_remains(case):
-    left = {"cohesion": 0.51, "friction_angle": 0.81}
-    assert warned(case, fit_of(remaining_fraction=left), rows_of()) == (
-        "cohesion is weakly identified: 51% of the prior's width remains",
-        "friction_angle is not identified: 81% of the prior's width remains",
-    )
-    wide = {"cohesion": 1.03, "friction_angle": 0.996}
-    assert warned(case, fit_of(remaining_fraction=wide), rows_of()) == (
-        "cohesion is not identified: all of the prior's width remains",
-        "friction_angle is not identified: all of the prior's width remains",
-    )
-    weak = {"cohesion": 0.8, "friction_angle": 0.8}
-    assert all("weakly" in t for t in warned(case, fit_of(remaining_fraction=weak), rows_of()))
-    one_load = rows_of(load=(60.0, 60.0, 60.0))
-    said = warned(case, fit_of(remaining_fraction=left), one_load)
-    assert said[0] == "one load only: cohesion is not identified"
-    assert warned(case, fit_of(), one_load) == (
-        "one load only: cohesion is determined by the change with slip alone",
-    )
-    other = fit_of(
-        names=("n", "friction_angle"), remaining_fraction={"n": 0.1, "friction_angle": 0.1}
-    )
-    assert not any("one load" in t for t in warned(case, other, one_load))
-
-
-def test_values_at_bounds_and_assumed_priors_are_said(case):
-    said = warned(case, fit_of(), rows_of(), u=(0.0009, 0.9991))
-    assert said == (
-        "cohesion is at the lower bound of its prior, which determines the estimate",
-        "friction_angle is at the upper bound of its prior, which determines the estimate",
-    )
-    at_bound = at_prior_bound(np.asarray([0.0011, 0.9989, 0.0, 1.0]))
-    assert at_bound.tolist() == [False, False, True, True]
-    said = warned(replace(case, prior={}), fit_of(), rows_of())
-    assert said[0] == "cohesion has no prior: 0 to 10000 Pa is assumed"
-
-
-def test_few_readings_trade_offs_and_excess_are_said(case):
-    assert "1 reading for 2 parameters: the prior determines the rest" in warned(
-        case, fit_of(), rows_of(load=(60.0,))
-    )
-    assert not any("readings for" in t for t in warned(case, fit_of(), rows_of(load=(30.0, 60.0))))
-    tied = np.asarray([[4.0, -1.92], [-1.92, 1.0]])
-    said = warned(case, fit_of(covariance=tied), rows_of())
-    assert len(said) == 1
-    assert said[0].startswith("cohesion and friction_angle trade off (correlation -0.96)")
-    assert warned(case, fit_of(covariance=0.5 * (tied + COVARIANCE)), rows_of()) == ()
-    said = warned(case, fit_of(misfit=9.0), rows_of(), excess=True)
-    assert said[0].startswith("residuals are 3.0 times the declared noise: ")
-    unsure = replace(case, discrepancy={"torque_Nm": Discrepancy(share=0.1)})
-    said = warned(unsure, fit_of(misfit=9.0), rows_of(), excess=True)
-    assert said[0].startswith("residuals are 3.0 times the declared noise and discrepancy: ")
-    rows = rows_of(std=np.full(3, np.nan), excluded_channels=("sinkage_m",))
-    said = warned(case, fit_of(), rows, undeclared=True)
-    assert said[0].startswith("noise of torque_Nm is not declared: estimated from the residuals")
-    assert said[1] == "sinkage_m is not used: its noise is not declared in [noise]"
 
 
 def test_a_parameter_that_is_held_fixed_widens_the_others_by_its_prior(case):
@@ -270,32 +130,6 @@ def test_noise_alone_exceeds_the_limit_of_the_misfit_once_in_a_thousand():
     for freedom in (1, 5, 40):
         assert misfit_limit(freedom) == pytest.approx(chi2.ppf(0.999, freedom) / freedom, rel=0.04)
     assert misfit_limit(0) == np.inf
-
-
-def test_a_small_effective_sample_size_is_said():
-    def of_size(size):
-        weights = np.full(size, 1.0 / size)
-        return tuple(texts(_sampling_warnings(ImportanceSample(np.zeros((size, 1)), weights, 0.0))))
-
-    assert of_size(100000) == ()
-    assert of_size(100) == (
-        "the effective sample size is 100 only: sampling error of the values is about 10 % of "
-        "their std",
-    )
-
-
-def test_the_misfit_counts_squares_within_condensed_rows():
-    class Density:
-        class readings:  # noqa: N801
-            squares_within, reading_count = 3.0, 8
-
-        @staticmethod
-        def squared_residuals(u):
-            assert u.shape == (1, 2)
-            return 9.0
-
-    assert _misfit(Density, np.zeros(2), 2) == 2.0
-    assert _misfit(Density, np.zeros(2), 9) == 12.0
 
 
 def test_methods_are_checked_before_anything_is_read(case):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError, TableError
-from soilml.io import spreadsheet_size
+from soilml.io import spreadsheet
 from soilml.io.bounds import SHEET_BYTES, SHEET_CELLS
 from soilml.io.read_table import read_table
 from soilml.log_import.channels.runs import run_names
@@ -174,7 +174,7 @@ def rewritten(file, part, change):
 
 
 def test_what_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(spreadsheet_size, "SHEET_BYTES", replace(SHEET_BYTES, most=1 << 20))
+    monkeypatch.setattr(spreadsheet, "SHEET_BYTES", replace(SHEET_BYTES, most=1 << 20))
     file = save(tmp_path / "runs.xlsx", A=RUNS)
     assert len(read_table(file)) == 2
     rewritten(file, "sheet1.xml", lambda text: text + b" " * (1 << 20))
@@ -207,7 +207,7 @@ def test_texts_that_cells_share_are_read(tmp_path):
 
 @pytest.mark.parametrize("far", ["XFD2", "B1048576"])
 def test_a_far_cell_does_not_take_the_memory_of_a_sheet(tmp_path, monkeypatch, far):
-    monkeypatch.setattr(spreadsheet_size, "SHEET_CELLS", replace(SHEET_CELLS, most=10_000))
+    monkeypatch.setattr(spreadsheet, "SHEET_CELLS", replace(SHEET_CELLS, most=10_000))
     file = save(tmp_path / "runs.xlsx", A=lambda sheet: sheet.__setitem__(far, 1))
     assert "more than 10000 cells" in refusal(file)
 

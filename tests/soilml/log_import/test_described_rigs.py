@@ -4,21 +4,12 @@ import json
 
 import numpy as np
 import pytest
-from described_rigs import WRITERS, drive
+from described_rigs import drive
 from foreign_rigs import table
-from guessed_channels import LOOKED_AT, RIGHT, judged
 
 from soilml.log_import import import_log, init_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import side_lines
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
-def test_channels_of_a_described_rig(writer, tmp_path):
-    logs, truth = writer(np.random.default_rng(11), tmp_path)
-    found = judged(logs, truth)
-    assert {*found.values()} <= {RIGHT, LOOKED_AT}, found
 
 
 @pytest.mark.parametrize("kind", ["json", "csv", "txt", "own"])

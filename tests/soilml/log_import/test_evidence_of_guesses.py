@@ -62,15 +62,15 @@ def log_of(folder, seed=5, **more):
 
 @pytest.mark.slow
 def test_no_guess_over_all_rigs_is_wrong_without_a_mark():
-    """Right or wrong, and marked or not: `python guessed_channels.py described_rigs`."""
+    """Right or wrong, and marked or not: `python guessed_channels.py public_logs`."""
     kinds = [
         kind
-        for module in ("described_rigs", "set_aside_rigs")
+        for module in ("described_rigs", "set_aside_rigs", "public_logs")
         for own in judged_rigs(module).values()
         for kind in own.values()
     ]
     assert kinds.count(SILENT) == 0
-    assert kinds.count(RIGHT) + kinds.count(LOOKED_AT) > 0.95 * len(kinds)
+    assert kinds.count(RIGHT) + kinds.count(LOOKED_AT) > 0.93 * len(kinds)
     assert kinds.count(RIGHT) > 0.5 * len(kinds)
 
 
@@ -219,3 +219,20 @@ def test_units_and_rate_of_a_labview_head(clock, tmp_path):
     content = tomllib.loads(text)
     assert content["ground_speed"]["unit"] == "mm/s"
     assert content["time"].get("rate", "20 Hz") == "20 Hz"
+
+
+def test_what_was_computed_shares_its_error(tmp_path, capsys):
+    """A torque that is a constant times a current, and a load that never changes."""
+    log, _ = log_of(tmp_path, **{"current [A]": lambda rng, d: d.torque})
+    lines = log.read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines[1:]], dtype=float)
+    rows[:, 3], rows[:, 4] = 1.01 * rows[:, 5], 60.0
+    log.write_text("\n".join([lines[0], *(",".join(f"{x:.5f}" for x in row) for row in rows)]))
+    text = init(tmp_path, [log]).replace("# radius = ", f'radius = "{RADIUS} m"  # ')
+    text = text.replace('bias = "1 %"', "")
+    assert imported(tmp_path, [log], text) == 0
+    said = capsys.readouterr().err
+    assert "[torque] is a constant times the current 'current'" in said
+    assert "[load] is a constant or follows from the slope" in said
+    bias = tomllib.loads((tmp_path / "runs.bias.toml").read_text())["bias"]
+    assert bias["torque_Nm"] == "10 %" and bias["load_N"] == "2 %"

@@ -14,9 +14,10 @@ from soilml.log_import.checks.table_hints import table_hints
 def log(tmp_path_factory):
     """A log in SI units of a wheel that drives at three slips."""
     d = drive(np.random.default_rng(30), seconds=8)
+    own = np.random.default_rng(1).normal(0.0, 0.02, d.time.size)
     columns = {"t": d.time, "w": d.rim / RADIUS, "v": d.ground, "T": d.torque, "Fz": d.load,
                "Fx": np.where(d.rim > 0, 0.3 * d.torque / RADIUS, 0.0),
-               "I": np.where(d.rim > 0, d.torque / (0.05 * 40), 0.0),
+               "I": np.where(d.rim > 0, d.torque / (0.05 * 40) + own, 0.0),
                "pitch": np.full(d.time.size, 8.0)}  # fmt: skip
     return write_csv(tmp_path_factory.mktemp("hints") / "log.csv", columns)
 
@@ -151,7 +152,7 @@ def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, caps
     for command in (
         ["identify", model, str(runs), "--method", "nonlinear"],
         ["gap", model, str(runs), "--out", str(tmp_path / "found")],
-        ["estimate", "exported/any_wheel.onnx", str(runs), "--case", model, "--by", "run"],
+        ["estimate", "exported/any_wheel.onnx", str(runs), "--model", model, "--by", "run"],
     ):
         main(command)
         assert "! " + str(runs) + ": torque is" in (said := capsys.readouterr().err), command

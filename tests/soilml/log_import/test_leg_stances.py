@@ -86,7 +86,7 @@ def test_what_the_map_lacks_or_has_twice_is_named(logs, tmp_path):
     for edits, said in (
         ([*NO_ZERO, *blind], r"\[wheel_leg\] zero is missing"),
         ([*NO_ENCODER, *blind], "no stance is seen"),
-        ([("legs = 5", "legs = 2")], "legs is 2; needed are 3 to 12"),
+        ([("legs = 5", "legs = 2")], "legs is 2; it must lie between 3 and 12"),
         ([("legs = 5", "legs = 5\nhalf_width = 1.0")], "half_width is 1 rad"),
         ([("[wheel_leg]", "[wheel]\nradius = 0.15\n[wheel_leg]")], "beside .wheel. radius"),
         ([("legs = 5", "legs = 5\nlegnth = 1")], "unknown key 'legnth'"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from described_rigs import WRITERS, pull_curves, six_axes_load_on_y
+from described_rigs import pull_curves, six_axes_load_on_y
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
@@ -75,15 +75,3 @@ def test_rows_with_load_and_pull_exchanged_are_refused(tmp_path):
     (tmp_path / "map.toml").write_text(text)
     with pytest.raises(InputError, match=r"'Wv' .* likely column of \[load\]"):
         import_log(logs, tmp_path / "map.toml")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("writer", WRITERS, ids=lambda w: w.__name__)
-def test_right_maps_are_not_refused(writer, tmp_path):
-    logs, _ = writer(np.random.default_rng(5), tmp_path)
-    text = init_map(logs)
-    if "# radius" in text:
-        text = text.replace("# radius =", "radius =").replace("0.15 m +- 1 %", "0.13 m")
-    (tmp_path / "map.toml").write_text(text.replace("1.0 N m/A", "0.036 N m/A"))
-    found = import_log(logs, tmp_path / "map.toml")
-    assert not found.implausible

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from soilml.errors import InputError, MissingLibraryError, SoilmlError
-from soilml.log_import.readers import read_log
+from soilml.log_import.readers import message_fields, read_log, text_by_arrow
 from soilml.remarks import texts
 
 PLAIN = "t,F,M\n0.0,1.5,-2\n0.1,1.6,-3\n0.2,,-4\n0.3,1.8,-5\n0.4,1.9,-6\n"
@@ -147,7 +147,7 @@ def test_a_long_log_of_numbers_is_read_as_its_lines_are(mark, tmp_path):
     separator = "," if mark == "." else ";"
     rows = [
         separator.join([f"{t:.2f}", f" {v:.6e}", "NaN" if t % 7 == 0 else f"{v:.3f}"])
-        for t, v in zip(np.arange(3000) / 4, rng.normal(size=3000), strict=True)
+        for t, v in zip(np.arange(12000) / 4, rng.normal(size=12000), strict=True)
     ]  # fmt: skip
     lines = [separator.join(["t [s]", "Fz [N]", "T [Nm]"]), *rows]
     plain, odd = tmp_path / "plain.csv", tmp_path / "odd.csv"
@@ -156,7 +156,30 @@ def test_a_long_log_of_numbers_is_read_as_its_lines_are(mark, tmp_path):
     odd.write_text("\n".join([*lines, separator.join(["stopped", "by", "hand"])]))
     (fast,), (slow,) = read_log(plain), read_log(odd)
     for name in ("t", "Fz", "T"):
-        np.testing.assert_array_equal(fast.columns[name], slow.columns[name][:3000])
+        np.testing.assert_array_equal(fast.columns[name], slow.columns[name][:12000])
     assert fast.units == slow.units and [n.code for n in fast.notes] == [
         n.code for n in slow.notes if n.code != "lines-left-out"
     ]
+
+
+def test_a_log_that_memory_has_no_room_for_is_thinned(tmp_path, monkeypatch):
+    """Text and messages: evenly over the whole, and said."""
+    for module in (text_by_arrow, message_fields):
+        monkeypatch.setattr(module, "KEPT_VALUES", 12_000)
+    t = np.arange(20_000) / 1000
+    lines = ["t,run,v", *(f"{x:.3f},{'ab'[int(x > 10)]},{x * x:.4f}" for x in t)]
+    lines[7000] += ",7"
+    (tmp_path / "long.csv").write_text("\n".join(lines))
+    seen = []
+    (found,) = read_log(tmp_path / "long.csv", seen.append)
+    every = round(20_000 / len(found))
+    assert 4 <= every <= 8 and {"thinned", "lines-left-out"} == {n.code for n in found.notes}
+    np.testing.assert_allclose(found.columns["v"], found.columns["t"] ** 2, atol=1e-3)
+    assert set(found.texts["run"]) == {"a", "b"} and found.columns["t"][-1] > 19.9
+    assert seen and seen[-1] == (tmp_path / "long.csv").stat().st_size
+    topic = message_fields.TopicColumns(tmp_path)
+    for x in t:
+        topic.add(x, {"v": x * x})
+        message_fields.thin_largest([topic])
+    assert topic.size <= 12_000 and topic.notes("/v")
+    np.testing.assert_allclose(topic.columns()["v"], topic.times() ** 2)

@@ -43,21 +43,6 @@ def imported(folder, log, *edits):
     return import_log([log], folder / "map.toml").table
 
 
-def test_chrono_wheel_test_rig(tmp_path, samples):
-    """In the order in which demo_VEH_WheelTestRig prints them; its slip is (r omega - v) / v."""
-    s = samples
-    columns = {
-        "time": s["time"], "long_slip": s["slip"] / (1 - s["slip"]), "slip_angle": s["zero"],
-        "camber_angle": s["zero"], "frc.x": s["pull"], "frc.y": s["zero"], "frc.z": s["load"],
-        "pnt.x": s["v"] * s["time"], "pnt.y": s["zero"], "pnt.z": -0.5 - s["sinkage"],
-        "trq.x": s["zero"], "trq.y": -s["torque"], "trq.z": s["zero"],
-    }  # fmt: skip
-    rows = imported(tmp_path, write(tmp_path / "rig.csv", columns))
-    found = np.stack([rows[c] for c in ("slip", "torque_Nm", "drawbar_pull_N")], axis=1)
-    assert found == pytest.approx(np.asarray(STAGES)[:, :3], rel=0.03)
-    assert rows["load_N"] == pytest.approx([LOAD] * 3, rel=0.01)
-
-
 def test_chrono_drawbar_pull_rig_without_a_header(tmp_path, samples):
     """DBP.dat of ChVehicleCosimWheeledMBSNode: two spaces, seven digits, no names."""
     s = samples
@@ -77,22 +62,3 @@ def test_chrono_drawbar_pull_rig_without_a_header(tmp_path, samples):
     # the names are those of this file alone
     log.rename(tmp_path / "other.dat")
     assert "lin_vel" not in init_map([tmp_path / "other.dat"])
-
-
-def test_gz_terramechanics(tmp_path, samples):
-    """The topics /terra/WHEEL/state and /forces, whose data have the names of the source."""
-    s = samples
-    omega = s["omega"] + 1e-4 * np.sin(s["time"])  # as the controller of the joint lets it turn
-    columns = {
-        "time": s["time"], "omega": omega, "v_x": omega * s["v"] / OMEGA, "v_y": s["zero"],
-        "s": s["slip"],
-        "beta": s["zero"], "W": s["load"], "h_0": s["sinkage"], "F_x": s["pull"],
-        "F_y": s["zero"], "F_z": s["load"], "M_x": s["zero"], "M_y": -s["torque"],
-        "M_z": s["zero"],
-    }  # fmt: skip
-    rows = imported(tmp_path, write(tmp_path / "gz.csv", columns))
-    found = np.stack(
-        [rows[c] for c in ("slip", "torque_Nm", "drawbar_pull_N", "sinkage_m")], axis=1
-    )
-    assert found == pytest.approx(np.asarray(STAGES), rel=0.03)
-    assert rows["load_N"] == pytest.approx([LOAD] * 3, rel=0.01)

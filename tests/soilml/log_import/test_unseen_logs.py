@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from simulated_rig import LOAD, RADIUS, drive, torque_law, write_csv
+from simulated_rig import RADIUS, drive, torque_law, write_csv
 
 from soilml.errors import InputError
 from soilml.log_import import import_log, init_map
-from soilml.log_import.checks.table_hints import table_hints
-from soilml.remarks import about
 
 SLIPS = (0.1, 0.3, 0.5)
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")
@@ -85,40 +83,6 @@ def test_structs_of_wheels_are_wheels(tmp_path):
         import_log(tmp_path / "one.csv", tmp_path / "map.toml")
 
 
-def test_a_lifted_wheel_a_turned_pull_and_a_german_head(tmp_path):
-    """No edit: the head states radius and gearbox, the rest is seen in the samples."""
-    rng = np.random.default_rng(74)
-    d = drive(rng, slips=SLIPS, seconds=10, rest=4.0)
-    pull = np.where(d.rim > 0, 0.8 * d.torque / RADIUS - 10.0, 0.0)
-    columns = {
-        "Zt [s]": d.time,
-        "Mot.Winkel [Grad]": 64 * np.degrees(d.rim_place / RADIUS),
-        "Wg.Pos [mm]": 2000 - 1000 * d.place,
-        "M_Rad [N mm]": 1000 * d.torque + 60 + 20 * rng.standard_normal(d.time.size),
-        "F_Zug [N]": 17.0 - pull + 0.3 * rng.standard_normal(d.time.size),
-        "F_N [N]": np.where(d.time < 2.0, 12.0, 12.0 + d.load),
-        "Einsinkung [mm]": np.where(d.rim > 0, -12.0, 0.0),
-    }
-    head = ("Radradius:;150 mm", "Getriebe:;1:64")
-    log = write_csv(tmp_path / "v.txt", columns, ";", ",", "utf-16", head)
-    found, text = imported(tmp_path, log)
-    assert "NEEDED;" not in text
-    np.testing.assert_allclose(found.table["slip"], SLIPS, atol=0.02)
-    np.testing.assert_allclose(found.table["load_N"], LOAD, rtol=0.01)
-    np.testing.assert_allclose(found.table["torque_Nm"], torque_law(SLIPS), rtol=0.08)
-    expected = 0.8 * torque_law(SLIPS) / RADIUS - 10.0
-    np.testing.assert_allclose(found.table["drawbar_pull_N"], expected, atol=2.0)
-    assert (found.table["sinkage_m"] > 0.0).all()
-
-
-def test_a_pull_that_falls_with_slip_is_named():
-    slip, load = np.array([0.1, 0.25, 0.4, 0.6]), np.full(4, 35.0)
-    pull = np.array([5.3, 2.7, 0.7, -1.5])
-    columns = {"slip": slip, "load_N": load, "drawbar_pull_N": pull}
-    assert about(table_hints(columns, RADIUS), "sign") == {"drawbar_pull_N"}
-    assert not table_hints(columns | {"drawbar_pull_N": -pull}, RADIUS)
-
-
 @pytest.mark.parametrize("german", [True, False])
 def test_thousands_are_read(german, tmp_path):
     d = drive(np.random.default_rng(75), slips=(0.2,))
@@ -136,19 +100,3 @@ def test_thousands_are_read(german, tmp_path):
     found, _ = imported(tmp_path, path, [("# radius", "radius")])
     np.testing.assert_allclose(found.table["slip"], 0.2, atol=0.02)
     np.testing.assert_allclose(found.table["torque_Nm"], torque_law(0.2), rtol=0.08)
-
-
-def test_a_commanded_slip_is_offered_and_the_rotation_is_asked_for(tmp_path):
-    d = drive(np.random.default_rng(77), slips=(0.2,))
-    columns = {"t": d.time, "slip_cmd_percent": np.full(d.time.size, 20.0), "torque": d.torque}
-    text = init_map(write_csv(tmp_path / "log.csv", columns))
-    assert "NEEDED: no column is the rotation" in text and '"slip_cmd_percent"' in text
-
-
-def test_a_table_of_runs_among_logs_is_refused(tmp_path):
-    d = drive(np.random.default_rng(78), slips=(0.2,))
-    log = write_csv(tmp_path / "log.csv", {"t": d.time, "torque": d.torque, "Fz": d.load})
-    runs = write_csv(tmp_path / "runs.csv", {"run": ["a"] * 9, "slip": [0.2] * 9,
-                                             "load_N": [9.0] * 9})  # fmt: skip
-    with pytest.raises(InputError, match="is a table of runs already"):
-        init_map([log, runs])

@@ -92,13 +92,13 @@ def of_plates_and_shear(case):
 @pytest.mark.parametrize(
     ("make", "shape", "said"),
     [
-        (fit, (3,), "cohesion c (kPa)"),
-        (estimate, (3,), "friction angle φ (°)"),
-        (gap, (), "Fitted rows"),
-        (pull, (3, 1), "60 N on the wheel"),
-        (rover, (2, 2), "steepest slope, degrees"),
+        (fit, (2,), "residual, sigma"),
+        (estimate, (3,), "friction angle φ, °"),
+        (gap, (1,), "fitted rows"),
+        (pull, (3,), "drawbar pull, N"),
+        (rover, (2, 2), "margin, N"),
         (imported, (1,), "torque / (load × radius)"),
-        (audited, (), "that separates it from its nearest rival"),
+        (audited, (1,), "that separates it from its nearest rival"),
         (of_plates_and_shear, (3,), "shear strength, kPa"),
     ],
 )
@@ -113,8 +113,8 @@ def test_results_draw_themselves(make, shape, said, case):
     assert said in texts
     assert all(a.has_data() for a in np.ravel(own))
     pyplot.close("all")
-    given = Figure().subplots(*(shape or (1,)), squeeze=False)
-    back = np.ravel(result.plot(ax=given[0, 0] if not shape else given))
+    given = Figure().subplots(*shape, squeeze=False)
+    back = np.ravel(result.plot(ax=given))
     assert all(a is b for a, b in zip(back, given.ravel(), strict=True))
     assert not pyplot.get_fignums()
     with pytest.raises(InputError, match="this plot needs"):

@@ -8,8 +8,7 @@ from served_page import runs_file
 
 from soilml import Model, Wheel
 from soilml.errors import InputError
-from soilml.serve.answers.chosen_case import model_text
-from soilml.serve.answers.forward import controls, forward
+from soilml.serve.forward_curves import controls, forward
 
 SECRET = "root:x:0:0:the first line of a file that is not the page's"
 MODEL = """\
@@ -52,7 +51,7 @@ def check(answer, secret):
 
 
 @pytest.mark.parametrize("key", KEYS)
-@pytest.mark.parametrize("ask", [model_text, controls, forward], ids=lambda ask: ask.__name__)
+@pytest.mark.parametrize("ask", [controls, forward], ids=lambda ask: ask.__name__)
 def test_no_answer_reads_a_file_that_a_model_names(ask, key, secret):
     for name in (secret, "/nowhere/at/all.csv", "../../secret.csv"):
         with pytest.raises(InputError, match="may name no file") as found:
@@ -63,17 +62,14 @@ def test_no_answer_reads_a_file_that_a_model_names(ask, key, secret):
 def test_no_job_reads_a_file_that_its_settings_name(page, secret, tmp_path):
     key = page.put("RUNS.csv", runs_file(tmp_path, Model(Wheel(radius=0.15, width=0.12)))
                    .read_bytes())  # fmt: skip
-    for kind in ("estimate", "gap"):
-        answer, status = page.ask(
-            "/api/jobs",
-            {"kind": kind, "files": [key], "model": {"model": text_of("table", secret)}},
-        )
-        assert status == 422
-        check(answer, secret)
-    question = page.ask("/api/design", {})[0]["question"]
+    for kind in ("identify", "gap", "pull"):
+        job = page.job(kind=kind, files=[key], model=text_of("table", secret))
+        assert job["state"] == "failed"
+        check(job, secret)
+    question = json.loads(page.request("GET", "/api/choices")[2])["question"]
     head, tail = question[: question.index("[soil]")], question[question.index("[goal]") :]
     for model, runs in ((secret, "RUNS.csv"), ("MODEL.toml", secret)):
         soil = f'[soil]\nmodel = "{model}"\nruns = "{runs}"\n'
-        job = page.job(kind="design", files=[key], question=head + soil + tail, effort="quick")
+        job = page.job(kind="wheels", files=[key], model=MODEL, question=head + soil + tail)
         assert job["state"] == "failed"
         check(job, secret)

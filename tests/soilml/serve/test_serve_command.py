@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from conftest import MODEL
 from served_page import Page, serve
 
 from soilml.cli import main
@@ -29,7 +30,7 @@ def test_a_signal_ends_it_in_one_line_and_removes_its_files(name, tmp_path):
     process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
     page = Page(process)
     key = page.put("RUNS.csv", b"run,slip,load_N,torque_Nm\na,0.3,60,2.26\n")
-    job, _ = page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": {"values": {}}})
+    job, _ = page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": MODEL})
     assert job["state"] == "running" and list(tmp_path.iterdir())
     process.send_signal(getattr(signal, name))
     _, said = process.communicate(timeout=60)
@@ -44,7 +45,7 @@ def test_a_worker_ends_with_its_server(tmp_path):
     process = serve("--port", "0", env={"TMPDIR": str(tmp_path)})
     page = Page(process)
     key = page.put("RUNS.csv", b"run,slip,load_N,torque_Nm\na,0.3,60,2.26\n")
-    page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": {"values": {}}})
+    page.ask("/api/jobs", {"kind": "gap", "files": [key], "model": MODEL})
     process.kill()
     process.communicate(timeout=60)
     until = time.monotonic() + 60.0

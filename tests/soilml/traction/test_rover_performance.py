@@ -90,7 +90,7 @@ def measured(case, wheels):
 def test_bands_of_a_rover_have_the_error_of_its_model(case):
     """At needed slip the torque has the declared error, whether declared or learned."""
     table = measured(case, list(FOUR))
-    plain = rover_report(case, table, slopes=SLOPES)
+    plain = rover_report(case, table, slopes=SLOPES, exact_model=True)
     part = RemainderPart(
         "torque_Nm", "", 0.2, 0.3, 0.3, 0.6, (0.1, 0.5), (20.0, 20.1),
         ((0.3, 20.0),), (0.0,), ((0.0,),), ((0.0,),),
@@ -98,7 +98,7 @@ def test_bands_of_a_rover_have_the_error_of_its_model(case):
     learned = replace(case, remainder=Remainder((part,)))
     declared = replace(case, discrepancy={"torque_Nm": Discrepancy(constant=0.3)})
     for wide in (learned, declared):
-        found = rover_report(wide, table, slopes=SLOPES)
+        found = rover_report(wide, table, slopes=SLOPES, exact_model=True)
         assert not remarked(found.warnings, "not errors of the model")
         assert remarked(found.warnings, "errors of the model (torque)")
         torque, exact = (f.performance.torque["front-left"][:, 0] for f in (found, plain))

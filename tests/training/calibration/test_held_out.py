@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.gaussian_pooling import RunConditions
 from training.calibration.held_out import carry_errors, measure_held_out
-from training.calibration.row_pooling import calibrate_single_rows
+from training.calibration.row_pooling import single_rows
 from training.dataset import Dataset
 
 CONDITIONS = RunConditions(
@@ -38,21 +37,19 @@ def rows(lengths, steady, seed=0):
     )
 
 
-def sensor(share, inside=lambda features: np.ones(len(features), dtype=bool)):
+def sensor(share, data):
     """Estimates of std 0.1, of which this share of the error variance is the soil's."""
-
-    def predict(features):
-        error = np.sqrt(share) * features[:, 1] + np.sqrt(1.0 - share) * features[:, 2]
-        mean = features[:, :1] + 0.1 * error[:, None]
-        return mean, np.full_like(mean, 0.1), inside(features)
-
-    return predict
+    features = data.features
+    error = np.sqrt(share) * features[:, 1] + np.sqrt(1.0 - share) * features[:, 2]
+    mean = features[:, :1] + 0.1 * error[:, None]
+    return mean, np.full_like(mean, 0.1)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("share", [0.2, 0.6, 0.95])
 def test_the_share_of_error_in_common_is_found(share):
-    found = measure_held_out(sensor(share), rows([8] * 1000, True), CONDITIONS, FACTOR)
+    data = rows([8] * 1000, True)
+    found = measure_held_out(*sensor(share, data), data, CONDITIONS, FACTOR)
     assert found.repeats.tolist() == [1, 2, 4, 8]
     assert found.common_share()[0] == pytest.approx(share, abs=0.06)
     np.testing.assert_allclose(found.repeat_coverage_factor, 1.645, rtol=0.06)
@@ -63,15 +60,11 @@ def test_the_share_of_error_in_common_is_found(share):
 
 
 def test_repeats_are_scored_on_other_runs():
-    data, scored = rows([8] * 400, True), rows([8] * 200, True, seed=1)
-    predict = sensor(0.7)
-    mean, std, _ = predict(data.features)
-    prior_std = np.asarray([0.17])
-    prior = PriorSummary(np.asarray([0.3]), prior_std, data.lower - 1.0, data.upper + 1.0)
-    pooling = calibrate_single_rows(mean, std[:, None] ** 2, data, prior, CONDITIONS)
-    pooling, scores = carry_errors(predict, pooling, data, scored, prior_std)
+    data = rows([8] * 800, True)
+    pooling = single_rows(CONDITIONS, FACTOR)
+    pooling, scores = carry_errors(*sensor(0.7, data), pooling, data, np.asarray([0.17]))
     assert pooling.held_out is not None and sorted(scores) == [1, 2, 4, 8]
-    assert scores[8].rows == 200
+    assert scores[8].rows == 400
     assert scores[8].rmse[0] < scores[1].rmse[0]
     for metrics in scores.values():
         assert metrics.cover90[0] == pytest.approx(0.9, abs=0.05)

@@ -35,7 +35,7 @@ def drive(rng, rows):
 @pytest.mark.slow
 @pytest.mark.parametrize(("file", "rows"), [("wheel", 1), ("wheel", 3), ("any_wheel", 1)])
 def test_a_stream_gets_the_answers_of_the_file(tmp_path, file, rows):
-    out = exported(tmp_path, file, "--rows", str(rows))
+    out = exported(tmp_path, file, "--step-rows", str(rows))
     session = onnxruntime.InferenceSession(str(out), providers=["CPUExecutionProvider"])
     context = WHEEL if file == "any_wheel" else {}
     estimator = Estimator.load(f"exported/{file}.onnx")

@@ -210,8 +210,8 @@ def test_three_files_of_three_quantities(tmp_path):
 def test_files_that_cannot_be_fused_are_refused_in_one_line(tmp_path, capsys):
     folder = ROOT / "exported"
     for others, said in (
-        (["wheel_linear"], "does not carry its errors on held-out rows"),
-        (["slip_torque_known"], "do not carry their errors on common rows"),
+        (["wheel_linear"], "does not state its errors on held-out rows"),
+        (["slip_torque_known"], "do not state their errors on common rows"),
         (["slip_torque"], "each needs another name"),
         ([], "needed are 2 to 4"),
     ):

@@ -8,12 +8,13 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 from sklearn.utils.estimator_checks import check_estimator
 
-from training.regressors.exact_solution import KernelEigensystem
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.linear_gaussian import LinearGaussian
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
-from training.regressors.nystrom_features import RidgeEigensystem
+from training.regressors.nystrom_features import NystromFeatures
 from training.regressors.rbf_expansion import rbf
+from training.regressors.row_groups import folds_of
+from training.regressors.tiled_cholesky import tiles_of
 
 ALL = [LSSVM(), FixedSizeLSSVM(), LinearGaussian(), GaussianMLP()]
 
@@ -33,44 +34,48 @@ def test_passes_the_checks_of_scikit_learn(regressor):
     assert sum(r["status"] == "passed" for r in results) > 40
 
 
-def bordered(x, y, gamma, width):
-    """Dual weights and bias by solving the whole bordered system."""
-    n = len(x)
-    system = np.zeros((n + 1, n + 1))
-    system[0, 1:] = system[1:, 0] = 1.0
-    system[1:, 1:] = rbf(x, x, width) + np.eye(n) / gamma
-    solution = np.linalg.solve(system, np.vstack([np.zeros((1, y.shape[1])), y]))
-    return solution[1:], solution[0], system
-
-
-def test_solution_is_that_of_the_bordered_system_for_all_outputs_at_once():
-    x, y, _ = curve(60)
-    alpha, bias, _ = KernelEigensystem.of(rbf(x, x, 0.8)).solve(y, 30.0)
-    expected_alpha, expected_bias, _ = bordered(x, y, 30.0, 0.8)
-    np.testing.assert_allclose(alpha, expected_alpha, rtol=1e-8, atol=1e-10)
-    np.testing.assert_allclose(bias, expected_bias, rtol=1e-8)
-    np.testing.assert_allclose(alpha.sum(axis=0), 0.0, atol=1e-9)
-
-
-def test_fixed_size_leave_one_out_is_leaving_one_out():
-    x, y, _ = curve(40)
-    features = rbf(x, x[:9], 1.0)
-    ridge, centred = RidgeEigensystem.of(features), y - y.mean(axis=0)
-    weights = ridge.solve((features - ridge.mean).T @ centred, 3.0)
-    residual = ridge.leave_one_out(ridge.project(features), centred, weights, 3.0)
-    for i in range(0, 40, 5):
-        rest = np.arange(40) != i
-        # ridge with a free bias by its normal equations
-        A = np.hstack([features[rest], np.ones((39, 1))])
-        penalty = np.diag([1 / 3.0] * 9 + [0.0])
-        w = np.linalg.solve(A.T @ A + penalty, A.T @ y[rest])
-        left_out = y[i] - features[i] @ w[:-1] - w[-1]
-        np.testing.assert_allclose(residual[i], left_out, rtol=1e-8)
+@pytest.mark.parametrize(
+    "regressor", [LSSVM(gamma=30.0, width=0.8), FixedSizeLSSVM(30, gamma=30.0, width=0.8)]
+)
+def test_rows_left_out_in_closed_form_are_those_of_fits_without_them(regressor):
+    """Every row is estimated as by the whole bordered system without its tile or fold."""
+    x, y, _ = curve(120)
+    groups = np.repeat(np.arange(24), 5)
+    mean, _ = regressor.fit_left_out(x, y, groups, lambda done, total: None)
+    u, z = regressor.x_scaling_.apply(x), regressor.y_scaling_.apply(y)
+    if isinstance(regressor, FixedSizeLSSVM):
+        outs, exact = [folds_of(groups) == k for k in range(20)], False
+    else:
+        order, slices = tiles_of(groups)
+        outs, exact = [np.isin(np.arange(120), order[rows]) for rows in slices], True
+    for out in outs:
+        assert len(np.intersect1d(groups[out], groups[~out])) == 0 < out.sum() < 30
+        if exact:
+            centres, kernel = u[~out], rbf(u[~out], u[~out], 0.8) + np.eye((~out).sum()) / 30.0
+        else:  # in the primal, with the features of all centres
+            features = NystromFeatures.of(regressor.expansion_.centres, 0.8)
+            phi = features.at(u)
+            a = phi[~out] - phi[~out].mean(axis=0)
+            weights = np.linalg.solve(
+                a.T @ a + np.eye(phi.shape[1]) / 30.0, a.T @ (z[~out] - z[~out].mean(axis=0))
+            )
+            expected = z[~out].mean(axis=0) + (phi[out] - phi[~out].mean(axis=0)) @ weights
+            np.testing.assert_allclose(
+                regressor.y_scaling_.apply(mean[out]), expected, rtol=1e-6, atol=1e-8
+            )
+            continue
+        n = len(centres)
+        system = np.zeros((n + 1, n + 1))
+        system[0, 1:] = system[1:, 0] = 1.0
+        system[1:, 1:] = kernel
+        solution = np.linalg.solve(system, np.vstack([np.zeros((1, 2)), z[~out]]))
+        expected = rbf(u[out], centres, 0.8) @ solution[1:] + solution[0]
+        np.testing.assert_allclose(regressor.y_scaling_.apply(mean[out]), expected, atol=1e-8)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "regressor", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=240, patience=60)]
+    "regressor", [LSSVM(), FixedSizeLSSVM(centres=120), GaussianMLP(epochs=300, batch=64)]
 )
 def test_fits_a_curve_better_than_a_line_and_estimates_the_noise(regressor):
     x, y, _ = curve(900)
@@ -97,12 +102,6 @@ def test_std_does_not_shrink_far_from_the_data():
         far = fitted.predict(50.0 * x, return_std=True)[1]
         assert (far >= 0.98 * near.min(axis=0)).all()
         assert np.isfinite(far).all()
-
-
-def test_training_stops_early_when_held_out_rows_get_worse():
-    x, y, _ = curve(40, noise=1.0)
-    regressor = GaussianMLP(hidden=(64, 64), epochs=400, patience=5, batch=8).fit(x, y)
-    assert len(regressor.history_) < 400
 
 
 def test_the_public_regressors_work_in_pipelines_and_searches():

@@ -8,9 +8,7 @@ import pytest
 from soilml.processes import limited_workers
 from training.regressors import exact_solution, nystrom_features
 from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
-from training.regressors.rbf_expansion import rbf
 from training.regressors.tanh_network import TanhNetwork
-from training.regressors.tiled_cholesky import TILE, TiledCholesky
 
 
 def curve(rows, seed=0, noise=0.1):
@@ -18,19 +16,6 @@ def curve(rows, seed=0, noise=0.1):
     x = rng.uniform(-2.0, 2.0, (rows, 2))
     clean = np.stack([np.sin(2.0 * x[:, 0]) + x[:, 1], x[:, 0] * x[:, 1]], axis=1)
     return x, clean + noise * rng.normal(size=clean.shape), clean
-
-
-def test_the_exact_solution_in_tiles_is_that_of_the_eigensystem(monkeypatch):
-    x, y, _ = curve(700)
-    whole = LSSVM(solution="exact", gamma=20.0, width=0.7).fit(x, y)
-    monkeypatch.setattr(exact_solution, "EIGENSYSTEM_ROWS", 300)
-    tiles = LSSVM(solution="exact", gamma=20.0, width=0.7).fit(x, y)
-    a, b = whole.expansion_, tiles.expansion_
-    np.testing.assert_allclose(b.alpha, a.alpha, atol=1e-8)
-    np.testing.assert_allclose(b.residual, a.residual, atol=1e-8)
-    # gamma of the log-variance is selected on fewer rows
-    for one, other in zip(whole.predict(x, True), tiles.predict(x, True), strict=True):
-        np.testing.assert_allclose(other, one, rtol=0.3, atol=1e-6)
 
 
 @pytest.mark.slow
@@ -56,7 +41,7 @@ def test_the_fixed_size_solution_in_parts_is_that_of_all_rows_at_once(monkeypatc
     ],
 )
 def test_a_fit_stays_within_the_memory_that_it_states(regressor, rows, monkeypatch):
-    monkeypatch.setattr(exact_solution, "EIGENSYSTEM_ROWS", 500)
+    monkeypatch.setattr(exact_solution, "SEARCH_ROWS", 300)
     x, y, _ = curve(rows)
     regressor.fit(x[:1000], y[:1000])  # what it imports is not of the fit
     tracemalloc.start()
@@ -70,35 +55,22 @@ def test_a_fit_stays_within_the_memory_that_it_states(regressor, rows, monkeypat
 
 
 @pytest.mark.slow
-def test_rows_of_one_soil_do_not_mislead_where_validation_rows_are_of_others():
+def test_rows_of_one_soil_do_not_mislead_where_they_are_left_out_together():
     rng = np.random.default_rng(0)
     x = np.repeat(rng.uniform(-2.0, 2.0, (80, 1)), 10, axis=0) + 0.01 * rng.normal(size=(800, 1))
     shared = np.repeat(rng.normal(size=(80, 1)), 10, axis=0)  # what the rows of a soil share
     y = np.sin(2.0 * x) + shared
     other = rng.uniform(-2.0, 2.0, (400, 1))
     truth = np.sin(2.0 * other)
-    noisy = truth + rng.normal(size=truth.shape)
     for regressor in (LSSVM(), FixedSizeLSSVM(centres=100)):
         misled = np.sqrt(np.mean((regressor.fit(x, y).predict(other) - truth) ** 2))
-        regressor.fit_with_validation(x, y, (other, noisy), lambda done, total: None)
+        regressor.fit_left_out(x, y, np.repeat(np.arange(80), 10), no_progress)
         sound = np.sqrt(np.mean((regressor.predict(other) - truth) ** 2))
         assert sound < 0.75 * misled
 
 
 def no_progress(done, total):
     pass
-
-
-@pytest.mark.parametrize("rows", [40, 2 * TILE, 2 * TILE + 77])
-def test_solution_and_diagonal_of_the_inverse_are_those_of_the_whole_matrix(rows):
-    rng = np.random.default_rng(0)
-    x, y = rng.normal(size=(rows, 3)), rng.normal(size=(rows, 2))
-    factor = TiledCholesky.of(x, 0.8, 30.0, no_progress)
-    inverse = np.linalg.inv(rbf(x, x, 0.8) + np.eye(rows) / 30.0)
-    np.testing.assert_allclose(factor.solve(y), inverse @ y, rtol=1e-9, atol=1e-10)
-    np.testing.assert_allclose(
-        factor.inverse_diagonal(no_progress), np.diag(inverse), rtol=1e-9, atol=1e-11
-    )
 
 
 def test_the_gradient_is_that_of_differences():

@@ -37,12 +37,6 @@ export function options(select, entries, chosen) {
   if (chosen !== undefined) select.value = chosen;
 }
 
-/** What is not needed at first: its title, and the rest when it is opened. */
-export function fold(title, ...children) {
-  const kept = children.filter(Boolean);
-  return kept.length ? element("details", { class: "fold" }, element("summary", {}, title), ...kept) : null;
-}
-
 /** A list of texts, or nothing where there are none. */
 export function wordList(texts, className = "") {
   if (!texts || !texts.length) return null;

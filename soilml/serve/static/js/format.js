@@ -1,13 +1,15 @@
 // Numbers as an engineer writes them: three digits, no powers of ten in the usual range.
 
 const MINUS = "\u2212";
+const RAISED = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+const raised = (power) => power.replace("-", "⁻").replace(/\d/g, (digit) => RAISED[digit]);
 
 export function number(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.abs(value);
   const text = size >= 1e6 || size < 1e-4
-    ? value.toExponential(digits - 1).replace("e+", " × 10^").replace("e-", ` × 10^${MINUS}`)
+    ? value.toExponential(digits - 1).replace(/e\+?(-?\d+)/, (_, power) => ` × 10${raised(power)}`)
     : value.toLocaleString("en", {
       useGrouping: false,
       minimumFractionDigits: 0,
@@ -22,12 +24,6 @@ export const withUnit = (value, unit, digits = 3) => {
 };
 
 export const percent = (share) => `${Math.round(100 * share)}\u00a0%`;
-
-export function range(low, high, unit) {
-  if (number(low) === number(high)) return withUnit(low, unit);
-  const space = unit === "°" || !unit ? "" : "\u00a0";
-  return `${number(low)} to ${number(high)}${space}${unit}`;
-}
 
 export const counted = (count, thing) => `${count} ${thing}${count === 1 ? "" : "s"}`;
 

@@ -9,53 +9,31 @@ import { wheelPicture } from "./wheel_picture.js";
 
 const FROM_FILE = "model-file";
 const CURVES = { torque: "N m", pull: "N", sinkage: "mm" };
-const COLUMNS = { torque: ["torque_Nm", 1], pull: ["drawbar_pull_N", 1], sinkage: ["sinkage_m", 1000] };
-const NEAR = 0.1; // readings under loads that differ by less are drawn beside the curves
 const OPEN = 2; // groups of sliders that are open at first
 
-const state = { model: "", modelName: "", sliders: new Map(), wheelKnown: false, answer: null, held: null, readings: null };
+const state = { model: "", modelName: "", sliders: new Map(), answer: null, kept: null };
 const plots = {};
 let generation = 0, busy = false, again = false;
 
 /** The choice and the sliders as the server takes them. */
-export function chosen() {
+function chosen() {
   const values = {};
   for (const slider of state.sliders.values()) values[slider.path] = slider.value;
   const own = state.model ? { model: state.model } : { wheel: byId("wheel").value, soil: byId("soil").value };
   return { ...own, values };
 }
 
-/** Whether somebody has said which wheel drove: by a choice, a slider, an answer or a file. */
-export const wheelIsKnown = () => state.wheelKnown || Boolean(state.model);
-export const setWheelKnown = (known) => { state.wheelKnown = known; };
-
-/** The sliders of the wheel's sizes, and the list of wheels. */
-export const sizesOfWheel = () => ["gear.radius", "gear.width", "gear.base"].map((path) => state.sliders.get(path)).filter(Boolean);
-export const wheelList = () => state.choices.wheels;
-
-/** Choose a wheel of the list. */
-export async function chooseWheel(id) {
-  byId("wheel").value = id;
-  await choose();
-}
-
-/** The dropped model file, or an empty text. */
-export const droppedModel = () => state.model;
-
 export async function startForward(choices) {
   state.choices = choices;
   fillChoices(choices.first);
   makePlots();
-  byId("wheel").addEventListener("change", () => {
-    state.wheelKnown = true;
-    return choose();
-  });
+  byId("wheel").addEventListener("change", choose);
   byId("soil").addEventListener("change", choose);
   byId("reset").addEventListener("click", () => {
     for (const slider of state.sliders.values()) slider.set(slider.first);
     update();
   });
-  byId("hold").addEventListener("click", hold);
+  byId("keep").addEventListener("click", keep);
   await loadControls();
 }
 
@@ -114,10 +92,7 @@ async function loadControls() {
   const opened = new Map([...document.querySelectorAll("details.group")].map((d) => [d.dataset.title, d.open]));
   state.sliders = new Map();
   const groups = found.groups.map(({ title, controls }, i) => {
-    const made = controls.map((control) => new Slider(control, (slider) => {
-      if (slider.path.startsWith("gear.")) state.wheelKnown = true;
-      return update();
-    }));
+    const made = controls.map((control) => new Slider(control, update));
     for (const slider of made) state.sliders.set(slider.path, slider);
     return element("details", { class: "group", "data-title": title, open: opened.get(title) ?? i < OPEN },
       element("summary", {}, title), ...made.map((slider) => slider.place));
@@ -129,8 +104,7 @@ async function loadControls() {
 }
 
 /** Ask for new curves: one question at a time, and always about the latest values. */
-export async function update() {
-  document.dispatchEvent(new CustomEvent("sliders-moved"));
+async function update() {
   again = true;
   if (busy) return;
   busy = true;
@@ -160,8 +134,7 @@ function makePlots() {
       x: "slip", y: null, reading: byId(`${name}-reading`),
       series: [
         { label: "", colour: name, unit, width: 2.5 },
-        { label: "held", colour: "held", unit, dash: [6, 5], width: 1.8 },
-        { label: "measured", colour: "ink", unit, points: true },
+        { label: "kept", colour: "kept", unit, dash: [6, 5], width: 1.8 },
       ],
     });
   }
@@ -171,8 +144,8 @@ function makePlots() {
       { label: "σ", colour: "normal", unit: "kPa", width: 2.5 },
       { label: "τ", colour: "shear", unit: "kPa", width: 2.5 },
       { label: "strength", colour: "strength", unit: "kPa", dash: [6, 5], width: 1.8 },
-      { label: "held σ", colour: "normal", dash: [2, 4], width: 1.4 },
-      { label: "held τ", colour: "shear", dash: [2, 4], width: 1.4 },
+      { label: "kept σ", colour: "normal", dash: [2, 4], width: 1.4 },
+      { label: "kept τ", colour: "shear", dash: [2, 4], width: 1.4 },
     ],
   });
 }
@@ -191,15 +164,14 @@ const now = (label, value, unit) => element("div", {}, element("dt", {}, label),
   element("dd", {}, number(value), element("small", {}, unit ? `\u00a0${unit}` : "")));
 
 function drawCurve(name, answer) {
-  const points = measured(name, answer.at.load);
-  const x = [...new Set([...answer.slip, ...(state.held?.slip ?? []), ...points.keys()])].sort((a, b) => a - b);
+  const x = [...new Set([...answer.slip, ...(state.kept?.slip ?? [])])].sort((a, b) => a - b);
   const line = (curve) => {
     if (!curve) return x.map(() => null);
     const known = new Map(curve.slip.map((s, i) => [s, curve[name][i]]));
     return fill(x, known);
   };
   const here = answer.at[name];
-  plots[name].set([x, line(answer), line(state.held), x.map((s) => points.get(s) ?? null)],
+  plots[name].set([x, line(answer), line(state.kept)],
     [answer.at.slip, here, name],
     `${name === "pull" ? "Drawbar pull" : name} against slip; ${withUnit(here, CURVES[name])} at slip ${number(answer.at.slip)}`);
 }
@@ -217,75 +189,39 @@ function fill(x, known) {
   });
 }
 
-/** Readings of the dropped table under about this load, by slip. */
-function measured(name, load) {
-  const found = new Map();
-  const [column, factor] = COLUMNS[name], points = state.readings?.points;
-  if (!points?.[column]) return found;
-  points.slip.forEach((slip, i) => {
-    const value = points[column][i];
-    if (value !== null && Math.abs(points.load_N[i] / load - 1) < NEAR) found.set(slip, factor * value);
-  });
-  return found;
-}
-
 function drawStress(answer) {
   const { profile } = answer;
   byId("stress-figure").hidden = !profile;
   if (!profile) return;
   wheelPicture(byId("wheel-picture"), answer);
-  const held = state.held?.profile;
+  const kept = state.kept?.profile;
   const back = (values) => [...values].reverse();
   const mine = back(profile.angle);
-  const x = [...new Set([...mine, ...(held ? held.angle : [])])].sort((a, b) => a - b);
+  const x = [...new Set([...mine, ...(kept ? kept.angle : [])])].sort((a, b) => a - b);
   const line = (from, name) => (from ? fill(x, new Map(from.angle.map((a, i) => [a, from[name][i]]))) : x.map(() => null));
   plots.stress.set([x, line(profile, "normal"), line(profile, "shear"), line(profile, "strength"),
-    line(held, "normal"), line(held, "shear")], null,
+    line(kept, "normal"), line(kept, "shear")], null,
   `Stress against angle: normal stress up to ${number(Math.max(...profile.normal))} kPa, shear stress up to ${number(Math.max(...profile.shear))} kPa, entry at ${number(profile.angle[0])} degrees`);
   byId("mobilised").textContent = `${percent(profile.mobilised)} of the shear strength below the wheel is mobilised. Torque is the shear stress summed along the rim: it grows with slip, and with a smaller shear modulus K, until τ reaches the strength.`;
 }
 
-function hold() {
-  if (state.held) return release();
+function keep() {
+  if (state.kept) return release();
   const { at } = state.answer;
-  state.held = state.answer;
-  byId("hold").setAttribute("aria-pressed", "true");
-  byId("hold").textContent = "Let held curves go";
-  byId("held").hidden = false;
-  byId("held").textContent = `Held (dashed): torque ${withUnit(at.torque, "N m")}, pull ${withUnit(at.pull, "N")}, sinkage ${withUnit(at.sinkage, "mm")} at slip ${number(at.slip)}, load ${withUnit(at.load, "N")}.`;
+  state.kept = state.answer;
+  byId("keep").setAttribute("aria-pressed", "true");
+  byId("keep").textContent = "Drop the kept curves";
+  byId("kept").hidden = false;
+  byId("kept").textContent = `Kept (dashed): torque ${withUnit(at.torque, "N m")}, pull ${withUnit(at.pull, "N")}, sinkage ${withUnit(at.sinkage, "mm")} at slip ${number(at.slip)}, load ${withUnit(at.load, "N")}.`;
   return draw(state.answer);
 }
 
 function release() {
-  state.held = null;
-  byId("hold").setAttribute("aria-pressed", "false");
-  byId("hold").textContent = "Hold these curves";
-  byId("held").hidden = true;
+  state.kept = null;
+  byId("keep").setAttribute("aria-pressed", "false");
+  byId("keep").textContent = "Keep these curves";
+  byId("kept").hidden = true;
   if (state.answer) draw(state.answer);
-}
-
-/** Draw the readings of a table beside the curves, and set the load to one of theirs. */
-export function showReadings(table) {
-  state.readings = table;
-  const loads = table.points.load_N;
-  const slider = state.sliders.get("load");
-  if (slider && loads.length && !loads.some((l) => Math.abs(l / slider.value - 1) < NEAR)) {
-    slider.set([...loads].sort((a, b) => a - b)[Math.floor(loads.length / 2)]);
-  }
-  byId("points-note").hidden = false;
-  byId("points-note").textContent = `Dots: readings of ${table.name} under loads within ${percent(NEAR)} of the slider's.`;
-  update();
-}
-
-/** Give the wheel of the sliders the radius of a log, in m; what was done in words, or "". */
-export function setRadius(radius) {
-  const slider = state.sliders.get("gear.radius");
-  if (!radius || !slider || Math.abs(slider.value / radius - 1) < 0.005) return "";
-  const before = withUnit(slider.shown, slider.unit);
-  slider.set(radius);
-  update();
-  state.wheelKnown = false; // its width is another, too
-  return `The wheel has now the radius of this log, ${withUnit(slider.shown, slider.unit)} (it had ${before}).`;
 }
 
 /** Set soil parameters (SI units by path), as an estimate found them. */

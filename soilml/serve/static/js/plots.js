@@ -10,13 +10,11 @@ export const colour = (name) =>
   getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 /**
- * A plot in an element. `series` are { label, colour, dash, width, points, fill }, `bands` are
- * [upper, lower, colour] by the numbers of series; `marker` is a colour of a dot at the present
- * point; with `zero` the axis of y begins there.
+ * A plot in an element. `series` are { label, colour, unit, dash, width }.
  */
 export class Plot {
-  constructor(place, { x, y, series, bands = [], height = HEIGHT, reading = null, ticks = null, zero = false }) {
-    Object.assign(this, { place, x, y, series, bands, height, reading, ticks, zero });
+  constructor(place, { x, y, series, height = HEIGHT, reading = null }) {
+    Object.assign(this, { place, x, y, series, height, reading });
     this.data = [[], ...series.map(() => [])];
     this.marker = null;
     this.plot = null;
@@ -37,17 +35,13 @@ export class Plot {
     const first = { label: this.x };
     const lines = this.series.map((s) => ({
       label: s.label, stroke: colour(s.colour), width: s.width ?? 2, dash: s.dash,
-      paths: s.points ? () => null : undefined, pxAlign: 0, spanGaps: !!s.points,
-      points: { show: !!s.points, size: 7, fill: colour(s.colour), stroke: colour("panel") },
-    }));
-    const bands = this.bands.map(([upper, lower, name, share]) => ({
-      series: [upper, lower], fill: withAlpha(colour(name), share ?? 0.2),
+      pxAlign: 0, points: { show: false },
     }));
     this.plot = new uPlot({
       width: this.width(), height: this.height, padding: [10, 14, 0, 0], pxAlign: 0,
-      legend: { show: false }, scales: { x: { time: false }, ...(this.zero ? { y: { range: (_, low, high) => [Math.min(0, low), 1.08 * Math.max(0, high) || 1] } } : {}) },
+      legend: { show: false }, scales: { x: { time: false } },
       cursor: { y: false, drag: { x: false, y: false }, points: { size: 6 } },
-      series: [first, ...lines], bands, axes: [axis(this.x, 26), axis(this.y, 46)],
+      series: [first, ...lines], axes: [axis(this.x, 26), axis(this.y, 46)],
       hooks: { draw: [(u) => this.drawMarker(u)], setCursor: [(u) => this.read(u)] },
     }, this.data, this.place);
   }
@@ -99,26 +93,8 @@ export class Plot {
       .map(([s, v]) => `${s.label ? `${s.label} ` : ""}${withUnit(v, s.unit)}`);
     return parts.length ? `${this.x.split(" (")[0]} ${number(this.data[0][i])}: ${parts.join(", ")}` : "";
   }
-
-  remove() {
-    all.delete(this);
-    this.plot?.destroy();
-  }
-}
-
-function withAlpha(name, share) {
-  const probe = /^#(..)(..)(..)$/.exec(name);
-  if (!probe) return name;
-  const [r, g, b] = probe.slice(1).map((part) => parseInt(part, 16));
-  return `rgba(${r}, ${g}, ${b}, ${share})`;
-}
-
-/** Forget the plots of elements that are no longer in the page. */
-export function sweepPlots() {
-  for (const plot of [...all]) if (!plot.place.isConnected) plot.remove();
 }
 
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  sweepPlots();
   for (const plot of all) plot.build();
 });

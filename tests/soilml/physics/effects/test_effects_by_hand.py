@@ -501,3 +501,11 @@ def test_stresses_are_those_of_the_true_sinkage_whatever_the_sensor_says():
         found = (WHEEL + effect).profile(SAND, RIG_AT)
         np.testing.assert_array_equal(found.angle, expected.angle)
         np.testing.assert_array_equal(found.normal, expected.normal)
+
+
+def test_a_soft_crust_takes_a_constant_pressure_where_the_ground_bears_much():
+    before, scene = pressed([100.0, 2e3, 1e6])
+    found = EFFECTS["soft-crust"](deficit=2000.0).on_stress(before, scene)
+    lost = 2000.0 * np.asarray([1 - np.exp(-0.05), 1 - np.exp(-1.0), 1.0])
+    np.testing.assert_allclose(found.normal, [100.0, 2e3, 1e6] - lost, rtol=1e-12)
+    np.testing.assert_allclose(found.shear, strength(found), rtol=1e-12)

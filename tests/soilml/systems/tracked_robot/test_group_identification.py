@@ -3,13 +3,10 @@
 import numpy as np
 import pytest
 
-from soilml import Case, Model, soil
+from soilml import Case, Model, simulate, soil
 from soilml.config.measurement_noise import Noise
 from soilml.numerics.prior import Prior
-from soilml.systems.tracked_robot.group_identification import (
-    identify_groups,
-    simulate_group,
-)
+from soilml.systems.tracked_robot.group_identification import identify_groups
 from soilml.systems.tracked_robot.robot import WANG2018
 
 pytestmark = pytest.mark.slow
@@ -32,9 +29,8 @@ SHEAR = ("friction_angle", "shear_modulus", "cohesion")
 
 @pytest.fixture(scope="module")
 def groups():
-    rng = np.random.default_rng(3)
     slips = np.linspace(0.05, 0.85, 8)
-    tables = [simulate_group(CASE, slips, WANG2018.load, rng) for _ in range(4)]
+    tables = [simulate(CASE, slips, WANG2018.load, seed=k) for k in range(4)]
     return identify_groups(CASE, tables, SHEAR)
 
 

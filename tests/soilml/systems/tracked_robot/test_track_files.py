@@ -22,6 +22,10 @@ shear_modulus = { range = [0.005, 0.08], scale = "log" }
 [noise]
 torque_Nm = "1 %"
 drawbar_pull_N = "1 % + 2"
+[[effect]]
+name = "shear-softening"
+share = 1.0
+peak = 1.0
 """
 
 
@@ -31,14 +35,16 @@ def model(tmp_path):
     return tmp_path / "model.toml"
 
 
-def test_what_is_simulated_is_identified(model, tmp_path):
+def test_what_is_simulated_is_identified_without_a_false_alarm(model, tmp_path, capsys):
+    """The pull of clay falls behind its peak: no sign is turned."""
     curve, fit = str(tmp_path / "curve.csv"), tmp_path / "fit.json"
-    runs = ["--slip", "0.05:0.6:5", "--load", "300:900:2", "--run", "a", "--out", curve]
+    runs = ["--slip", "0.05:0.9:6", "--load", "300:900:2", "--run", "a", "--out", curve]
     assert main(["simulate", str(model), *runs]) == 0
     assert main(["identify", str(model), curve, "--out", str(fit)]) == 0
     found = json.loads(fit.read_text())["parameters"]
-    assert found["friction_angle"]["value"] == pytest.approx(0.541, rel=1e-4)
-    assert found["shear_modulus"]["value"] == pytest.approx(0.0348, rel=1e-3)
+    assert found["friction_angle"]["value"] == pytest.approx(0.541, rel=2e-3)
+    assert found["shear_modulus"]["value"] == pytest.approx(0.0348, rel=0.05)
+    assert "falls as slip grows" not in "".join(capsys.readouterr())
 
 
 def test_a_load_that_the_soil_does_not_carry_is_a_blank_row_with_its_reason(model, tmp_path):

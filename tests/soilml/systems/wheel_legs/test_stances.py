@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from soilml.systems.wheel_legs.slip_models import fit_lines
+from soilml.papers.comin2017_slip import fit_lines
 from soilml.systems.wheel_legs.stances import (
     GRAVITY,
     SpringLeg,

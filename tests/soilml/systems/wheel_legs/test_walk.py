@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from soilml.systems.wheel_legs.geometry import FEET, Section, wheel_leg
-from soilml.systems.wheel_legs.ground_reaction import batch_plates, ground_reaction
-from soilml.systems.wheel_legs.integrator import FADING, WalkStatus, explicit_step
+from soilml.systems.wheel_legs.ground_reaction import WalkingLegs
 from soilml.systems.wheel_legs.resistive_force import GROUNDS, LinearGround
-from soilml.systems.wheel_legs.walk import walk
+from soilml.systems.wheel_legs.walk import WalkStatus, walk
 
 pytestmark = pytest.mark.slow
 
 SAND = LinearGround(stiffness=0.7e6)
 WEIGHT = 3.75 * 9.81
 STRIDE = 2 * np.pi / 5
-FADES = np.array([FADING * 0.3 * 0.18])
+FREE = np.asarray([np.nan])
 
 
 @pytest.fixture(scope="module")
@@ -26,9 +25,9 @@ def slipping():
 
 def test_the_ground_carries_the_weight_over_a_stride():
     fine = walk(wheel_leg("LTF"), SAND, turns=1, steps=1000)
-    given = batch_plates([wheel_leg("LTF")], [SAND])
+    given = WalkingLegs.of([wheel_leg("LTF")], [SAND], FREE)
     up = [
-        ground_reaction(given, given.at(a), z, vx, vz, FADES).up
+        given.reaction(given.at(a), z, vx, vz)[0][1]
         for a, z, vx, vz in zip(fine.angle, fine.z, fine.vx, fine.vz, strict=True)
     ]
     assert np.mean(up[-200:]) == pytest.approx(WEIGHT, rel=1e-3)
@@ -51,35 +50,34 @@ def test_a_case_does_not_depend_on_the_batch():
 
 
 def test_long_steps_agree_with_the_papers_short_ones():
-    short = round(2 * np.pi / 0.3 / 1e-4)
-    slow = walk(wheel_leg("LTF"), SAND, turns=0.05, steps=short, step=explicit_step, fading=1e-9)
+    """Eq. 8 with explicit steps of 1e-4 s, forces at their start."""
     fast = walk(wheel_leg("LTF"), SAND, turns=0.05, steps=1000)
-    np.testing.assert_allclose(
-        fast.z[:, 0], np.interp(fast.angle, slow.angle, slow.z[:, 0]), atol=1e-3
-    )
-    assert fast.x[-1, 0] == pytest.approx(slow.x[-1, 0], rel=0.02)
+    given, dt = WalkingLegs.of([wheel_leg("LTF")], [SAND], FREE), 1e-4
+    x, z, vx, vz = (part[0].copy() for part in (fast.x, fast.z, fast.vx, fast.vz))
+    angles, heights = np.arange(0.0, fast.angle[-1], 0.3 * dt), []
+    for angle in angles:
+        heights.append(float(z[0]))
+        (ahead, up, _), _ = given.reaction(given.at(angle), z, vx, vz)
+        vx, vz = vx + ahead / 3.75 * dt, vz + (up / 3.75 - 9.81) * dt
+        x, z = x + vx * dt, z + vz * dt
+    np.testing.assert_allclose(np.interp(fast.angle, angles, heights), fast.z[:, 0], atol=1e-3)
+    assert fast.x[-1, 0] == pytest.approx(float(x[0]), rel=0.02)
 
 
 def test_the_jacobian_of_the_reaction_is_its_derivative():
     cases = [wheel_leg("LTF"), wheel_leg("CIF", legs=3)]
-    given = batch_plates(cases, [SAND, GROUNDS["SSC-2"]])
-    at, fading = given.at(0.3), np.full(2, 1e-3)
+    given = WalkingLegs.of(cases, [SAND, GROUNDS["SSC-2"]], np.full(2, np.nan))
+    at = given.at(0.3)
     here = (np.array([0.1, 0.13]), np.array([0.04, 0.03]), np.array([-0.01, 0.02]))
-
-    def force(height, ahead, up):
-        found = ground_reaction(given, at, height, ahead, up, fading)
-        return np.stack([found.ahead, found.up])
-
-    found = ground_reaction(given, at, *here, fading)
-    for i, analytic in enumerate(
-        [found.height_derivative, *found.velocity_jacobian.swapaxes(0, 1)]
-    ):
+    rates = given.reaction(at, *here)[1]
+    for i, order in enumerate((2, 0, 1)):  # height, velocity ahead and up
         step = [np.zeros(2)] * 3
         step[i] = np.full(2, 1e-7)
         ahead, behind = (
-            force(*(h + sign * d for h, d in zip(here, step, strict=True))) for sign in (1, -1)
+            given.reaction(at, *(h + sign * d for h, d in zip(here, step, strict=True)))[0][:2]
+            for sign in (1, -1)
         )
-        np.testing.assert_allclose(analytic, (ahead - behind) / 2e-7, rtol=1e-4, atol=1e-2)
+        np.testing.assert_allclose(rates[:, order], (ahead - behind) / 2e-7, rtol=1e-4, atol=1e-2)
 
 
 def test_invalid_cases_have_a_status_and_do_not_affect_the_others():

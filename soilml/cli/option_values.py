@@ -1,0 +1,124 @@
+"""Values of options: numbers in bounds, names and lists, each refused in one line."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from soilml.errors import InputError
+from soilml.io.bounds import ROWS
+from soilml.io.cell_text import read_number, read_whole_number
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+_MAX_SHOWN = 80  # A longer option value is cut in an error message
+
+
+def number(text: str) -> float:
+    """A finite number; raises `ArgumentTypeError` for anything else."""
+    try:
+        return read_number(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a number") from None
+
+
+@dataclass(frozen=True)
+class NumberFrom:
+    """The type of an option that is a number from `lower` to `upper`, in `unit`.
+
+    Raises `ArgumentTypeError` for anything else.
+    """
+
+    lower: float
+    upper: float
+    unit: str = ""
+
+    def __call__(self, text: str) -> float:
+        value = number(text)
+        if not self.lower <= value <= self.upper:
+            raise argparse.ArgumentTypeError(
+                f"{text!r} given; needed is {self.lower:g} to {self.upper:g} {self.unit}".rstrip()
+            )
+        return value
+
+
+def slip_limit(text: str) -> float:
+    """A slip between 0 and 1; raises `ArgumentTypeError` for anything else."""
+    value = number(text)
+    if not 0.0 < value < 1.0:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a slip between 0 and 1")
+    return value
+
+
+def whole_number(text: str) -> int:
+    """A whole number; raises `ArgumentTypeError` for anything else."""
+    try:
+        return read_whole_number(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number") from None
+
+
+def whole_number_from(lower: int, upper: int | None = None) -> Callable[[str], int]:
+    """A function from a text to a whole number in these bounds, as `whole_number` is."""
+    ends = f", {lower} or more" if upper is None else f" from {lower} to {upper}"
+
+    def bounded(text: str) -> int:
+        value = whole_number(text)
+        if not lower <= value <= (10**9 if upper is None else upper):
+            raise argparse.ArgumentTypeError(f"{text!r} given; needed is a whole number{ends}")
+        return value
+
+    return bounded
+
+
+def parse_costs(args: argparse.Namespace) -> dict[str, float]:
+    """The costs of `--cost` by kind; raises `InputError` for a text that is not KIND=NUMBER."""
+    return named_numbers(args.cost, "--cost", "KIND=NUMBER, such as reverse=2")
+
+
+def named_numbers(texts: Sequence[str], option: str, needed: str) -> dict[str, float]:
+    """Numbers by name from texts NAME=NUMBER; raises `InputError`, with what is `needed`."""
+    found = {}
+    for text in texts:
+        name, _, number = text.rpartition("=")
+        try:
+            found[name] = read_number(number)
+        except ValueError:
+            name = ""
+        if not name:
+            raise InputError(f"{option} {text!r}: needed is {needed}")
+    return found
+
+
+def parse_names(text: str | None) -> list[str] | None:
+    """The names of `a,b,c`; None where the option is absent."""
+    return None if text is None else [name.strip() for name in text.split(",")]
+
+
+def parse_numbers(option: str, text: str) -> NDArray[np.float64]:
+    """The numbers of `start:stop:count` or `a,b,c`; raises `InputError` naming the option."""
+    import numpy as np
+
+    try:
+        if ":" in text:
+            start, stop, count = text.split(":")
+            if read_whole_number(count) > ROWS.most:
+                raise InputError(f"{option} is {text!r}; at most {ROWS.most} values are possible")
+            with np.errstate(all="ignore"):
+                values = np.linspace(
+                    read_number(start), read_number(stop), read_whole_number(count)
+                ).round(12)
+        else:
+            values = np.asarray([read_number(part.strip()) for part in text.split(",")])
+    except InputError:
+        raise
+    except ValueError:
+        values = np.zeros(0)
+    if values.size == 0 or not np.all(np.isfinite(values)):
+        shown = text if len(text) <= _MAX_SHOWN else f"{text[:_MAX_SHOWN]}..."
+        raise InputError(f"{option} is {shown!r}; needed is start:stop:count or values with commas")
+    return values

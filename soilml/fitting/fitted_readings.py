@@ -1,0 +1,197 @@
+"""Readings beside what a model predicts for them: by channel against slip, residuals below."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from soilml.arrays import Floats
+from soilml.config.case import Case
+from soilml.fitting.coordinates import Coordinate, rates_at
+from soilml.fitting.levels import load_levels
+from soilml.fitting.predictions import linearise
+from soilml.fitting.readings import Readings
+from soilml.quantities import Z_90, column
+from soilml.report.figure_style import AFTER, BEFORE, LOADS, PRIOR, UNCHANGED, take_axes
+from soilml.report.numbers import channel_name, channel_unit, pretty, significant, with_unit
+from soilml.report.report import Picture
+
+MOST_LOADS = 4  # Levels of load that the upper panels show; the residuals are those of all
+COMPRESSED = 12.0  # Residual in standard deviations from which on the axis is compressed
+
+
+@dataclass(frozen=True)
+class FittedReadings:
+    """Readings (m,) of all channels with the predictions of a fitted model.
+
+    Attributes
+    ----------
+    channels, channel
+        Columns of the channels, and the index (m,) of each reading's.
+    run
+        Run of each reading.
+    slip, load
+        Where it was measured (m,); the load in N.
+    measured, std
+        Readings and standard deviations of their noise (m,), SI units.
+    after, after_std
+        Predictions and their standard deviations by the uncertainty of the fit (m,).
+    before
+        Predictions (m,) without what was added to the model; None where nothing was.
+    """
+
+    channels: tuple[str, ...]
+    channel: NDArray[np.int64]
+    run: tuple[str, ...]
+    slip: Floats
+    load: Floats
+    measured: Floats
+    std: Floats
+    after: Floats
+    after_std: Floats
+    before: Floats | None = None
+
+    @staticmethod
+    def of(
+        case: Case,
+        readings: Readings,
+        free: Sequence[Coordinate],
+        values: Floats,
+        covariance: Floats,
+    ) -> FittedReadings:
+        """Readings and predictions at values (p,) of free parameters with a covariance (p, p).
+
+        Noise that is not declared is that of the residuals.
+        """
+        x = np.asarray([c.prior.fraction(float(v)) for c, v in zip(free, values, strict=True)])
+        found = linearise(case, free, x, readings)
+        rates = rates_at(free, x)
+        variance = np.einsum(
+            "ij,jk,ik->i", found.jacobian, covariance / np.outer(rates, rates), found.jacobian
+        )
+        std = readings.noise_at(found.prediction)
+        residual = readings.measured - found.prediction
+        for k in range(len(readings.channels)):
+            own = (readings.channel == k) & ~np.isfinite(std)
+            std[own] = np.sqrt(np.nanmean(residual[own] ** 2)) if own.any() else 1.0
+        return FittedReadings(
+            channels=tuple(map(column, readings.channels)),
+            channel=readings.channel,
+            run=tuple(readings.runs[readings.run[row]] for row in readings.row),
+            slip=readings.slip,
+            load=readings.load,
+            measured=readings.measured,
+            std=std,
+            after=found.prediction,
+            after_std=np.sqrt(np.maximum(variance, 0.0)),
+        )
+
+    def picture(self, with_added: str = "") -> Picture:
+        """Readings and predictions over slip, a column of panels for each channel.
+
+        with_added: What `after` has that `before` has not, in words.
+        """
+        count = len(self.channels)
+        names = ", ".join(map(channel_name, self.channels))
+        lines = "Lines: the fitted model."
+        if self.before is not None:
+            lines = f"Dashed: the soil alone. Solid: {with_added or 'with what was added'}."
+        return Picture(
+            "Measured and predicted",
+            self.plot,
+            2,
+            count,
+            (4.6 * count, 5.4),
+            f"{names} over slip, measured and predicted, with residuals below",
+            f"Points: readings, coloured by load. {lines} Bands: 90 % of a reading, by its noise "
+            "and the uncertainty of the fit. Below: residuals of all readings in standard "
+            "deviations; grey: 90 % of noise.",
+        )
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw the picture into axes (2, channels); see `take_axes`."""
+        count = len(self.channels)
+        axes = take_axes(ax, 2, count, (4.6 * count, 5.4))
+        for k, name in enumerate(self.channels):
+            factor, unit = channel_unit(name)
+            top, low = axes[:, k]
+            for colour, load, rows, line in self._shown(k):
+                self._draw_load(top, factor, colour, load, rows, line)
+            top.set_title(channel_name(name))
+            top.set_ylabel(with_unit(channel_name(name), pretty(unit)))
+            top.legend(ncols=2)
+            self._draw_residuals(low, np.flatnonzero(self.channel == k))
+            low.set_xlabel("slip")
+            low.set_ylabel("residual, sigma")
+            low.set_xlim(top.get_xlim())
+        return axes
+
+    def _shown(self, channel: int) -> Iterator[tuple[str, float, NDArray[Any], NDArray[Any]]]:
+        """Levels of load spread over all: colour, load (N), readings, those of the line by slip.
+
+        The line is that of the run with most readings at this load: runs may differ in speed.
+        """
+        own = np.flatnonzero((self.channel == channel) & np.isfinite(self.measured))
+        if not own.size:
+            return
+        levels = load_levels(self.load)
+        present = np.unique(levels.index[own])
+        most = min(MOST_LOADS, len(present))
+        picked = present[np.linspace(0, len(present) - 1, most).round().astype(int)]
+        colours = np.linspace(0, len(LOADS) - 1, most).round().astype(int)
+        names = np.asarray(self.run, dtype=object)
+        for level, colour in zip(picked, colours, strict=True):
+            rows = own[levels.index[own] == level]
+            runs, counts = np.unique(names[rows].astype(str), return_counts=True)
+            line = rows[names[rows].astype(str) == runs[int(np.argmax(counts))]]
+            line = line[np.argsort(self.slip[line], kind="stable")]
+            yield LOADS[colour], float(np.median(self.load[rows])), rows, line
+
+    def _draw_load(
+        self,
+        axes: Any,
+        factor: float,
+        colour: str,
+        load: float,
+        rows: NDArray[Any],
+        line: NDArray[Any],
+    ) -> None:
+        slip, after = self.slip[line], factor * self.after[line]
+        band = factor * Z_90 * np.hypot(self.after_std[line], self.std[line])
+        if np.unique(slip).size > 1:
+            axes.fill_between(slip, after - band, after + band, color=colour, alpha=0.15, lw=0)
+            axes.plot(slip, after, color=colour, lw=1.7)
+            if self.before is not None:
+                axes.plot(slip, factor * self.before[line], "--", color=colour, lw=1.1)
+        else:
+            axes.errorbar(slip, after, band, fmt="_", color=colour, ms=14, lw=4, alpha=0.3)
+        label = f"{significant(load, 3)} N"
+        axes.plot(
+            self.slip[rows], factor * self.measured[rows], "o", color=colour, ms=4, label=label
+        )
+
+    def _draw_residuals(self, axes: Any, rows: NDArray[Any]) -> None:
+        axes.axhspan(-Z_90, Z_90, color=PRIOR, alpha=0.6, lw=0)
+        axes.axhline(0.0, color=UNCHANGED, lw=0.8)
+        most = 3.5
+        shown = [(self.after, AFTER, "o", "with it")]
+        if self.before is not None:
+            shown.insert(0, (self.before, BEFORE, "x", "soil alone"))
+        for prediction, colour, marker, label in shown:
+            residual = (self.measured[rows] - prediction[rows]) / self.std[rows]
+            axes.plot(self.slip[rows], residual, marker, color=colour, ms=3.6, label=label)
+            finite = np.abs(residual[np.isfinite(residual)])
+            most = max(most, 1.2 * float(finite.max()) if finite.size else 0.0)
+        if self.before is not None:
+            axes.legend(ncols=2)
+        if most > COMPRESSED:
+            axes.set_yscale("symlog", linthresh=3.0)
+            ticks = [10.0 ** int(np.log10(most)), 3.0]
+            both = [*(-t for t in ticks), 0.0, *ticks]
+            axes.set_yticks(both, [f"{t:g}" for t in both])
+            axes.minorticks_off()
+        axes.set_ylim(-most, most)

@@ -1,0 +1,146 @@
+"""Rotation and travel of a map from which no slip can follow, with the likely cause."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.log_import.mapping.log_map import WheelMap
+from soilml.log_import.units import spelling
+
+#: Ratio of what was read to what is meant: of rotations that are too fast; unit that was read, and
+#: the one that is meant, of those that are too slow; of travel.
+_ROTATION = (
+    (180.0 / math.pi, "deg"),
+    (30.0 / math.pi, "rpm"),
+    (2.0 * math.pi, "turns"),
+    (6.0, "deg/s, and was read as rpm"),
+)
+_SLOW_ROTATION = (
+    (6.0, "deg/s", "rpm"),
+    (180.0 / math.pi, "deg/s", "rad/s"),
+    (180.0 / math.pi, "deg", "rad"),
+    (30.0 / math.pi, "rpm", "rad/s"),
+)
+_TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
+#: Share of the rim speed from which a wheel moves, fewest rows, and how near to 1 and how constant
+#: travel over rim speed is where one is computed from the other.
+_MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 4, 0.03, 1e-3
+
+
+def rate_hints(
+    wheel: WheelMap, rim: Floats, ground: Floats
+) -> Iterator[tuple[str, str, tuple[str, ...]]]:
+    """Code, text and channels of what is wrong.
+
+    rim, ground: Speeds of rim and travel (rows,), m/s, in the sensors' own direction.
+    """
+    channels = wheel.channels
+    rotation = next((r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in channels), "")
+    good = np.isfinite(rim) & np.isfinite(ground) & (rim != 0.0)
+    if "slip" in channels or not rotation or not good.any():
+        return
+    ratio = ground[good] / rim[good]
+    travel = "position" if "position" in channels else "ground_speed"
+    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good]):
+        yield "one-sensor", why, (rotation, travel)
+        return
+    if float(np.median(ratio)) < -0.02:
+        text = (
+            f"travel and rotation have opposite signs in {np.mean(ratio < 0.0):.0%} of windows: "
+            f"write reverse = true in [{travel}] or in [{rotation}]"
+        )
+        yield "sign", text, (travel, rotation)
+        ratio = np.abs(ratio)
+    middle, fastest = float(np.median(ratio)), float(np.max(ratio))
+    if 0.0 < fastest < 0.3:
+        text = (
+            f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be "
+            f"{1.0 / fastest:.3g} times as fast as the travel; "
+            f"{_too_fast(wheel, rotation, 1.0 / fastest)}"
+        )
+        yield "rotation-too-fast", text, (rotation,)
+    elif middle > 3.0:
+        text = (
+            f"travel is {middle:.3g} times as fast as the rim in the middle of the windows; "
+            f"{_too_slow(wheel, travel, rotation, middle)}"
+        )
+        yield "travel-too-fast", text, (travel, rotation)
+    elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
+        radius = wheel.radius.value if wheel.radius else math.nan
+        text = (
+            f"slip is {1.0 - fastest:.2g} or more in all windows; was the radius of {radius:g} m "
+            "measured as diameter?"
+        )
+        yield "radius-as-diameter", text, ("radius",)
+
+
+def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats) -> str:
+    """Why rotation and travel are one measurement, from which no slip follows; "" where two are.
+
+    rim, ground: Means of windows or samples (n,), m/s. The travel of an odometry of the wheels is r
+    omega within its resolution, also where the speed changes.
+    """
+    ours, theirs = wheel.channels[rotation].columns, wheel.channels[travel].columns
+    needed = "needed is a travel from another sensor, or [slip]"
+    if {*ours} & {*theirs}:
+        return (
+            f"[{rotation}] and [{travel}] are both of the column {theirs[0]!r}: slip is a constant "
+            f"by construction; {needed}"
+        )
+    moves = np.abs(rim) > _MOVES * float(np.max(np.abs(rim), initial=0.0))
+    if not ours or not theirs or moves.sum() < _FEWEST:
+        return ""
+    ratio = ground[moves] / rim[moves]
+    middle = float(np.median(ratio))
+    alike = abs(middle - 1.0) < _ODOMETRY and float(np.std(ratio)) < _RESOLUTION
+    changes = float(np.std(rim[moves])) > 10.0 * _RESOLUTION * float(np.median(np.abs(rim[moves])))
+    if not (alike and (changes or float(np.ptp(ratio)) == 0.0)):
+        return ""
+    return (
+        f"the travel is {middle:.4g} times the rim speed in all {int(moves.sum())} windows: "
+        f"[{travel}] seems to be computed from the rotation, so that slip is 0 by construction; "
+        f"{needed}"
+    )
+
+
+def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
+    unit = wheel.channels[rotation].unit
+    if rotation != "rim_speed" and unit in ("", "rad/s", "rad", "rpm"):
+        for factor, meant in _ROTATION:
+            if 0.9 * factor <= excess <= 1.8 * factor and (factor == 6.0) == (unit == "rpm"):
+                return f"probably [{rotation}] is in {meant}"
+    if wheel.radius is not None and wheel.radius.value > 2.0:
+        return "probably the radius is in mm"
+    if rotation == "rim_speed":
+        # at a slip of 0 to 0.5 the rim is up to twice as fast as the travel
+        near = [u for f, u in _TRAVEL if 0.9 * f <= excess <= 2.0 * f]
+        meant = {"mm": "mm/s", "cm": "cm/s"}.get(near[0], near[0]) if near else "another unit"
+        return f"probably [rim_speed] is in {meant}, or [ground_speed] in a larger one"
+    return (
+        f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio "
+        f"in [{rotation}]), or its unit is wrong"
+    )
+
+
+def _too_slow(wheel: WheelMap, travel: str, rotation: str, excess: float) -> str:
+    likely = []
+    if rotation != "rim_speed" and wheel.channels[rotation].unit:
+        given = spelling(wheel.channels[rotation].unit)
+        for factor, read, meant in _SLOW_ROTATION:
+            if given == read and 0.4 * factor <= excess <= 1.2 * factor:
+                likely.append(f"[{rotation}] is in {meant}, and was read as {read}")
+    if wheel.channels[travel].unit in ("", "m", "m/s"):
+        for factor, unit in _TRAVEL:
+            if 0.4 * factor <= excess <= 1.2 * factor:
+                rate = "/s" if travel == "ground_speed" and "/" not in unit else ""
+                likely.append(f"[{travel}] is in {unit}{rate}")
+    if likely:
+        return f"probably {', or '.join(likely)}"
+    ratio = wheel.channels[rotation].gear_ratio.value if rotation != "rim_speed" else 1.0
+    if ratio > 1.0 and excess > 0.4 * ratio:
+        return f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
+    return f"probably the unit of [{travel}] or of [{rotation}] is wrong"

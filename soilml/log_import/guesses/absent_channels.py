@@ -1,0 +1,161 @@
+"""Tables of a guess for channels that no column has: what logs state, or what is needed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from soilml.log_import.guesses.columns import Candidate, words_of
+from soilml.log_import.guesses.constants import StatedConstants, number_in_names
+from soilml.log_import.guesses.roles import Assignment
+from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.mapping.written_map import Marked, WrittenTable, key_line, toml_value
+
+_GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}  # Words of a place in degrees
+#: Words of a torque, also in the name of the force that measures it on a lever.
+_OF_TORQUE = {"torque", "moment", "drehmoment", "couple", "par", "coppia"}
+#: Uncertainty and unit of what logs state.
+_STATED = {"load": ("1 %", "N"), "ground_speed": ("1 %", "m/s"), "slip": ("0.01", "1")}
+
+
+@dataclass(frozen=True)
+class AbsentChannels:
+    """What stands for the roles of a guess that have no column."""
+
+    found: Assignment
+    columns: Sequence[Candidate]
+    stated: StatedConstants
+    run_names: Sequence[str]
+
+    def load(self, labels: int) -> WrittenTable:
+        """The load: what logs or names say, or the mass.
+
+        labels: The number of wheels that a column of the log distinguishes.
+        """
+        common = self.stated.common
+        said = None if {"load", "mass"} <= common.keys() else self._said("load")
+        if said := said or self._said_by_names("load"):
+            return said
+        count, why = max(1, len(self.found.wheels), labels), ""
+        if count == 1:
+            why = Marked("CHANGE: how many wheels carry this mass")
+            if "wheels" in common:
+                number, line = common["wheels"]
+                count, why = int(number), f"stated in the log: {line[:60]}"
+        table = WrittenTable(before=["# No column is a vertical load: it follows from the mass."])
+        if "mass" in common:
+            table.path = "vehicle"
+            value, line = common["mass"]
+            table.put("mass", f"{value} +- 1 %", f"stated in the log: {line[:60]}")
+            table.put("wheels", count, why)
+            return table
+        wheels = f"# {key_line('wheels', count, why)}"
+        table.after = [
+            Marked("# [vehicle]                   # NEEDED, or [load] value = '60 N +- 1 N'"),
+            '# mass = "6.1 kg +- 0.1 kg"   # all that stands on the wheels',
+            Marked(wheels) if isinstance(why, Marked) else wheels,
+        ]
+        return table
+
+    def _said(self, role: str, unit: str = "") -> WrittenTable | None:
+        """The table of a role that the lines before the headers state, of all logs or of each."""
+        std, usual = _STATED[role]
+        if role in self.stated.common:
+            value, line = self.stated.common[role]
+            why = f"stated in the log: {line[:60]}"
+            return WrittenTable(role, {"value": f"{value} +- {std}"}, {"value": why})
+        if role not in self.stated.of_each:
+            return None
+        pattern, own, values = self.stated.of_each[role]
+        why = f"the logs state {', '.join(values[:4])}"
+        return WrittenTable(role, {"head": pattern, "unit": own or unit or usual}, {"head": why})
+
+    def _said_by_names(self, role: str) -> WrittenTable | None:
+        """The table of a role whose number stands in the names of all runs."""
+        in_name = number_in_names(role, self.run_names)
+        if in_name is None:
+            return None
+        pattern, unit, numbers = in_name
+        why = f"the names say {', '.join(f'{n:g}' for n in numbers[:4])}"
+        return WrittenTable(role, {"file_name": pattern, "unit": unit}, {"file_name": why})
+
+    def _set_slip(self) -> WrittenTable | None:
+        """A slip that was set, as the heads or the names of the logs say."""
+        values = self.stated.of_each["slip"][2] if "slip" in self.stated.of_each else []
+        large = any(float(value.split()[0]) > 1.0 for value in values)
+        table = self._said("slip", "%" if large else "1")
+        if table is not None and "slip" not in self.stated.common:
+            table.put("noise", 0.01, Marked("CHANGE: how far the slip may be from what was set"))
+        return table or self._said_by_names("slip")
+
+    def table(self, role: str) -> list[WrittenTable]:
+        """What stands for a role other than the load: what is needed, or the runner-up."""
+        roles, others = self.found.roles(), self.found.others.get(role, [])
+        travel = {"position", "slip"} & roles
+        said: WrittenTable | None = None
+        if role == "slip" and not {"position", "ground_speed"} & roles:
+            said = self._set_slip()
+        elif role == "ground_speed" and not travel:
+            said = self._said(role)
+        if said is not None:
+            return [said]
+        lines: list[str] = []
+        if role == "wheel_speed" and not others:
+            if not {"wheel_angle", "rim_speed", "slip"} & roles:
+                lines = self._needed_rotation()
+        elif role == "torque" and not (others or "motor_current" in roles):
+            lines = self._needed_torque()
+        elif role == "ground_speed" and not (travel or others):
+            lines = self._needed_travel()
+        elif role in ("drawbar_pull", "sinkage") and not others:
+            lines = self._perhaps(role)
+        if others and not lines:
+            column = toml_value(others[0].address)
+            lines = [f"# [{role}]  # {ROLES[role][1]}", f"# column = {column}"]
+        return [WrittenTable(before=lines)] if lines else []
+
+    def _needed_rotation(self) -> list[str]:
+        commanded = [c.address for c in self.columns if "slip" in words_of(c.name)]
+        return [
+            Marked("# NEEDED: no column is the rotation of the wheel. One of these:"),
+            "# [wheel_angle]",
+            "# [wheel_speed]",
+            *(f"# [slip]  # column = {toml_value(name)}" for name in commanded),
+        ]
+
+    def _needed_torque(self) -> list[str]:
+        forces = [c for c in self.columns if c.kind == "N" and _OF_TORQUE & {*words_of(c.name)}]
+        needed = Marked("# NEEDED for a soil: no column is a torque. One of these:")
+        lines = [needed, "# [torque]"]
+        for c in forces:
+            lines.append(f"# column = {toml_value(c.address)}")
+            lines.append('# scale = "0.2 N m +- 1 %"  # 1 N on a lever arm of 0.2 m')
+        return [*lines, "# [motor_current]"]
+
+    def _needed_travel(self) -> list[str]:
+        degrees = [c.address for c in self.columns if _GLOBE & {*words_of(c.name)}]
+        return [
+            *(
+                f"# {name}: degrees on the globe are no place; add columns in m, north and east"
+                for name in degrees
+            ),
+            Marked("# NEEDED: no column is the travel. One of these:"),
+            "# [ground_speed]",
+            '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
+        ]
+
+    def _perhaps(self, role: str) -> list[str]:
+        """Columns of the unit of a role that nothing uses and that vary: one may be the role."""
+        groups = [self.found.shared, *self.found.wheels.values()]
+        used = {c.address for own in groups for c in own.values()}
+        used |= {c.address for own in self.found.parts.values() for c in own}
+        names = [
+            c.address for c in self.columns
+            if c.kind == ROLES[role][0] and c.address not in used and not c.about.constant
+            and not (role == "sinkage" and c.about.travel > 0.6)
+        ]  # fmt: skip
+        if not names:
+            return []
+        shown = ", ".join(map(toml_value, names[:4]))
+        line = f"# [{role}]  # CHANGE: perhaps one of {shown} is {ROLES[role][1]}"
+        return [Marked(line), f"# column = {toml_value(names[0])}"]

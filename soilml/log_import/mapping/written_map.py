@@ -1,0 +1,101 @@
+"""A map that is written: tables of keys with a reason for each, as TOML with comments."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from soilml.io.cell_text import is_plain, one_line
+from soilml.optional_imports import tomllib
+
+
+class Marked(str):
+    """A line of a map, or the comment of a key, with what no log shows: a person must look."""
+
+
+def toml_value(value: Any) -> str:
+    """A value in TOML: numbers without needless digits, patterns in single quotes.
+
+    Characters that are not plain are written as escapes, and half a pair of surrogates, which TOML
+    does not have, as a question mark.
+    """
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, float | int | np.number):
+        return f"{float(value):g}" if float(value) != int(value) else f"{int(value)}"
+    if isinstance(value, str) and "\\" in value and "'" not in value and is_plain(value):
+        return f"'{value}'"
+    written = json.dumps(value, ensure_ascii=False).encode("utf-8", "replace").decode()
+    return "".join(c if is_plain(c) else f"\\U{ord(c):08x}" for c in written)
+
+
+def key_line(key: str, value: Any, comment: str = "") -> str:
+    """The line of a key, which is marked where its comment is."""
+    line = f"{key} = {toml_value(value)}" + (f"  # {comment}" if comment else "")
+    return Marked(line) if isinstance(comment, Marked) else line
+
+
+@dataclass
+class WrittenTable:
+    """A table: its keys, a comment for each, and lines of comment before and after them.
+
+    The path of a channel is `load`, or `wheels.front_left.load`. A table without a path is comments
+    alone, such as what is needed.
+    """
+
+    path: str = ""
+    keys: dict[str, Any] = field(default_factory=dict)
+    comments: dict[str, str] = field(default_factory=dict)
+    about: str = ""  # Comment behind the path
+    before: list[str] = field(default_factory=list)
+    after: list[str] = field(default_factory=list)
+
+    def put(self, key: str, value: Any, why: str = "") -> None:
+        """Set a key and its comment."""
+        self.keys[key] = value
+        if why:
+            self.comments[key] = why
+
+    @property
+    def is_marked(self) -> bool:
+        """Whether a key says that a person must look."""
+        return any(isinstance(why, Marked) for why in self.comments.values())
+
+    def lines(self) -> Iterator[str]:
+        """The lines of TOML after a blank one."""
+        yield from ("", *self.before)
+        if self.path:
+            yield f"[{self.path}]" + (f"  # {self.about}" if self.about else "")
+            for key, value in self.keys.items():
+                yield key_line(key, value, self.comments.get(key, ""))
+        yield from self.after
+
+
+@dataclass
+class WrittenMap:
+    """A map as its tables in order, below lines of comment on the logs."""
+
+    head: list[str]
+    tables: list[WrittenTable]
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What the text holds, as nested dictionaries."""
+        return tomllib.loads(self.text)
+
+    @property
+    def text(self) -> str:
+        """The map in TOML; names and lines of the log also stand in comments, as one line each."""
+        return "\n".join(map(one_line, self._lines())) + "\n"
+
+    @property
+    def marked(self) -> int:
+        """How many lines say that a person must look."""
+        return sum(isinstance(line, Marked) for line in self._lines())
+
+    def _lines(self) -> list[str]:
+        return [*self.head, *(line for table in self.tables for line in table.lines())]

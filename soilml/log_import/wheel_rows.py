@@ -1,0 +1,170 @@
+"""One wheel in all runs: its rows, what is left out of them, and what looks odd."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.config.measurement_noise import Noise
+from soilml.log_import.channels.inputs import Inputs, wheel_inputs
+from soilml.log_import.channels.runs import Run
+from soilml.log_import.channels.shared_errors import SharedError, shared_errors
+from soilml.log_import.channels.wheel_quantities import Conversion
+from soilml.log_import.checks.column_units import differing_units, unit_hints
+from soilml.log_import.checks.independence import with_shared_errors
+from soilml.log_import.checks.row_hints import RowsToCheck
+from soilml.log_import.checks.sensors import (
+    dead_sensors,
+    lifted_at_the_end,
+    untared_load,
+    untared_sensors,
+)
+from soilml.log_import.mapping.log_map import LogMap, WheelMap
+from soilml.log_import.rows import (
+    WheelSeries,
+    WindowRow,
+    add_stated_errors,
+    by_name,
+    irregular_windows,
+    pool_errors,
+    table_rows,
+    unusable,
+    values_of,
+    window_row,
+)
+from soilml.log_import.stance_rows import stance_rows, without_rolling
+from soilml.log_import.windows.steady import Stretch, steady_windows
+from soilml.remarks import Remark
+
+Progress = Callable[[str, int, int], None]
+
+
+class WheelRows:
+    """The rows of a wheel with one gear: of samples over time, or of a table of steady runs.
+
+    kept: By run, the rows that can be used.
+    stretches: By run, what is left out, with the reason.
+    """
+
+    def __init__(
+        self, log_map: LogMap, wheel: WheelMap, runs: Sequence[Run], progress: Progress
+    ) -> None:
+        wheel, self.computed = with_shared_errors(wheel, runs)
+        self.log_map, self.wheel, self.runs = log_map, wheel, runs
+        self.conversion = Conversion(wheel, log_map.vehicle)
+        self.inputs: list[Inputs] = []
+        self.dead: list[dict[str, str]] = [{} for _ in runs]
+        self.quantities: list[dict[str, Floats]] = []
+        self.stretches: list[list[Stretch]] = [[] for _ in runs]
+        if log_map.runs.each_row:
+            self.rows = [table_rows(run, self.conversion) for run in runs]
+            odd: dict[tuple[int, int], Remark] = {}
+        else:
+            self.inputs = [wheel_inputs(run, wheel) for run in runs]
+            self.dead = dead_sensors(self.inputs)
+            stage = f"finding steady windows{' of ' + wheel.name if wheel.name else ''}"
+            self.rows = []
+            for i in range(len(runs)):
+                progress(stage, i, len(runs))
+                self.rows.append(self._windows(i))
+            progress(stage, len(runs), len(runs))
+            odd = irregular_windows(self.rows)
+            pool_errors([row for i, rows in enumerate(self.rows) for k, row in enumerate(rows)
+                         if (i, k) not in odd])  # fmt: skip
+            for inputs, rows in zip(self.inputs, self.rows, strict=True):
+                for row in rows:
+                    add_stated_errors(row, inputs, self.conversion)
+        # the slip of stances may be what is asked for
+        needed = ("slip", "load") if wheel.leg is None else ("load",)
+        self.kept: list[list[WindowRow]] = []
+        for i, rows in enumerate(self.rows):
+            why = [unusable(row, self.dead[i], needed) or odd.get((i, k))
+                   for k, row in enumerate(rows)]  # fmt: skip
+            pairs = list(zip(rows, why, strict=True))
+            self.stretches[i] += [replace(row.window, why=w) for row, w in pairs if w]
+            self.kept.append([row for row, w in pairs if not w])
+
+    def _windows(self, i: int) -> list[WindowRow]:
+        """The rows of a run over time; what is left out of it joins its stretches."""
+        run, inputs = self.runs[i], self.inputs[i]
+        for role in self.dead[i]:
+            inputs.values[role] = np.full(inputs.time.size, np.nan)
+        angle = without_rolling(inputs, self.wheel) if self.wheel.leg is not None else None
+        quantities = self.conversion.of({**inputs.values, **inputs.constants})
+        series = {n: np.broadcast_to(v, inputs.time.shape) for n, v in quantities.items()}
+        self.quantities.append(series)
+        left_out = tuple(e for e in self.log_map.left_out if e.run in ("", run.name))
+        windows = self.log_map.windows
+        if angle is not None:
+            out, rows = stance_rows(inputs, angle, series, self.conversion, windows, left_out)
+            self.stretches[i] += out
+            return rows
+        stretches = steady_windows(inputs.time, series, windows, left_out)
+        self.stretches[i] += [s for s in stretches if s.why]
+        kept = (s for s in stretches if not s.why)
+        return [window_row(s, inputs, quantities, run, self.conversion) for s in kept]
+
+    def hints(self) -> list[Remark]:
+        """What says that the map is wrong, by all windows, left out or not."""
+        values = values_of([row for rows in self.rows for row in rows])
+        radius = self.wheel.radius.value if self.wheel.radius is not None else None
+        checked = RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints()
+        of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
+        return unit_hints(self.log_map, self.wheel, self.runs[0]) + [
+            Remark(hint.code, f"{self.log_map.source}{of}: {hint.text}", hint.about)
+            for hint in checked
+            if hint.wrong
+        ]
+
+    def remarks(self) -> list[Remark]:
+        """Dead and untared sensors; rows of a table that are left out."""
+        if self.log_map.runs.each_row:
+            return self.computed + [
+                replace(s.why, text=f"row {s.start + 1:.0f} of {run.recordings[0].file.name} is "
+                        f"left out: {s.why}")
+                for run, own in zip(self.runs, self.stretches, strict=True) for s in own if s.why
+            ]  # fmt: skip
+        of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
+        found = list(self.computed)
+        for run, dead, inputs in zip(self.runs, self.dead, self.inputs, strict=True):
+            if len(dead) > 2 and len(dead) >= len(inputs.values) - 1:
+                text = f"run {run.name}: no sensor{of} says anything: an empty log?"
+                found.append(Remark("empty-log", text, (run.name,)))
+                continue
+            for role, why in dead.items():
+                text = f"run {run.name}: the sensor of [{role}]{of} is dead: {why}"
+                found.append(Remark("dead-sensor", text, (role, run.name)))
+        found += untared_sensors(self.wheel, self.inputs)
+        found += untared_load(self.wheel, self.inputs)
+        found += differing_units(self.wheel, self.runs[0])
+        return found + lifted_at_the_end(self.wheel, [run.name for run in self.runs], self.inputs)
+
+    def shared_errors(self) -> tuple[dict[str, Noise], list[SharedError]]:
+        """The errors that the rows share by the constants of the map; see `shared_errors`."""
+        means = by_name([row.means for own in self.kept for row in own])
+        if not means:
+            return {}, []
+        return shared_errors(
+            lambda constants: self.conversion.of(means, constants), self.conversion.constants
+        )
+
+    def series(self, i: int) -> WheelSeries:
+        """Quantities and stretches of one run."""
+        run = self.runs[i]
+        windows = [row.window for row in self.kept[i]]
+        notes = (*run.notes, *self.inputs[i].notes)
+        notes += tuple(
+            Remark("dead-sensor", f"[{role}] is dead: {why}", (role,))
+            for role, why in self.dead[i].items()
+        )
+        return WheelSeries(
+            run=f"{run.name}_{self.wheel.name}" if self.wheel.name else run.name,
+            drive=run.name,
+            time=self.inputs[i].time,
+            quantities=self.quantities[i],
+            stretches=tuple(sorted([*self.stretches[i], *windows], key=lambda s: s.start)),
+            notes=notes,
+        )

@@ -1,0 +1,163 @@
+"""What a job of the page runs: a command line on the files of its folder.
+
+The page shows what the command writes, so that both say the same.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from soilml.errors import InputError
+from soilml.io.named_files import NO_FILES, NamedFiles
+
+#: Folders of a job: of the files that it reads, in which it works, and of what it writes. No
+#: written file can replace a read one, and a dropped file may have any name.
+READ, WRITTEN = "read", "found"
+#: Names of the texts of the page, by which messages call them.
+MODEL_FILE, STUDY_FILE, MAP_FILE = "MODEL.toml", "rover.toml", "map.toml"
+OUT = f"../{WRITTEN}"
+#: Designs of the sweep and draws, by how thorough the answer is: the last is the command's default.
+EFFORTS = {"quick": (60, 300), "normal": (100, 500), "thorough": (250, 1000)}
+#: Columns by two of which a table of runs is known, where no column is a clock.
+_RUNS, _CLOCKS = {"slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m"}, {"time", "t"}
+
+
+def command_of(request: Mapping[str, Any]) -> list[str]:
+    """The words of the command of a request; writes the texts of the page beside the files.
+
+    Raises `InputError` for a text that names other files than those of the page.
+    """
+    return KINDS[request["kind"]](request)
+
+
+def look(request: Mapping[str, Any]) -> dict[str, Any]:
+    """The kind of the dropped files: a table of runs, logs, or a spreadsheet of several sheets."""
+    from soilml.io.read_table import RUNS, read_table
+    from soilml.io.spreadsheet import is_spreadsheet, sheet_rows, sheets_with_cells, split_sheet
+
+    name = request["names"][0]
+    file, sheet = split_sheet(name)
+    if is_spreadsheet(file):
+        sheets = sheets_with_cells(file)
+        if len(sheets) > 1 and not sheet:
+            return {"kind": "sheets", "sheets": sheets}
+        header = set(next((row for row in sheet_rows(Path(name)) if row), []))
+    else:
+        header = _header(Path(name))
+    if len(request["names"]) > 1 or len(header & _RUNS) < 2 or header & _CLOCKS:
+        return {"kind": "log"}
+    table = read_table(name, RUNS)
+    radii = {*table["wheel_radius_m"].tolist()} if "wheel_radius_m" in table else set()
+    return {
+        "kind": "runs",
+        "rows": len(table),
+        "runs": list(dict.fromkeys(map(str, table["run"]))),
+        "radius": radii.pop() if len(radii) == 1 else None,
+        "measured": [c for c in ("drawbar_pull_N", "sinkage_m") if c in table],
+    }
+
+
+def _header(file: Path) -> set[str]:
+    """The names of the columns of a table; empty for other files."""
+    if file.suffix == ".parquet":
+        from soilml.io.parquet import read_parquet
+
+        return set(read_parquet(file)[0])
+    if file.suffix.lower() not in (".csv", ".txt", ".tsv"):
+        return set()
+    with file.open("rb") as opened:
+        line = opened.readline(1 << 16).decode("utf-8-sig", errors="replace")
+    return {cell.strip().strip("\"'") for cell in re.split(r"[,;\t]", line)}
+
+
+def _identify(request: Mapping[str, Any]) -> list[str]:
+    return ["identify", *_model_and_rows(request), "--report", OUT]
+
+
+def _gap(request: Mapping[str, Any]) -> list[str]:
+    return ["gap", *_model_and_rows(request), "--out", OUT]
+
+
+def _pull(request: Mapping[str, Any]) -> list[str]:
+    return ["pull", *_model_and_rows(request), "--report", OUT]
+
+
+def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
+    from soilml.config.case import read_case
+
+    model = _text_file(MODEL_FILE, request.get("model"))
+    read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
+    run = request.get("run")
+    return [MODEL_FILE, request["names"][0], *([f"--where=run={run}"] if run else [])]
+
+
+def _draft(request: Mapping[str, Any]) -> list[str]:
+    return ["import", "--init", *request["names"], "--out", f"{OUT}/{MAP_FILE}"]
+
+
+def _import(request: Mapping[str, Any]) -> list[str]:
+    _text_file(MAP_FILE, request.get("map"))
+    accept = ["--accept"] if request.get("accept") is True else []
+    out = f"{OUT}/runs.csv"
+    return ["import", *request["names"], "--map", MAP_FILE, "--out", out, *accept]
+
+
+def _wheels(request: Mapping[str, Any]) -> list[str]:
+    from soilml.config.case import read_case
+    from soilml.rover_design.study import read_study
+
+    names = request["names"]
+    if request.get("model"):
+        model = _text_file(MODEL_FILE, request["model"])
+        read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
+        names = [*names, model.name]
+    files = NamedFiles(names=names, hint="drop the table of runs first")
+    read_study(_text_file(STUDY_FILE, request.get("question")), files)
+    effort = request.get("effort", "normal")
+    if not isinstance(effort, str) or effort not in EFFORTS:
+        raise InputError(f"effort is {effort!r}; needed is one of {', '.join(EFFORTS)}")
+    designs, draws = map(str, EFFORTS[effort])
+    words = ["plan", "wheels", STUDY_FILE, "--designs", designs, "--draws", draws]
+    return [*words, "--report", OUT]
+
+
+def _init(request: Mapping[str, Any]) -> list[str]:
+    """A first model file for a wheel of these sizes, m; without a soil its bearing is unknown."""
+    words = ["init", f"{OUT}/{MODEL_FILE}"]
+    for name in ("radius", "width", "soil"):
+        if (value := request.get(name)) not in (None, ""):
+            words.append(f"--{name}={value}")
+    return words
+
+
+def _example(request: Mapping[str, Any]) -> list[str]:
+    return ["example", OUT]
+
+
+def _text_file(name: str, text: object) -> Path:
+    """A text box of the page as a file of this name, so that errors name it."""
+    if not isinstance(text, str) or not text.strip():
+        raise InputError(f"{name} is missing")
+    path = Path(name)
+    if path.exists():
+        raise InputError(f"a dropped file has the name {name}; rename it")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+#: Words of the command by the kind of a job.
+KINDS: Mapping[str, Callable[[Mapping[str, Any]], list[str]]] = {
+    "identify": _identify,
+    "gap": _gap,
+    "pull": _pull,
+    "draft": _draft,
+    "import": _import,
+    "wheels": _wheels,
+    "init": _init,
+    "example": _example,
+}
+#: Kinds of jobs that read no dropped file.
+WITHOUT_FILES = ("wheels", "init", "example")

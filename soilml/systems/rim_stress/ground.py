@@ -1,0 +1,306 @@
+"""Cohesion, friction angle and shear modulus from climbs of several slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.errors import FitError, InputError
+from soilml.fitting.misfit import misfit_limit
+from soilml.identification.fit import STRONG_CORRELATION, Fit, identifiability_remarks
+from soilml.numerics.importance_sampling import importance_sample
+from soilml.numerics.prior import Prior
+from soilml.quantities import QUANTITIES, SHEAR
+from soilml.remarks import Remark
+from soilml.systems.rim_stress.climb import (
+    Climb,
+    Rover,
+    ShearParameters,
+    Uncertainty,
+    group_by_slope,
+)
+from soilml.systems.rim_stress.climb_balances import (
+    ForceBalances,
+    estimate_wheel_loads,
+    wheel_components,
+    wheel_magnifications,
+)
+from soilml.systems.rim_stress.force_balance import unit_remarks
+
+#: Priors of the shear parameters of sands, used where neither a value nor a range is given.
+DEFAULT_PRIORS = {
+    "cohesion": Prior(0.0, 2000.0),
+    "friction_angle": Prior(0.35, 0.87),
+    "shear_modulus": Prior(0.001, 0.05, log=True),
+}
+#: Random soils among which the search starts; posterior samples returned; iterations in which the
+#: noise covariance, which depends on the soil, is updated at the current centre. Two suffice: the
+#: covariance changes little over the posterior.
+START_SOILS, SAMPLES, ITERATIONS = 2048, 6000, 2
+#: A climb is refused if its balance misses every soil of the priors by this many standard
+#: deviations, all climbs as contradictory if the noise would have to be this many times larger.
+MAX_MISS, MAX_NOISE_SCALE = 6.0, 5.0
+EDGE = 1e-6  # Distance of the corner soils from the edges of the unit cube
+
+
+@dataclass(frozen=True)
+class GroundEstimate:
+    """Soil parameters estimated from climbs, and the residual of each climb.
+
+    `samples_as_measured` are consistent with the stresses as measured: an error of the entry angles
+    common to all runs affects stresses and k_x, and the two effects nearly cancel in the pull.
+    """
+
+    fit: Fit
+    samples: Floats  # (n, 3): c (Pa), phi (rad), k_x (m); fixed parameters are constant
+    samples_as_measured: Floats  # (n, 3)
+    rover: Rover  # with the loads of its wheels, known or estimated
+    noise: Uncertainty
+    residual: Floats  # (climbs,) N, pull less the weight along the slope, at the posterior mean
+    residual_std: Floats  # (climbs,) N
+    distinct_slopes: int
+    magnification: Floats  # (climbs, 2), M of front and rear wheel at the posterior mean
+
+    @property
+    def shear(self) -> ShearParameters:
+        """Posterior mean of (c, phi, k_x)."""
+        return _shear(self.samples.mean(axis=0))
+
+
+def identify_ground(
+    rover: Rover,
+    climbs: Sequence[Climb],
+    *,
+    fixed: Mapping[str, float] | None = None,
+    prior: Mapping[str, Prior] | None = None,
+    noise: Uncertainty | None = None,
+    seed: int = 0,
+) -> GroundEstimate:
+    r"""Estimate (c, phi, k_x) and their posterior from the force balance on slopes.
+
+    .. math::
+        2 (F_{xf} + F_{xr}) = m g \sin\alpha, \qquad 2 (F_{zf} + F_{zr}) = m g \cos\alpha
+
+    The second equation gives M of each run in closed form; the first is then one equation for each
+    run, weighted by the noise of its balance (`balance_std`). The posterior mean and covariance are
+    the estimate. Repeated climbs of one slope are one condition: p parameters need p slopes. Each
+    wheel has its own M only if the loads of the wheels are known; with the two sums alone each run
+    would add as many unknowns as equations.
+
+    Parameters
+    ----------
+    rover
+        Mass, wheels and, where known, the centre of mass.
+    climbs
+        Steady climbs with slip and stress of both wheels.
+    fixed
+        Known values of `cohesion` (Pa), `friction_angle` (rad) or `shear_modulus` (m).
+    prior
+        Ranges of the others; `DEFAULT_PRIORS` where missing.
+    noise
+        Standard deviations of the measurements.
+    seed
+        Seed of the posterior samples.
+
+    Raises
+    ------
+    FitError
+        For too few slopes, and for climbs that no single soil explains.
+    InputError
+        For an unknown parameter, and for a climb that no soil of the prior explains.
+
+    References
+    ----------
+    Nagatani et al., section 6.
+
+    Examples
+    --------
+    >>> from soilml.systems.rim_stress import SimulatedRover
+    >>> true = SimulatedRover()  # its shear modulus is 7.2 mm
+    >>> rng = np.random.default_rng(0)
+    >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist())
+    >>> ground = identify_ground(
+    ...     true.rover, climbs, fixed={"cohesion": 0.0, "friction_angle": 0.6632}
+    ... )
+    >>> modulus = ground.fit["shear_modulus"]
+    >>> round(1e3 * float(modulus.mean), 1), round(1e3 * float(modulus.std), 1)  # mm
+    (7.4, 0.3)
+    """
+    fixed, prior, noise = dict(fixed or {}), dict(prior or {}), noise or Uncertainty()
+    if unknown := sorted((fixed.keys() | prior.keys()) - set(SHEAR)):
+        raise InputError(f"no soil parameter {unknown[0]!r}; there are: {', '.join(SHEAR)}")
+    ranges = {name: prior.get(name, DEFAULT_PRIORS[name]) for name in SHEAR if name not in fixed}
+    slopes = len(group_by_slope(climbs, noise.slope)) if climbs else 0
+    _refuse_too_few(slopes, list(ranges))
+    constant = fixed.get("shear_modulus", 0.0)
+    within = ranges.get("shear_modulus") or Prior(constant, constant)
+    balances = ForceBalances.tabulate(rover, climbs, within)
+    rng, free = np.random.default_rng(seed), list(ranges)
+
+    def soils(u: Floats) -> Floats:
+        """(c, phi, k_x) (n, 3) at fractions (n, p) of the priors."""
+        columns = [
+            ranges[name].at(u[:, free.index(name)])
+            if name in ranges
+            else fixed[name] + 0.0 * u[:, 0]
+            for name in SHEAR
+        ]
+        return np.stack(columns, axis=1)
+
+    def draw(whitener: Floats) -> Floats:
+        """Posterior samples (n, p) of the fractions, for Gaussian residuals whitened as given."""
+        if not free:
+            return np.zeros((SAMPLES, 1))
+
+        def log_density(u: Floats) -> Floats:
+            squares = ((balances.residuals(soils(u)) @ whitener.T) ** 2).sum(axis=1)
+            return np.where(np.isnan(squares), -np.inf, -0.5 * squares)
+
+        drawn = importance_sample(log_density, len(free), int(rng.integers(2**31)))
+        return drawn.u[rng.choice(len(drawn.u), SAMPLES, p=drawn.weights)]
+
+    # the covariance depends on the soil: evaluated at the best of many, then at the mean
+    width = max(len(free), 1)
+    corners = np.asarray(list(product((EDGE, 1.0 - EDGE), repeat=width)))
+    start = soils(np.vstack([rng.random((START_SOILS, width)), corners]))
+    missed = balances.residuals(start)
+    centre = soils(np.full((1, width), 0.5))[0]
+    for _ in range(ITERATIONS):
+        whitener, std = balances.whitener(_shear(centre), noise)
+        squares = ((missed @ whitener.T) ** 2).sum(axis=1)
+        centre = start[int(np.argmin(np.nan_to_num(squares, nan=np.inf)))]
+    _refuse_unexplained(balances, missed, std)
+    freedom, noise_scale = len(climbs) - len(free), 1.0
+    for _ in range(ITERATIONS):
+        u = draw(whitener / noise_scale)
+        centre = soils(u).mean(axis=0)
+        whitener, std = balances.whitener(_shear(centre), noise)
+        residual = balances.residuals(centre[None])[0]
+        misfit = float(np.sum((whitener @ residual) ** 2)) / max(freedom, 1)
+        noise_scale = float(np.sqrt(misfit)) if misfit > misfit_limit(max(freedom, 1)) else 1.0
+    _refuse_contradiction(balances, residual, std, noise_scale)
+    as_measured, _ = balances.whitener(_shear(centre), replace(noise, entry_angle=0.0))
+    samples = soils(u)
+    fit = Fit(
+        method="climbing",
+        names=tuple(free),
+        units=tuple(QUANTITIES[name].unit for name in free),
+        values=(values := samples[:, [SHEAR.index(name) for name in free]]).mean(axis=0),
+        covariance=np.atleast_2d(np.cov(values, rowvar=False)) if free else np.zeros((0, 0)),
+        warnings=(),
+        rows_used=len(climbs),
+        remaining_fraction={n: float(np.std(u[:, i]) * np.sqrt(12.0)) for i, n in enumerate(free)},
+        misfit=misfit,
+        channels=("slope_rad",),
+    )
+    cohesion, friction, modulus = shear = _shear(samples.mean(axis=0))
+    scales = [
+        wheel_magnifications(
+            rover,
+            climb.slope,
+            [wheel_components(wheel, rover, modulus) for wheel in climb.wheels],
+            cohesion,
+            float(np.tan(friction)),
+        )
+        for climb in climbs
+    ]
+    assumed = {name: ranges[name] for name in free if name not in prior}
+    warnings = _warnings(fit, noise_scale, slopes, assumed) + unit_remarks(np.asarray(scales))
+    return GroundEstimate(
+        fit=replace(fit, warnings=tuple(warnings)),
+        samples=samples,
+        samples_as_measured=soils(draw(as_measured / noise_scale)),
+        rover=estimate_wheel_loads(rover, climbs, shear),
+        noise=noise,
+        residual=residual,
+        residual_std=std,
+        distinct_slopes=slopes,
+        magnification=np.asarray(scales),
+    )
+
+
+def _shear(values: Floats) -> ShearParameters:
+    return float(values[0]), float(values[1]), float(values[2])
+
+
+def _refuse_too_few(slopes: int, free: list[str]) -> None:
+    needed = max(len(free), 1)
+    if slopes < needed:
+        count = {0: "no climb", 1: "one slope"}.get(slopes, f"{slopes} slopes")
+        fixable = [name for name in SHEAR if name in free and name != "shear_modulus"]
+        hint = f", or {' or '.join(fixable)} as a number in [soil]" if fixable else ""
+        raise FitError(
+            f"{count} for {needed} parameters ({', '.join(free)}): each slope adds one equation "
+            f"besides that for M; needed are {needed} different slopes{hint}"
+        )
+
+
+def _refuse_unexplained(balances: ForceBalances, residuals: Floats, std: Floats) -> None:
+    """Raise `InputError` for the climb that is farthest from all soils of the priors."""
+    lowest, highest = np.nanmin(residuals, axis=0), np.nanmax(residuals, axis=0)
+    miss = np.maximum(lowest, -highest) / std
+    if miss.max() <= MAX_MISS:
+        return
+    i = int(np.argmax(miss))
+    climb = balances.climbs[i]
+    required = balances.rover.weight * np.sin(climb.slope)
+    too_little = highest[i] < 0.0
+    pull = required + (highest[i] if too_little else lowest[i])
+    raise InputError(
+        f"run {climb.name}: a slope of {climb.slope:.3g} rad requires {required:.3g} N, but on "
+        f"every soil within the ranges the wheels pull {'at most' if too_little else 'at least'} "
+        f"{pull:.3g} N at these slips and stresses; check slope_rad (rad, positive uphill), slip, "
+        "angle_rad (positive forward) and the mass, or widen [soil.prior]"
+    )
+
+
+def _refuse_contradiction(
+    balances: ForceBalances, residual: Floats, std: Floats, noise_scale: float
+) -> None:
+    """Raise `FitError` if no single soil explains all climbs, naming the largest outlier."""
+    if noise_scale > MAX_NOISE_SCALE:
+        i = int(np.argmax(np.abs(residual) / std))
+        raise FitError(
+            f"no single soil within the ranges explains these climbs: their force balances miss by "
+            f"{noise_scale:.0f} times the noise, run {balances.climbs[i].name} by "
+            f"{residual[i]:+.3g} N; check its slope_rad, slip and stress, and [noise]"
+        )
+
+
+def _warnings(
+    fit: Fit, noise_scale: float, slopes: int, assumed: Mapping[str, Prior]
+) -> list[Remark]:
+    """What limits the estimate."""
+    found = [
+        remark
+        for name, left in fit.remaining_fraction.items()
+        for remark in identifiability_remarks(name, left)
+    ]
+    for i, a in enumerate(fit.names):
+        for j, b in enumerate(fit.names):
+            if i < j and abs(fit.correlation[i, j]) > STRONG_CORRELATION:
+                text = (
+                    f"{a} and {b} compensate each other (correlation {fit.correlation[i, j]:+.2f})"
+                    ": rely on the pull that follows from both, not on each value"
+                )
+                found.append(Remark("trade-off", text, (a, b)))
+    if noise_scale > 1.0:
+        text = (
+            f"the residuals of the force balances are {noise_scale:.1f} times the noise; standard "
+            "deviations are scaled up by the same factor"
+        )
+        found.append(Remark("excess-residuals", text))
+    if slopes == 1:
+        text = "only one slope: whether the parameters apply on other slopes is not checked"
+        found.append(Remark("one-slope", text))
+    for name, range_ in assumed.items():
+        text = (
+            f"{name} has neither a value nor a range in [soil]: {range_.lower:g} to "
+            f"{range_.upper:g} {QUANTITIES[name].unit} is assumed"
+        )
+        found.append(Remark("assumed-prior", text, (name,)))
+    return found

@@ -1,0 +1,264 @@
+"""The tables of runs, of rim stresses and of sensor readings, and what they are together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from soilml.arrays import Floats
+from soilml.config.measurement_noise import Noise
+from soilml.errors import InputError, TableError
+from soilml.io.read_table import read_table
+from soilml.io.table import Table
+from soilml.systems.rim_stress.climb import WHEELS, Climb, WheelRun
+from soilml.systems.rim_stress.force_balance import SteadyRun
+from soilml.systems.rim_stress.sensor_readings import (
+    MeasuredStress,
+    SensingWheel,
+    SensorReadings,
+    bin_stress,
+)
+from soilml.systems.rim_stress.stress_profile import StressProfile
+
+STRESS, READINGS = ("run", "angle_rad", "normal_Pa"), ("run", "angle_rad", "sensor", "force_N")
+SPEEDS = ("speed_m_s", "rim_speed_m_s")
+SLIP_TOLERANCE = 1e-3  # Largest difference between the slips of a run in both tables
+#: Fewest points of a profile whose scatter tells its noise; 20 is the variance of the third
+#: difference of unit noise, 0.798 the mean size of a standard normal number.
+_FEWEST, _THIRD, _MEAN = 8, 20.0, 0.798
+
+Key = tuple[str, str]  # Run and wheel
+
+
+@dataclass(frozen=True)
+class ClimbData:
+    """Climbs, and all stresses measured at a known slip, on climbs or on level ground."""
+
+    climbs: tuple[Climb, ...]
+    front: tuple[WheelRun, ...]
+    rear: tuple[WheelRun, ...]
+    artificial: tuple[tuple[WheelRun, ...], tuple[WheelRun, ...]]  # of runs that are no climbs
+
+
+def noise_by_scatter(normal: Floats) -> Floats:
+    """Standard deviation (points,) by the scatter about a smooth course, a share of the stress."""
+    if len(normal) < _FEWEST or not normal.any():
+        return np.zeros(len(normal))
+    level = np.convolve(normal, np.full(4, 0.25), "valid")
+    share = np.abs(np.diff(normal, 3))[level > 0.0] / level[level > 0.0]
+    return np.asarray(float(np.mean(share)) / math.sqrt(_THIRD) / _MEAN * normal)
+
+
+def read_steady_runs(path: str) -> dict[str, SteadyRun]:
+    """Runs of one wheel, a row each; raises `TableError` naming file and row."""
+    table = read_table(path, need := ("run", "slip", "load_N"), filled=need)
+    fields = {"slip": "slip", "weight": "load_N", "slope": "slope_rad"}
+    runs = {}
+    for name, rows in table.groups():
+        if len(rows) > 1:
+            raise TableError(f"{path}: run {name} has {len(rows)} rows; needed is one")
+        values = {
+            f"{field}{std}": float(rows[f"{column}{std}"][0])
+            for field, column in fields.items()
+            for std in ("", "_std")
+            if f"{column}{std}" in rows
+        }
+        runs[name] = SteadyRun(**values)
+    return runs
+
+
+def read_stresses(
+    path: str,
+    noise: Callable[[Floats], Floats] = noise_by_scatter,
+    discs: SensingWheel | None = None,
+) -> dict[str, MeasuredStress]:
+    """The stress of each run of one wheel from its rows, in any order.
+
+    Its standard deviation is the column `normal_Pa_std`, else what `noise` gives. Of round sensors
+    (`discs`), points below twice the deadband may have samples that read nothing. Raises
+    `TableError` for a run whose rows are no profile.
+    """
+    table = read_table(path, STRESS, filled=STRESS)
+    return {name: _stress(rows, noise, f", run {name}", discs) for name, rows in table.groups()}
+
+
+def read_readings(path: str, wheel: SensingWheel) -> dict[str, MeasuredStress]:
+    """The stress of each run of one wheel from the samples of its sensors over some turns."""
+    table, found = read_table(path, READINGS, filled=READINGS), {}
+    for name, rows in table.groups():
+        try:
+            samples = SensorReadings(rows["angle_rad"], rows["sensor"], rows["force_N"])
+            found[name] = bin_stress(samples, wheel)
+        except InputError as error:
+            raise TableError(f"{path}, run {name}: {error}") from None
+    return found
+
+
+def _stress(
+    rows: Table,
+    noise: Callable[[Floats], Floats],
+    where: str,
+    discs: SensingWheel | None = None,
+) -> MeasuredStress:
+    order = np.argsort(rows["angle_rad"], kind="stable")
+    angle, normal = rows["angle_rad"][order], rows["normal_Pa"][order]
+    try:
+        StressProfile(angle, normal)
+    except InputError as error:
+        lines = f" lines {rows.line[0]} to {rows.line[-1]}" if len(rows.line) else ""
+        raise TableError(f"{rows.source}{lines}{where}: {error}") from None
+    std = np.asarray(noise(normal), dtype=np.float64)
+    if "normal_Pa_std" in rows:
+        read = rows["normal_Pa_std"][order]
+        std = np.where(np.isnan(read), std, read)
+    least = 0.0 if discs is None else 2.0 * float(discs.deadband) / discs.area
+    return MeasuredStress(angle, normal, std, normal > least)
+
+
+def read_climb_data(
+    runs: str, stress_path: str, noise: Noise, *, ignore_extra: bool = False
+) -> ClimbData:
+    """Read a table of climbs and one of stresses; raises `TableError` naming file and row.
+
+    A climb has one row for its front and one for its rear wheel, and stresses of both. Stresses of
+    other runs, such as artificial slip on level ground, need a slip of their own. `noise` is that
+    of the stress where the table has no normal_Pa_std.
+    """
+    need = ("run", "wheel", "slope_rad")
+    climbed = read_table(runs, need, filled=(*need, "slip", *SPEEDS), ignore_extra=ignore_extra)
+    own = ("wheel", *STRESS)
+    stresses = read_table(stress_path, own, filled=own, ignore_extra=ignore_extra)
+    for table, known in ((climbed, ()), (stresses, ("normal_Pa_std",))):
+        for name in table.columns:
+            if name.endswith("_std") and name not in known:
+                raise TableError(f"{table.source}: column {name} is not read; set it in [noise]")
+        odd = ~np.isin(table["wheel"], WHEELS)
+        if odd.any():
+            row = int(np.argmax(odd))
+            raise TableError(
+                f"{table.place(row)}, column wheel: {str(table['wheel'][row])!r} given; needed is "
+                "front or rear"
+            )
+    slips = _slips(climbed)
+    found: dict[Key, WheelRun] = {}
+    for name, rows in stresses.groups():
+        for wheel in dict.fromkeys(rows["wheel"].tolist()):
+            part = rows.rows(rows["wheel"] == wheel)
+            where = f", run {name}, {wheel}"
+            stress = _stress(part, noise.std, where)
+            slip = _slip(part, slips.get((name, wheel)), f"{stresses.source}{where}", runs)
+            profile = StressProfile(stress.angle, stress.normal)
+            found[name, wheel] = WheelRun(slip, profile, stress.std)
+    climbs = []
+    for name, rows in climbed.groups():
+        slope = rows["slope_rad"]
+        if np.ptp(slope) > 0.0:
+            raise TableError(
+                f"{rows.place(1)}, column slope_rad: run {name} has slopes of {slope[0]:g} and "
+                f"{slope[1]:g} rad; needed is one slope per run"
+            )
+        for wheel in WHEELS:
+            if wheel not in rows["wheel"]:
+                raise TableError(
+                    f"{rows.place(0)}: run {name} has no row for its {wheel} wheel; both wheels "
+                    "are needed"
+                )
+            if (name, wheel) not in found:
+                raise TableError(
+                    f"{stresses.source}: no stress of the {wheel} wheel in run {name}, which is a "
+                    "climb"
+                )
+        climbs.append(Climb(name, float(slope[0]), *(found[name, wheel] for wheel in WHEELS)))
+    every = [tuple(r for (_, w), r in found.items() if w == wheel) for wheel in WHEELS]
+    level = [
+        tuple(r for (n, w), r in found.items() if w == wheel and (n, w) not in slips)
+        for wheel in WHEELS
+    ]
+    return ClimbData(tuple(climbs), every[0], every[1], (level[0], level[1]))
+
+
+def _slips(climbed: Table) -> dict[Key, float]:
+    """The slip of each wheel of each climb: its column, or by the speeds of body and rim."""
+    if "slip" in climbed:
+        slip, source = climbed["slip"], "slip"
+    elif all(name in climbed for name in SPEEDS):
+        speed, rim = (climbed[name] for name in SPEEDS)
+        largest, source = np.maximum(speed, rim), "speed_m_s"
+        with np.errstate(invalid="ignore", divide="ignore"):
+            slip = np.where(largest > 0.0, (rim - speed) / largest, np.nan)
+    else:
+        raise TableError(
+            f"{climbed.source}: column slip is missing; needed is slip, or speed_m_s and "
+            "rim_speed_m_s of each wheel"
+        )
+    slips: dict[Key, float] = {}
+    for row, key in enumerate(zip(climbed["run"], climbed["wheel"], strict=True)):
+        if key in slips:
+            raise TableError(
+                f"{climbed.place(row)}: run {key[0]} has a second row for its {key[1]} wheel; "
+                "give each repetition a name of its own"
+            )
+        if not abs(slip[row]) < 1.0:
+            raise TableError(
+                f"{climbed.place(row)}, column {source}: gives slip {slip[row]:.3g}; needed is a "
+                "slip between -1 and 1"
+            )
+        slips[key] = float(slip[row])
+    return slips
+
+
+def _slip(rows: Table, climbed: float | None, where: str, runs: str) -> float:
+    """Slip of one wheel in one run, from the table of climbs or from that of stresses."""
+    read = rows["slip"] if "slip" in rows else np.full(len(rows), np.nan)
+    read = read[~np.isnan(read)]
+    if len(read) and np.ptp(read) > 0.0:
+        raise TableError(
+            f"{where}: slip ranges from {read.min():g} to {read.max():g}; needed is one value"
+        )
+    if climbed is None and len(read) == 0:
+        raise TableError(
+            f"{where}: no slip; needed is column slip here, or this run and wheel in {runs}"
+        )
+    if climbed is not None and len(read) and abs(read[0] - climbed) > SLIP_TOLERANCE:
+        raise TableError(f"{where}: slip is {read[0]:.4g} here and {climbed:.4g} in {runs}")
+    return float(read[0]) if climbed is None else climbed
+
+
+Columns = dict[str, list[Any]]
+
+
+def climb_tables(
+    climbs: Sequence[Climb],
+    front: Sequence[WheelRun] = (),
+    rear: Sequence[WheelRun] = (),
+    *,
+    rim_speed: float,
+) -> tuple[Columns, Columns]:
+    """Tables (climbs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
+
+    `front` and `rear` are stresses at artificial slip, which become separate runs.
+    """
+    climbed = [(c, w, run) for c in climbs for w, run in zip(WHEELS, c.wheels, strict=True)]
+    runs: Columns = {
+        "run": [c.name for c, _, _ in climbed],
+        "wheel": [wheel for _, wheel, _ in climbed],
+        "slope_rad": [c.slope for c, _, _ in climbed],
+        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, run in climbed],
+        "rim_speed_m_s": [rim_speed for _ in climbed],
+    }
+    stressed = [(c.name, wheel, run) for c, wheel, run in climbed]
+    for wheel, artificial in zip(WHEELS, (front, rear), strict=True):
+        stressed += [(f"flat_{wheel}_{i}", wheel, run) for i, run in enumerate(artificial, 1)]
+    samples = [
+        (name, wheel, run.slip, float(angle), float(normal))
+        for name, wheel, run in stressed
+        for angle, normal in zip(run.profile.angle, run.profile.normal, strict=True)
+    ]
+    names = ("run", "wheel", "slip", "angle_rad", "normal_Pa")
+    return runs, {
+        name: list(column) for name, column in zip(names, zip(*samples, strict=True), strict=True)
+    }

@@ -1,0 +1,95 @@
+"""The parsers of all commands: one word has one meaning and one unit; former words still work."""
+
+import argparse
+from collections import defaultdict
+
+import pytest
+
+from soilml.cli import main, old_spellings
+from soilml.cli.main import COMMANDS, GROUPS, parser
+from soilml.cli.options import leaves
+
+PARSERS = dict(leaves(parser()))
+
+
+def options(name):
+    return {o: a for a in PARSERS[name]._actions for o in a.option_strings}
+
+
+def test_a_bare_word_prints_at_most_twenty_commands_in_eighty_columns(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    assert main([]) == 0
+    said = capsys.readouterr().out
+    listed = [
+        line.split() for line in said.splitlines() if line.startswith("  ") and "--" not in line
+    ]
+    assert len(listed) <= 20 and max(map(len, said.splitlines())) <= 80
+    named = {line[0] for line in listed if line[0] not in GROUPS}
+    named |= {
+        f"{line[0]} {word.strip(',:')}" for line in listed for word in line[1:] if line[0] in GROUPS
+    }
+    assert set(COMMANDS) == set(PARSERS) and set(COMMANDS) <= named
+
+
+def test_an_option_has_one_meaning_and_one_unit_everywhere():
+    """The name of its value says both; a list of values has the name of one."""
+    kinds = defaultdict(set)
+    for name in PARSERS:
+        for option, action in options(name).items():
+            value = action.metavar or (None if action.choices is None else "choice")
+            if option in ("-o", "--out"):  # a folder, or a file whose ending says its form
+                assert value == "FOLDER" or "." in value, name
+                assert {"-o", "--out"} <= set(action.option_strings)
+                continue
+            kinds[option].add((str(value).removesuffix(",..."), action.nargs))
+    assert {option: kind for option, kind in kinds.items() if len(kind) > 1} == {}
+    assert not any(
+        kind[0].startswith("RAD") for own in kinds.values() for kind in own if kind[0] != "RAD_S"
+    )
+    near = [o for o in kinds if f"{o}s" in kinds and o != "--set"]
+    assert near == []  # no --load beside --loads
+
+
+@pytest.mark.parametrize("old", old_spellings.COMMANDS)
+def test_former_commands_lead_to_present_ones(old):
+    assert old not in PARSERS
+    words = old_spellings.present_words([old, "--help"])
+    assert " ".join(words[:-1]) in PARSERS
+
+
+@pytest.mark.parametrize("command", old_spellings.OPTIONS)
+def test_former_options_lead_to_present_ones(command):
+    for old, new in old_spellings.OPTIONS[command].items():
+        assert old not in options(command) and new in options(command)
+        before = [*command.split(), "in", old, "x", f"{old}=y"]
+        assert old_spellings.present_words(before) == [*command.split(), "in", new, "x", f"{new}=y"]
+        assert main([*command.split(), old, "x", new, "y"]) == 2
+
+
+def test_former_orders_of_arguments_lead_to_present_ones():
+    for words in (["drive.csv", "--rover", "r.toml"], ["--rover=r.toml", "drive.csv"]):
+        assert old_spellings.present_words(["slip", *words]) == [
+            "drive",
+            "slip",
+            "r.toml",
+            "drive.csv",
+        ]
+    found = old_spellings.present_words(["export-fusion", "o.c", "a.onnx", "b.onnx"])
+    assert found == ["export", "fusion", "a.onnx", "b.onnx", "o.c"]
+
+
+def test_hints_at_former_words_are_for_a_terminal(monkeypatch, capsys):
+    old_spellings.present_words(["advise", "--loads", "3"])
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    old_spellings.present_words(["advise", "--loads", "3"])
+    assert capsys.readouterr().err == (
+        "! `soilml advise` is now `soilml plan next`\n! --loads is now --load\n"
+    )
+
+
+def test_every_command_explains_itself_with_an_example():
+    for name, own in PARSERS.items():
+        assert isinstance(own, argparse.ArgumentParser) and own.description.strip()
+        own_example = any(f"soilml {name}" in own.description for _ in "x")
+        assert own_example or name == "setup check", name
