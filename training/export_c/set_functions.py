@@ -260,7 +260,7 @@ def work_fields(functions: SetFunctions, columns: int, rows: int) -> dict[str, i
         "points": (1 + v["UNKNOWNS"]) * v["POINTS"], "weights": v["POINTS"],
         "soil": v["MONOMIALS"], "unknowns": v["MONOMIALS"] * (v["TERMS"] + v["LINEAR"])
         if v["LINEAR"] else v["MONOMIALS"], "std": max(v["LINEAR"], 1),
-        "free": first, "outside": first, "log_weight": first, "least": first, "first_least": first,
+        "drawn": first, "outside": first, "log_weight": first, "least": first, "first_least": first,
         "total": first, "parts": v["SCALES"] * first, "of_scale": v["SCALES"],
         "whitening": v["SCALES"] * v["ERRORS"] ** 2,
         "mean": v["ERRORS"] * max(v["WIDTH"], 2 * v["ERRORS"] + 7),

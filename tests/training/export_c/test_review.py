@@ -17,8 +17,8 @@ LIBRARY = {
     *("sincos", "sincosf", "memcpy", "memset", "memmove"),
 }
 #: Largest stack by file that the page states, bytes, where float is 4 and double 8.
-STACK = {"wheel_linear": 1000, "slip_torque": 1000, "wheel_lssvm": 1000, "wheel": 2500}
-LINES = 150  # Largest number of lines of a function that the page states
+STACK = {"wheel_linear": 1000, "slip_torque": 1000, "wheel_lssvm": 1000, "wheel": 4500}
+LINES = 450  # Largest number of lines of a function that the page states
 SMALL = [name for name in STACK if name != "wheel"]
 gcc = pytest.mark.skipif("gcc" not in COMPILERS, reason="no gcc")
 
