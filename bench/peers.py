@@ -127,7 +127,7 @@ def methods() -> dict[str, Callable[..., Answer]]:
             lambda: KernelRidge(kernel="rbf", alpha=1.0, gamma=0.1), 4000
         ),
         "scikit-learn MLPRegressor": _sklearn(
-            lambda: MLPRegressor((64, 64), early_stopping=True, random_state=0)
+            lambda: MLPRegressor(hidden_layer_sizes=(64, 64), early_stopping=True, random_state=0)
         ),
         "torch mean and variance": _torch_network,
     }
