@@ -48,7 +48,7 @@ def answers(case, table) -> dict[str, Traction]:
     draws, seen = measured_soil(case, table).draws, MeasuredRange.of(table["slip"], table["load_N"])
     moon, slips = GravityChange(EARTH, MOON), slip_grid(None, seen)
     (one,) = predictions_by_load(case, draws, draws, [LOAD], slips, seen, gravity=moon)
-    print(f"{one.laws.text()}\n{one.laws.remark()}\n")
+    print(f"{one.laws.table().text()}\n\n{one.laws.remark().text}\n")
     earth = predict_traction(case, draws, LOAD, slips)
     at = int(np.argmin(np.abs(slips - SLIP)))
     found, lines = {}, []
