@@ -4,7 +4,7 @@ A script that takes long is run here with fewer rows, soils or seeds, in seconds
 records what that prints whenever it writes or confirms the blocks of the script, and a test prints
 it again: other numbers mean that the page may be stale, a new arrangement of the code does not.
 
-python tools/page_probes.py examples/papers/slip_models.py    print the small run of a script
+python tools/page_probes.py examples/papers/chains.py    print the small run of a script
 """
 
 from __future__ import annotations
@@ -60,26 +60,6 @@ def _lunar(script: ModuleType) -> None:
     script.draw_sweep = script.draw_posteriors = script.show_information = _nothing
 
 
-def _slip_models(script: ModuleType) -> Callable[[], object]:
-    whole, folder = script.smaller, _folder()
-
-    def smaller(name: str) -> Any:
-        spec = whole(name)
-        for reader in spec.regressors:
-            if "centres" in reader.model.get_params():
-                reader.model.set_params(centres=15)
-        return spec
-
-    def start() -> None:
-        for cells in script.slip_of(folder, script.UNKNOWN)[0]:
-            print(*cells)
-        for name, values in script.soil_of(folder, script.UNKNOWN).items():
-            print(name, values.round(3))
-
-    script.smaller, script.ROWS, script.TEST_ROWS = smaller, 450, 200
-    return start
-
-
 def _tracked_robot(script: ModuleType) -> None:
     """Two groups of pulls in place of eight."""
     script.GROUPS = 2
@@ -125,7 +105,6 @@ def _moon(script: ModuleType) -> None:
 #: What makes a script small, by its path.
 PROBES: dict[str, Shrink] = {
     "examples/papers/lunar_lssvm.py": _lunar,
-    "examples/papers/slip_models.py": _slip_models,
     "examples/papers/chains.py": _chains,
     "examples/papers/tracked_robot.py": _tracked_robot,
     "examples/import/wheel_leg.py": _import_wheel_leg,

@@ -106,7 +106,7 @@ def identify(
     >>> rows = Table({"slip": slip, "load_N": load, "torque_Nm": torque})
     >>> fit = identify(case, rows)
     >>> print(f"{fit['friction_angle']:.3f} +- {fit.std[0]:.3f} rad")
-    0.494 +- 0.040 rad
+    0.502 +- 0.071 rad
     """
     case, table = as_case(case).without_explanations(), as_table(table)
     if method not in METHODS:
