@@ -55,15 +55,8 @@ def working(text: str) -> Iterator[None]:
 def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
     """A function (stage, done, total): a bar for each stage on a terminal, otherwise lines."""
     if not sys.stderr.isatty():
-        stages: dict[str, Callable[[int], None]] = {}
-
-        def announce(text: str, done: int, total: int) -> None:
-            if text not in stages:
-                stages[text] = _lines(text, total, BETWEEN_LINES)
-                _say(f"{text} ...")
-            stages[text](done)
-
-        yield announce
+        with _stage_lines() as announce:
+            yield announce
         return
     tasks: dict[str, Any] = {}
     with _bars(counted=False, transient=False) as progress:
@@ -74,6 +67,36 @@ def stage_progress() -> Iterator[Callable[[str, int, int], None]]:
             progress.update(tasks[text], completed=done, total=total)
 
         yield update
+
+
+@contextmanager
+def _stage_lines() -> Iterator[Callable[[str, int, int], None]]:
+    """A line as each stage starts; the first one after `FIRST_LINE` seconds, as everywhere."""
+    stages: dict[str, Callable[[int], None]] = {}
+    said, lock = False, threading.Lock()
+
+    def first() -> None:
+        nonlocal said
+        with lock:
+            said = True
+            for text in list(stages)[-1:]:
+                _say(f"{text} ...")
+
+    def announce(text: str, done: int, total: int) -> None:
+        with lock:
+            if text not in stages:
+                stages[text] = _lines(text, total, BETWEEN_LINES)
+                if said:
+                    _say(f"{text} ...")
+            stages[text](done)
+
+    timer = threading.Timer(FIRST_LINE, first)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield announce
+    finally:
+        timer.cancel()
 
 
 @contextmanager

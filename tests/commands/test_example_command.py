@@ -32,7 +32,7 @@ def test_the_rover_answers_for_slopes(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["example", "rover", "."]) == 0
     assert main(["pull", "rover.toml", "runs.csv", "--slope", "0,10", "--format", "table"]) == 0
-    assert "slope_deg" in capsys.readouterr().out
+    assert "slope, deg" in capsys.readouterr().out
 
 
 def test_examples_replace_nothing_and_name_each_other(tmp_path, monkeypatch, capsys):

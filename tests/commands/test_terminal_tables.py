@@ -70,6 +70,7 @@ ELSEWHERE = {
     "paper climb",
     "paper wheel-leg",
     "paper sensor-wheel",
+    "paper track",
     "serve",
 }
 

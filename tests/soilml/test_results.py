@@ -1,5 +1,7 @@
 """What every result shares: text, frames of pandas, values with their uncertainty."""
 
+from html import escape
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from soilml import (
     simulate,
 )
 from soilml.errors import InputError
+from soilml.report.numbers import pretty
 from soilml.results import EstimatedValue, Result
 
 MODEL = """\
@@ -70,9 +73,8 @@ def test_every_result_has_a_verdict_first_and_a_table(results):
         assert len(first.split()) <= 25 and first.endswith((".", "%)."))
         assert str(result) == result.summary()
         assert repr(result) == f"<{type(result).__name__}: {first}>"
-        assert (
-            first.replace("<", "&lt;") in result._repr_html_() and "<table>" in result._repr_html_()
-        )
+        html = result._repr_html_()
+        assert escape(pretty(first)) in html and "<table>" in html
         columns = result.frame_columns()
         assert len({len(values) for values in columns.values()}) == 1
 

@@ -57,7 +57,7 @@ def test_a_right_map_gets_no_hint(log):
     ("content", "cause"),
     [
         # what the log has in SI units is taken for another unit: the wrong number arrives
-        (changed("torque", unit="kN m"), "mN m and was taken as N m"),
+        (changed("torque", unit="kN m"), "mN m and was read as N m"),
         (changed("load", unit="N", reverse=True), "reverse = true in [load]"),
         (changed("wheel_speed", unit="turns/s"), "or its unit is wrong"),
         (changed("wheel", radius=2 * RADIUS), "was the radius of 0.3 m measured as diameter?"),
@@ -156,7 +156,7 @@ def test_identify_estimate_and_gap_give_the_same_hint(tmp_path, model_file, caps
     ):
         main(command)
         assert "! " + str(runs) + ": torque is" in (said := capsys.readouterr().err), command
-        assert "the load is in kg and was taken as N" in said
+        assert "the load is in kg and was read as N" in said
 
 
 def rows_of_torque():
