@@ -19,6 +19,6 @@ def posterior(
     Drawn from the weighted samples of `soilml identify --method posterior`.
     """
     free = select_free(case, None)
-    found, _ = sample_posterior(case, usable_readings(case, table(slip, torque, load)), free)
+    found = sample_posterior(case, usable_readings(case, table(slip, torque, load)), free)
     drawn = found.u[rng.choice(len(found.u), count, p=found.weights)]
     return np.stack([f.prior.at(drawn[:, k]) for k, f in enumerate(free)], axis=1)
