@@ -43,7 +43,8 @@ def test_the_same_rows_and_seed_give_the_same_answer():
     shares: list[float] = []
     again = gap(case, table, progress=shares.append)
     assert again.as_json() == analysed("exit-angle").as_json()
-    assert shares == sorted(set(shares)) and 0.0 < shares[0] < shares[-1] < 1.0
+    # the posterior is computed once for the same rows and case, and then takes no time
+    assert shares == sorted(set(shares)) and all(0.0 < share < 1.0 for share in shares)
 
 
 def test_the_seed_is_that_of_the_draws_and_changes_no_fit(dug):
