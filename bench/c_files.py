@@ -79,7 +79,7 @@ def generated(name: str, rows: int = 32) -> Path:
     if not source.exists():
         model = str(ROOT / "exported" / f"{name}.onnx")
         with redirect_stdout(sys.stderr):
-            if main(["export-c", model, str(source), "--step-rows", str(rows)]):
+            if main(["export", "c", model, str(source), "--step-rows", str(rows)]):
                 sys.exit(f"{name}.onnx cannot be exported")
     return source
 

@@ -28,7 +28,13 @@ from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorS
 #: ones. Those of the laws are what they are in most models, because readings on one soil do not
 #: tell them from another soil. One model in five is so right before any row is seen.
 CHECKED = ErrorScale(0.2, bearing=0.15, channels=0.15, laws=0.6)
-
+#: Larger errors that a campaign may show, and their probabilities where the model is not that
+#: right. None of them has errors of zero: rows on one soil cannot show that the laws are exact.
+LARGER = (
+    ErrorScale(0.6, bearing=0.6, channels=0.3, laws=0.6),
+    ErrorScale(0.32, bearing=1.0, channels=1.5, laws=1.0),
+    ErrorScale(0.08, bearing=3.0, channels=4.0, laws=2.0),
+)
 #: Share of the prior that no campaign rules out: errors on other soils than its own.
 OPEN = 0.05
 #: Shares of the usual errors of sensors by which later drives may differ from the campaign, which
@@ -79,7 +85,7 @@ class SupportedErrors:
     Attributes
     ----------
     scales
-        Sizes of the model's errors, and their probabilities: `CHECKED` and the usual ones.
+        Sizes of the model's errors, and their probabilities: `CHECKED` and `LARGER`.
     sensors
         Standard deviations of errors of the sensors that all rows share, by input of the file.
         Those that the case declares, and of channels that were not measured, are missing.
@@ -101,7 +107,7 @@ def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErr
     The rows of the runs that were kept back, by which the model was not chosen, say how large its
     errors s may be; all rows of the campaign do so too. Those count that leave less to `CHECKED`. A
     share of the prior, `OPEN`, remains in any case. Errors that leave a significant misfit are not
-    supported; where all do, the usual ones have their usual probabilities.
+    supported; where all do, the larger ones have the probabilities that they had before any row.
 
     Board and campaign have the same sensors. An error e of a sensor, in usual standard deviations,
     has a mean m and a variance v given all rows and a size of the model's errors. The file has
@@ -124,8 +130,7 @@ def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErr
     O'Hagan, J. R. Statist. Soc. B 63(3), 2001 (errors that all readings share).
     """
     rest = 1.0 - CHECKED.probability
-    usual = [replace(s, probability=s.probability * rest) for s in USUAL_SCALES.scales]
-    scales = [CHECKED, *usual]
+    scales = [CHECKED, *(replace(s, probability=s.probability * rest) for s in LARGER)]
     prior = np.asarray([scale.probability for scale in scales])
     own = replace(case, discrepancy={}, remainder=None, soil_tests=())
     fits = [_fits(own, rows, scales) for rows in (kept_back, whole)]
@@ -140,7 +145,7 @@ def supported_errors(case: Case, kept_back: Table, whole: Table) -> SupportedErr
 
 
 def _posterior(fits: Sequence[_ScaleFit | None], prior: Floats) -> Floats:
-    """Probabilities of the scales given these fits; the prior of the usual ones without a fit."""
+    """Probabilities of the scales given these fits; the prior of the larger ones without a fit."""
     logs = np.log(prior) + [-np.inf if fit is None else fit.log_evidence for fit in fits]
     if not np.isfinite(logs).any():
         logs = np.log(prior)
