@@ -10,7 +10,6 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.config.compatibility import check_wheel_size
 from soilml.config.given_case import GivenCase, as_case
-from soilml.config.measurement_noise import checked_sensors
 from soilml.config.remainder import SAME_ROWS
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
@@ -80,7 +79,7 @@ from soilml.gap.verdict.remainder import (
     remaining_discrepancy,
 )
 from soilml.inference import constants
-from soilml.inference.posterior import Posterior, infer
+from soilml.inference.posterior import ONE_THREAD, Posterior, infer
 from soilml.inference.problem import InferenceProblem
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
@@ -92,8 +91,6 @@ from soilml.row_status import Status
 
 #: Readings that an analysis may have: its columns are as long, and there are some for each run.
 MOST_READINGS = 3600
-#: Readings up to which matrices are so small that several threads only wait for each other.
-ONE_THREAD = 1000
 #: Explanations that are scored on rows kept back, the likeliest first.
 SCORED = 4
 #: Share of outliers above which they form a pattern, so that the data cannot be analysed, and
@@ -204,13 +201,7 @@ def gap(
 
     from threadpoolctl import threadpool_limits
 
-    problem = InferenceProblem(
-        case=case,
-        soil=tuple(soil),
-        readings=readings,
-        effects=effects,
-        calibration=checked_sensors(case.bias) | dict(calibration or {}),
-    )
+    problem = InferenceProblem.of(case, readings, soil, effects, calibration)
     with threadpool_limits(1 if len(readings) <= ONE_THREAD else None):
         posterior = infer(problem, progress or (lambda _: None))
         if error := _unusable(posterior, split.analysed.place):

@@ -9,7 +9,6 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.measurement_noise import checked_sensors
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
@@ -106,18 +105,7 @@ def averaged_samples(
         std = np.where(np.isfinite(readings.std), readings.std, weighted.readings.std)
         known = readings.from_case & np.isfinite(readings.std)
         readings = replace(readings, std=std, from_case=known)
-    taken = {c.path for c in free}
-    problem = InferenceProblem(
-        case=case,
-        soil=tuple(free),
-        readings=readings,
-        effects={
-            name: effect
-            for name, effect in candidate_effects(case, effects).items()
-            if f"{name}.{effect.about.size}" not in taken
-        },
-        calibration=checked_sensors(case.bias),
-    )
+    problem = InferenceProblem.of(case, readings, free, candidate_effects(case, effects))
     try:
         found = infer(problem)
     except InputError:

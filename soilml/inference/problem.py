@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from soilml.config.case import Case
+from soilml.config.measurement_noise import checked_sensors
 from soilml.fitting.candidate_effects import with_effect
 from soilml.fitting.coordinates import (
     Coordinate,
@@ -66,6 +67,23 @@ class InferenceProblem:
     readings: Readings
     effects: Mapping[str, type[Effect]]
     calibration: Mapping[str, float]
+
+    @staticmethod
+    def of(
+        case: Case,
+        readings: Readings,
+        soil: Sequence[Coordinate],
+        effects: Mapping[str, type[Effect]],
+        calibration: Mapping[str, float] | None = None,
+    ) -> InferenceProblem:
+        """The problem of a case; effects whose size is free already are no candidates.
+
+        calibration: Beside that of the sensors in the case's [bias].
+        """
+        free = {c.path for c in soil}
+        candidates = {n: e for n, e in effects.items() if f"{n}.{e.about.size}" not in free}
+        known = checked_sensors(case.bias) | dict(calibration or {})
+        return InferenceProblem(case, tuple(soil), readings, candidates, known)
 
     def checksum(self) -> str:
         """A checksum, within this process, of all that the posterior depends on."""

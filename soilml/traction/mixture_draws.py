@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.config.case import Case
-from soilml.config.measurement_noise import Discrepancy, checked_sensors, range_with_zero
+from soilml.config.measurement_noise import Discrepancy, range_with_zero
 from soilml.errors import FitError, InputError
 from soilml.fitting.candidate_effects import candidate_effects, effect_names
 from soilml.fitting.coordinates import Coordinate, select_free, values_at
@@ -121,13 +121,7 @@ def posterior_draws_of(
         each = [(e.weight, case.of_explanation(e), {}) for e in case.explanations]
     total, groups = sum(weight for weight, _, _ in each), []
     for weight, own, effects in each:
-        problem = InferenceProblem(
-            case=own,
-            soil=tuple(_of_case(own, free)),
-            readings=readings,
-            effects=effects,
-            calibration=checked_sensors(own.bias),
-        )
+        problem = InferenceProblem.of(own, readings, _of_case(own, free), effects)
         try:
             posterior = infer(problem)
         except InputError as error:
