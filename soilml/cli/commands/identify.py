@@ -123,6 +123,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.identification.report import fit_report, group_report, soil_entries
     from soilml.systems.tracked_robot.group_identification import GroupFits, regressions
     from soilml.systems.tracked_robot.regression_presentation import (
+        regression_lines,
         regression_picture,
         regression_table,
     )
@@ -149,6 +150,7 @@ def run(args: argparse.Namespace) -> int:
     title = f"Soil of {Path(args.runs).name}, by the model {Path(args.model).name}"
     fits = {name: fit for name, (fit, _, _) in found.items()}
     runs = {name: own for name, (_, own, _) in found.items()}
+    mean: Fit | None = None
     if args.by is None:
         (content,), ((fit, _, steps),) = runs.values(), found.values()
         report = fit_report(fit, steps, title)
@@ -156,10 +158,9 @@ def run(args: argparse.Namespace) -> int:
         content = {"by": args.by, "runs": runs, "failed": failed}
         if args.mean:
             mean = GroupFits(tuple(fits.values())).average
-            fits[f"mean of {len(found)}"] = mean
             content["mean"] = mean.as_json() | soil_entries(case, mean, with_draws=False)
-        report = group_report(fits, failed, args.by, title)
-    if args.fresh is not None:
+        report = group_report(fits, failed, args.by, title, mean)
+    if args.fresh is not None and mean is not None:
         if case.gears:
             raise InputError("--fresh predicts rows of one gear: name it by --gear")
         fresh = read_table(args.fresh, ("slip", "load_N"), ignore_extra=args.ignore_extra)
@@ -167,6 +168,7 @@ def run(args: argparse.Namespace) -> int:
         content["mean"]["regression"] = {key: asdict(one.line) for key, one in lines.items()}
         report = replace(
             report,
+            lines=[*regression_lines(lines, name), *report.lines],
             tables=[*report.tables, regression_table(lines, name)],
             pictures=[*report.pictures, regression_picture(lines, name)],
         )

@@ -10,12 +10,22 @@ import numpy as np
 
 from soilml.quantities import COLUMNS
 from soilml.report.figure_style import AFTER, BEFORE, UNCHANGED
-from soilml.report.numbers import channel_name, channel_unit, pretty, with_unit
+from soilml.report.numbers import channel_name, channel_unit, pretty, rounded, with_unit
 from soilml.report.report import Picture
 from soilml.report.tables import Column, ReportTable
 from soilml.systems.tracked_robot.group_identification import ChannelRegression
 
 SIDE = 4.2  # Width and height of a panel, inches
+
+
+def regression_lines(found: Mapping[str, ChannelRegression], source: str) -> list[str]:
+    """A line for each channel: how measured values follow predicted ones."""
+    return [
+        f"{channel_name(key)}, {one.line.points} rows of {source} on predictions by the mean: "
+        f"slope {rounded(one.line.slope, one.line.slope_std)} +- "
+        f"{rounded(one.line.slope_std, one.line.slope_std)}, r2 {one.line.r2:.3f}"
+        for key, one in found.items()
+    ]
 
 
 def regression_table(found: Mapping[str, ChannelRegression], source: str) -> ReportTable:

@@ -21,9 +21,11 @@ def test_a_file_leaves_what_it_promised_in_the_mode_in_which_it_answers(mode, mo
         monkeypatch.delitem(sys.modules, name, raising=False)
     from promises import promises
 
-    rows = promises(mode(Estimator.load("wheel")), soils=24, rows=2)
+    rows = promises(mode(Estimator.load("wheel")), soils=16, rows=2)
     left, found = (
         np.sqrt(np.mean([np.square(row[key]) for row in rows], axis=0))
         for key in ("promised", "answered")
     )
-    np.testing.assert_allclose(left, found, rtol=0.12)
+    # over 120 soils the ratio is 1.02 to 1.07 by default and .96 to .99 with the exact model; that
+    # of 60 soils differs from seed to seed by up to .06, that of 16 by twice as much
+    np.testing.assert_allclose(left, found, rtol=0.2)
