@@ -187,11 +187,6 @@ def format_log_density(gain: float, std_error: float | None) -> str:
     return f"{gain:+.1f}" + ("" if std_error is None else f" +- {std_error:.1f}")
 
 
-def format_p_value(p: float) -> str:
-    """A p value, to at most two digits."""
-    return "p < 0.001" if p < 1e-3 else f"p = {p:.2f}" if p >= 0.1 else f"p = {p:.2g}"
-
-
 def format_probability(p: float) -> str:
     """A probability with two digits; near 0 and 1 as a bound."""
     if p < LEAST_STATED:

@@ -26,10 +26,6 @@ REGION_FRACTION = 0.3
 MOST_SLIP_LEVELS = 8
 #: Squared residual, in variances, of a prediction without equilibrium: ten standard deviations.
 INFEASIBLE_SQUARE = 100.0
-#: Least standard error of a gain, in nats, by which it is judged: a difference of log densities
-#: below 1 is no evidence. Kass and Raftery, Journal of the American Statistical Association 90,
-#: 1995, section 3.2, call twice such a difference below 2 "not worth more than a bare mention".
-LEAST_ERROR = 1.0
 
 
 @dataclass(frozen=True)
@@ -146,16 +142,6 @@ class PredictiveGain:
     def is_better(self) -> bool:
         """Whether the rows are predicted better than by the soil alone."""
         return self.value > 0.0
-
-    @property
-    def is_worse(self) -> bool:
-        """Whether they are predicted worse, beyond what folds differ by chance."""
-        return self.value <= -max(self.std_error or 0.0, LEAST_ERROR)
-
-    @property
-    def is_clearly_better(self) -> bool:
-        """Whether they are predicted better, beyond what folds differ by chance."""
-        return self.value >= max(self.std_error or 0.0, LEAST_ERROR)
 
 
 def predictive_gain(
