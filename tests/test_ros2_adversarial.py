@@ -29,7 +29,7 @@ MESSAGES = st.one_of(
 
 
 @pytest.mark.slow
-@settings(max_examples=20, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.lists(st.tuples(st.floats(0.0, 100.0), MESSAGES), max_size=60))
 def test_messages_of_any_content_raise_nothing_and_a_sound_drive_follows(messages):
     own = SoilLogic(SETTINGS)
@@ -44,7 +44,7 @@ def test_messages_of_any_content_raise_nothing_and_a_sound_drive_follows(message
 
 
 @pytest.mark.slow
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=15, deadline=None)
 @given(st.data())
 def test_late_topics_give_the_rows_of_prompt_ones(data):
     """Each topic keeps its order; waits are drawn for every message, below the patience."""

@@ -16,7 +16,7 @@ from packaging.version import Version
 
 from soilml import Estimator
 
-pytestmark = [pytest.mark.slow, pytest.mark.network]
+pytestmark = [pytest.mark.long, pytest.mark.network]
 
 ROOT = Path(__file__).parents[1]
 WHEEL = {
@@ -40,13 +40,7 @@ MATRIX = [
     (FROM_LOCK := ("3.10", "1.23.2", "2.2.6")),
     ("3.11", "1.32.0", None),
 ]
-#: The oldest of all in `make test`, the others in `make test-long`.
-PARAMETERS = [
-    pytest.param(
-        entry, id=f"python{entry[0]}-ort{entry[1]}", marks=[pytest.mark.long] if number else []
-    )
-    for number, entry in enumerate(MATRIX)
-]
+PARAMETERS = [pytest.param(entry, id=f"python{entry[0]}-ort{entry[1]}") for entry in MATRIX]
 #: Runs on the other Python: estimates of the files that it is given, as JSON.
 PROGRAM = """
 import json, sys

@@ -82,14 +82,19 @@ def test_each_small_run_is_of_a_script_of_a_page_and_is_recorded():
     assert set(page_probes.RECORDS.iterdir()) == records
 
 
-#: tests/papers compute each of its numbers, and compare the counts of the page.
-SUMMARY = "python -m soilml papers --summary"
+#: Commands that compute for half a minute; tests/papers compute each number of the first.
+LONG = (
+    "python -m soilml paper numbers --summary",
+    "python -m soilml pull examples/rover/rover.toml examples/rover/runs.csv --out build/rover.csv",
+    "python examples/import/wheel_leg.py",
+    "python examples/map/compare.py",
+)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
-    [pytest.param(c, marks=[pytest.mark.long] if c == SUMMARY else []) for c in commands()],
+    [pytest.param(c, marks=[pytest.mark.long] if c in LONG else []) for c in commands()],
 )
 def test_no_page_is_stale(command):
     """`python tools/pages.py PAGE` runs the whole command, and writes block and record."""

@@ -240,10 +240,10 @@ def constant_parquet():
 
 
 def large_dictionary_parquet():
-    """Names of 1 kB, two million of them, which compress to nothing."""
+    """Names of 1 kB, six hundred thousand of them, which compress to nothing."""
     import pyarrow as pa
 
-    count = 2_000_000
+    count = 600_000
     names = pa.array([f"{i:07d}" + "a" * 1017 for i in range(count)])
     rows = _constant(count, slip=0.2, load_N=60.0, torque_Nm=2.0)
     return _parquet({"run": names, **rows}, dictionary_pagesize_limit=1 << 31, use_dictionary=True)

@@ -9,7 +9,7 @@ import pytest
 from soilml import Estimator
 from soilml.identification.model_error_inputs import with_exact_model
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 BENCH = Path(__file__).parents[3] / "bench"
 

@@ -51,8 +51,8 @@ def test_the_best_design_is_the_least_one_that_meets_the_goal(study):
 @pytest.mark.slow
 def test_optimisation_finds_a_smaller_wheel_than_a_coarse_sweep(study):
     study = replace(study, goal=replace(study.goal, slope=0.05, risk=0.2))
-    coarse = design(study, designs=8, draws=80, optimise=False)
-    fine = design(study, designs=8, draws=80)
+    coarse = design(study, designs=8, draws=40, optimise=False)
+    fine = design(study, designs=8, draws=40)
     assert meets(study, coarse.designs).any()
     width = fine.best_dimensions["width"]
     assert width <= coarse.best_dimensions["width"]

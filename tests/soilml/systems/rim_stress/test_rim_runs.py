@@ -47,9 +47,9 @@ def inside(found, name="up6"):
 
 @pytest.mark.slow
 def test_intervals_cover_noise_of_stress_and_of_slip():
-    """5 % of each point of 41 of the rim, and 0.01 of the slip: 90 % intervals of 100 campaigns."""
+    """5 % of each point of 41 of the rim, and 0.01 of the slip: 90 % intervals of 40 campaigns."""
     rng, true, covered = np.random.default_rng(2), arcs(), []
-    for _ in range(100):
+    for _ in range(40):
         runs, stresses = {}, {}
         for name, at in RUNS.items():
             read = at.slip + 0.01 * rng.standard_normal()
@@ -59,7 +59,7 @@ def test_intervals_cover_noise_of_stress_and_of_slip():
             stresses[name] = MeasuredStress(angle, normal, 0.05 * normal, normal > 0.0)
         covered.append(inside(solve_runs(runs, stresses, QUIET, STRENGTH)))
     share = np.mean(covered, axis=0)
-    assert np.all((share >= 0.85) & (share <= 0.95)), share
+    assert np.all((share >= 0.8) & (share <= 0.975)), share
 
 
 @pytest.mark.parametrize("lean", [-0.4, 0.0])
@@ -85,7 +85,7 @@ def test_a_saturated_peak_is_inferred_from_the_flanks_with_a_warning():
 @pytest.mark.long
 def test_intervals_cover_noise_of_readings_of_five_turns():
     rng, covered = np.random.default_rng(7), []
-    for i in range(60):
+    for i in range(24):
         true = arcs((-0.3, 0.0, 0.3)[i % 3])
         runs = {
             name: replace(at, slip=at.slip + 0.0133 * rng.normal(), slip_std=0.0133)
