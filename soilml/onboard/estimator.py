@@ -15,15 +15,17 @@ from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, readings_of_frame, without_copies
-from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
+from soilml.onboard.gaussian_product import product_of_rows
+from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
 from soilml.onboard.model_file import Session, find_model, open_model
-from soilml.onboard.set_contract import OPTIONAL_READINGS, Floats
+from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS, Floats
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
 NoiseModels = Mapping[str, tuple[float, float]]
 
+READINGS = (*REQUIRED_READINGS, *OPTIONAL_READINGS)
 ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Outputs of the graph for single readings
 #: Rows fed to the graph at a time: bounds its working memory, which the runtime keeps.
 ROWS_PER_CALL = 4096
@@ -53,8 +55,10 @@ class Estimator:
         Provenance, validity and figures of the file.
     prior : PriorSummary
         Prior of the estimated quantities.
-    pooling : PoolingCalibration
-        Calibration of Gaussian pooling, for files without a set posterior.
+    coverage_factor : ndarray, shape (q,)
+        Half-width of the 90 % interval of a single row, in its standard deviations.
+    errors : HeldOutErrors or None
+        Errors on rows that the file was not trained on, of a file of slip.
     sets : SetPosterior or None
         Posterior of several readings by their exact joint likelihood.
     """
@@ -66,7 +70,8 @@ class Estimator:
     per_row: tuple[str, ...]
     metadata: dict[str, str] = field(repr=False)
     prior: PriorSummary
-    pooling: PoolingCalibration = field(repr=False)
+    coverage_factor: Floats = field(repr=False)
+    errors: HeldOutErrors | None = field(repr=False)
     sets: SetPosterior | None = field(repr=False)
     session: Session = field(repr=False)
 
@@ -168,8 +173,8 @@ class Estimator:
             found["covariance"].reshape(*shape, q, q),
             found["std"].reshape(*shape, q),
             found["in_range"].reshape(shape),
-            self.pooling.single_row_coverage_factor,
-            self.pooling.held_out,
+            self.coverage_factor,
+            self.errors,
         )
         load = dict(zip(self.inputs, flat, strict=True)).get("load")
         return estimate if load is None else replace(estimate, load=load.reshape(shape))
@@ -181,12 +186,12 @@ class Estimator:
     def run(self, frame: Any = None, /, **measured: Any) -> Any:
         """One estimate from all readings (rows,) of one soil.
 
-        Uses the set posterior where the file has one. Other files pool their estimates of single
-        rows as Gaussians, which is far less certain than the joint likelihood of many rows. Rows
-        that repeat another in every reading count once. Rows out of range are set aside
-        (`rows_set_aside`); where they are more than half of the rows, `in_range` is false and the
-        estimate is the prior. It is false also where no soil of the prior is consistent with all
-        rows; the estimate is then widened.
+        Uses the set posterior where the file has one; where no soil of the prior is consistent with
+        all rows, `in_range` is false and the estimate is widened. Other files multiply their
+        estimates of single rows as correlated Gaussians, which is far less certain than the joint
+        likelihood of many rows. Rows that repeat another in every reading count once. Rows out of
+        range are set aside (`rows_set_aside`); where they are more than half of the rows,
+        `in_range` is false and the estimate is the prior.
 
         Parameters
         ----------
@@ -219,7 +224,8 @@ class Estimator:
         if frame is not None:
             return self.run(**readings_of_frame(frame, self.inputs, self._optional)).to_frame()
         if self.sets is not None:
-            rows = without_copies(self._configured_sets.rows(measured))
+            rows = self._configured_sets.rows(measured)
+            rows = without_copies(rows, READINGS)
             if rows["slip"].size == 0:
                 raise InputError("no reading given; needed is one or more")
             return self._set_estimate(rows, self.start())[0]
@@ -232,7 +238,7 @@ class Estimator:
         rows = dict(zip(self.inputs, flat, strict=True))
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
-        return pool_run(self(**rows), rows, self.pooling)
+        return product_of_rows(self(**without_copies(rows, self.inputs)))
 
     @property
     def _optional(self) -> list[str]:
@@ -304,7 +310,7 @@ class Estimator:
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
-        return Estimate.from_prior(self.names, self.units, self.prior, shape, self.pooling.held_out)
+        return Estimate.from_prior(self.names, self.units, self.prior, shape, self.errors)
 
     @cached_property
     def _configured_sets(self) -> SetPosterior:

@@ -111,3 +111,13 @@ class HeldOutErrors:
 
     def __hash__(self) -> int:
         return hash(self.key)
+
+
+def together(factor: Floats, errors: HeldOutErrors | None = None) -> dict[str, Any]:
+    """The metadata entry "together": half-width (q,) of intervals of single rows, and errors.
+
+    Version 0.2 also reads what is empty.
+    """
+    empty: dict[str, Any] = {k: [] for k in ("over", "lower", "upper", "std", "kinds", "doubt")}
+    own = {} if errors is None else {"held_out": errors.entry()}
+    return empty | {"alone": factor.tolist()} | own

@@ -21,11 +21,6 @@ PER_ROW = (
     "Slip differs between rows: each reading is estimated by itself. How much the estimate depends "
     "on the prior depends on how well the soil is known; the standard deviation shows it."
 )
-POOLED = (
-    "Several readings of one soil, pooled (`run`), by the operating conditions that the run "
-    "varied, on half of the runs, with pooling calibrated on the others. Rows of nearly the same "
-    "slip and load count as one; for a run between these patterns, the calibration is interpolated."
-)
 REPEATED = (
     "Repeated readings of one soil at one slip and load (`soilml.onboard.multi_sensor`). The error "
     "of the model on this soil is common to them and does not average out. On half of the runs, "
@@ -89,10 +84,8 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         if (carried := trained.set_posterior.response.carried) < 1.0:
             lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
-    elif not trained.spec.per_row and trained.pooled_scores:
-        lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]
-    elif trained.pooling.held_out is not None:
-        lines += _repeats(trained.pooling.held_out, trained.repeat_scores, targets)
+    elif trained.errors is not None:
+        lines += _repeats(trained.errors, trained.repeat_scores, targets)
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
 
@@ -205,18 +198,3 @@ def _repeats(errors: HeldOutErrors, scores: Mapping[int, Metrics], targets: list
         values = [f"{v:.3f}" for v in metrics.relative] + [f"{v:.1%}" for v in metrics.cover90]
         lines.append(f"| {count} | {metrics.rows} | {' | '.join(values)} |")
     return [*lines, ""]
-
-
-def _pooled_table(scores: Mapping[str, Mapping[int, Metrics]], targets: list[str]) -> list[str]:
-    """Error and coverage of every target, a line for each pattern and number of rows."""
-    heads = [f"{what} {target}" for what in ("error", "90 %") for target in targets]
-    lines = [f"| run | rows | sets | {' | '.join(heads)} |"]
-    lines.append("|---|---:|---:|" + "---:|" * len(heads))
-    for pattern, by_length in scores.items():
-        for rows, metrics in by_length.items():
-            values = [f"{v:.3f}" for v in metrics.relative]
-            values += [f"{v:.1%}" for v in metrics.cover90]
-            lines.append(f"| {pattern} | {rows} | {metrics.rows} | {' | '.join(values)} |")
-        if not by_length:
-            lines.append(f"| {pattern} | | 0 |{' |' * len(heads)}")
-    return lines

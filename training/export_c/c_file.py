@@ -134,7 +134,7 @@ def write_c(
         "quantities": list(zip(fields["names"], fields["units"], strict=True)),
         "lower": fields["prior"].lower.tolist(),
         "upper": fields["prior"].upper.tolist(),
-        "factors": fields["pooling"].single_row_coverage_factor.tolist(),
+        "factors": fields["coverage_factor"].tolist(),
         "z90": Z_90,
         "vague": NOT_IDENTIFIED_ABOVE,
         "exact_columns": _exact_columns(interface),

@@ -219,7 +219,7 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
         raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.others:
         raise InputError("--with fuses single rows; omit --by")
-    known = are_comparable([e.pooling.held_out for e in estimators])
+    known = are_comparable([e.errors for e in estimators])
     if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:

@@ -60,8 +60,6 @@ CHANGES = {
     "a number as spec": {"spec": "5"},
     "an empty calibration": {"together": "{}"},
     "a calibration of other outputs": put("together", "alone", [1.0]),
-    "conditions that are not read": put("together", "over", ["a", "b"]),
-    "no kinds of runs": put("together", "kinds", []) | {"set": None},
     "an empty set": {"set": "{}"},
     "null as set": {"set": "null"},
     "negative noise": put("set", "noise", {"torque": [-1.0, 0.0]}),
