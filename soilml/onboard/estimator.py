@@ -163,9 +163,10 @@ class Estimator:
         if self.sets is not None and self.sets.sets_only:
             return self._rows_as_sets(self.sets, measured)
         flat, shape = flatten_readings(self.inputs, measured)
-        found = run_rows(self.session, dict(zip(self.inputs, flat, strict=True)))
+        rows = dict(zip(self.inputs, flat, strict=True))
+        found = run_rows(self.session, rows)
         q = len(self.names)
-        estimate = Estimate.gaussian(
+        return Estimate.gaussian(
             self.names,
             self.units,
             self.prior,
@@ -175,9 +176,8 @@ class Estimator:
             found["in_range"].reshape(shape),
             self.coverage_factor,
             self.errors,
+            rows["load"].reshape(shape) if "load" in rows else None,
         )
-        load = dict(zip(self.inputs, flat, strict=True)).get("load")
-        return estimate if load is None else replace(estimate, load=load.reshape(shape))
 
     @overload
     def run(self, frame: None = None, /, **measured: Any) -> Estimate: ...
@@ -255,16 +255,9 @@ class Estimator:
         rows = self._configured_sets.rows(measured)
         return self.sets.rows_in_range(self.session, rows)
 
-    def start(self, keep: int = 0) -> Memory:
-        """The memory of a soil before its first reading; see `step`.
-
-        keep: Rows that are kept as they were read until there are so many. Errors of model and
-            sensors are linear at the soil that is known from them all, so that up to so many rows
-            the answers are those of `run`. A step then takes as long as a call with these rows.
-
-        Raises `InputError` if `keep` is not a whole number of rows, from 0 to 256.
-        """
-        return self._configured_sets.start(self.memory_id).keeping(keep).sealed()
+    def start(self) -> Memory:
+        """The memory of a soil before its first reading; see `step`."""
+        return self._configured_sets.start(self.memory_id).sealed()
 
     @cached_property
     def memory_id(self) -> str:
@@ -276,8 +269,7 @@ class Estimator:
         """The estimate from all readings so far, after one or more new ones, and the new memory.
 
         The memory does not grow with the number of readings, and their order matters little. Errors
-        of model and sensors are linear at the soil that is known when a row arrives; `start` can
-        keep rows so that the answer is that of one call.
+        of model and sensors are linear at the soil that is known when a row arrives.
 
         Parameters
         ----------
@@ -299,14 +291,8 @@ class Estimator:
         """
         sets = self._configured_sets
         before = check_memory(memory, sets.columns, self.memory_id, self.path)
-        rows = sets.rows(measured)
-        if before.kept is None:
-            estimate, memory = self._set_estimate(rows, before)
-            return estimate, memory.packed(len(before.system)).sealed()
-        rows = before.kept.with_rows(rows)
-        estimate, memory = self._set_estimate(rows, before.kept.before)
-        kept = before.kept.after(rows, memory)
-        return estimate, replace(memory.packed(), kept=kept).sealed()
+        estimate, memory = self._set_estimate(sets.rows(measured), before)
+        return estimate, memory.packed(len(before.system)).sealed()
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
