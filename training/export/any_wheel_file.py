@@ -34,8 +34,8 @@ from training.spec import AnyWheelSpec
 SCALES = {"cohesion": "cohesion_max", "shear_modulus": "shear_modulus_max"}
 #: What a card says of a file for a microcontroller.
 SMALL = (
-    "For a microcontroller: the response has fewer monomials and a smaller network, fewer points "
-    "are sampled, and uncertain bearing values are integrated out as errors that all rows share."
+    "For a microcontroller: the response has fewer monomials and a smaller network, and fewer "
+    "points are sampled."
 )
 
 
@@ -114,7 +114,8 @@ def any_wheel_card(
         "    estimator.run(slip=..., torque=..., load=...)",
         "",
         "The exact likelihood of all readings under a learned response of the wheel is sampled in "
-        "the graph; the posterior itself is not learned. Bearing values: the pressure is "
+        "the graph; the posterior itself is not learned. Uncertain bearing values are integrated "
+        "out as errors that all rows share. Bearing values: the pressure is "
         "bearing_modulus z^n, with bearing_modulus = kc / b + kphi; bearing_std is the standard "
         "deviation of its logarithm at a sinkage of r / 20, and four times that of n. theta_m / "
         "theta_1 is 0.4 + 0.15 s. The prior is uniform: cohesion from 0 to cohesion_max, friction "

@@ -53,7 +53,7 @@ from training.onnx_graph.value import (
     where,
 )
 from training.set_posterior.draws import LARGEST_TANH, ProposalDraws, SampleSizes
-from training.set_posterior.families.wheel_family import WheelFamily
+from training.set_posterior.families.coordinates import PriorAxis
 from training.set_posterior.monomials import Terms, derivative, pair_factors
 from training.set_posterior.scale_mixture import PointMisfit, Scaled
 
@@ -89,12 +89,12 @@ class Polynomials:
     tilts: tuple[float, ...]  # lambda of the priors, in that order
 
     @staticmethod
-    def of(family: WheelFamily, terms: Terms) -> Polynomials:
+    def of(axes: Sequence[PriorAxis], terms: Terms) -> Polynomials:
         """Solved for the friction angle if it is unknown."""
-        names = [axis.name for axis in family.axes]
+        names = [axis.name for axis in axes]
         solved = names.index("friction_angle") if "friction_angle" in names else 0
         order = (*(i for i in range(len(names)) if i != solved), solved)
-        return Polynomials(terms, order, tuple(family.axes[i].tilt for i in order))
+        return Polynomials(terms, order, tuple(axes[i].tilt for i in order))
 
     @property
     def unknowns(self) -> int:
