@@ -38,6 +38,7 @@ from training.export_c.translation import (
 from training.set_posterior.draws import LARGEST_TANH
 from training.set_posterior.sampler import (
     DAMPING_STD,
+    LEAST_POWER,
     OUTSIDE_PENALTY,
     PRIOR_STEPS,
     PROPOSAL_SCALE,
@@ -239,7 +240,7 @@ def _values(
         "targets": int(value(posterior, "targets").flat[0]), "damping": DAMPING_STD**-2,
         "penalty": OUTSIDE_PENALTY, "steps": PRIOR_STEPS, "widening": PROPOSAL_SCALE,
         "most_apart": TEMPERING_RANGE, "sharing": TEMPERING_SAMPLES, "floor": VARIANCE_FLOOR,
-        "least_jacobian": 1.0 - LARGEST_TANH**2,
+        "least_jacobian": 1.0 - LARGEST_TANH**2, "least_power": LEAST_POWER,
     }  # fmt: skip
     return sizes | {"arrays": arrays, "numbers": numbers}
 
