@@ -14,7 +14,7 @@ from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.held_out_errors import HeldOutErrors
 from training.available_memory import available_memory
-from training.calibration.held_out import carry_errors
+from training.calibration.held_out import measure_held_out
 from training.calibration.recalibration import CalibratedRegressor, Metrics
 from training.calibration.training_domain import TrainingDomain
 from training.cross_fit import LeftOut, cross_fit
@@ -51,8 +51,6 @@ class TrainedModel:
     members: tuple[CalibratedRegressor, ...]  # the single regressors
     left_out: LeftOut  # estimates of all rows by fits that have not seen their runs
     errors: HeldOutErrors | None = None  # on rows left out, for targets that differ between rows
-    #: of repeated readings at one slip, by their number, for targets that differ between rows
-    repeat_scores: dict[int, Metrics] = field(default_factory=dict)
     #: posterior of several rows, where the spec asks for it
     set_posterior: SetPosteriorGraph | None = None
     #: its metrics by number of rows
@@ -117,12 +115,11 @@ def train(
     set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     found = cross_fit(spec, data, prior, labels, progress)
     left, errors = found.left_out, None
-    repeats: dict[int, Metrics] = {}
     if spec.per_row:
         mean = np.clip(left.mean, prior.lower, prior.upper)
         # with few runs, all rows are kept
         rows = replace(data, run=np.arange(len(data))) if left.few else data
-        errors, repeats = carry_errors(mean, left.std, left.factor, rows, prior.std)
+        errors = measure_held_out(mean, left.std, rows, left.factor)
     return TrainedModel(
         spec=spec,
         estimator=found.estimator,
@@ -133,7 +130,6 @@ def train(
         members=found.members,
         left_out=left,
         errors=errors,
-        repeat_scores=repeats,
         set_posterior=set_posterior,
         set_figures=set_figures,
     )

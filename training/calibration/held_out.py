@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from soilml.arrays import Floats
 from soilml.onboard.held_out_errors import HeldOutErrors
-from soilml.quantities import Z_90
-from training.calibration.recalibration import Metrics, compute_metrics
 from training.calibration.training_domain import OPERATING_CONDITIONS
 from training.dataset import Dataset
 
@@ -22,22 +20,6 @@ LEAST_GROUPS, MOST_GROUPS_OF_A_RUN = 50, 4
 #: share of that of all rows.
 STEADY = 0.2
 SAME_TARGET = 0.01  # A target counts as the same in all rows of a run up to this share of its range
-
-
-def carry_errors(
-    mean: Floats, std: Floats, factor: Floats, data: Dataset, prior_std: Floats
-) -> tuple[HeldOutErrors, dict[int, Metrics]]:
-    """The errors that a file carries, and metrics of repeated readings.
-
-    Metrics are those of half of the runs, with the errors of the others.
-
-    mean, std (n, q): Estimates of the rows of `data` by fits that have not seen them.
-    factor (q,): Half-width of the 90 % interval of one reading, in standard deviations.
-    """
-    half = data.run % 2 == 0
-    known = measure_held_out(mean[half], std[half], data.rows(half), factor)
-    scores = score_repeats(known, mean[~half], std[~half], data.rows(~half), prior_std)
-    return measure_held_out(mean, std, data, factor), scores
 
 
 def measure_held_out(
@@ -57,55 +39,25 @@ def measure_held_out(
     first = first[np.argsort(data.row[first])]
     repeats, size, factor = [1], [np.ones(mean.shape[1])], [coverage_factor]
     runs = steady_runs(data)
-    longest = row_groups([], 1)
     one = _size_and_quantile(row_groups(runs, 1), data.targets, mean, std)
     for count in REPEATS[1:]:
         groups = row_groups(runs, count)
         if len(groups) < LEAST_GROUPS:
             break
         many = _size_and_quantile(groups, data.targets, mean, std)
-        longest = groups
         repeats.append(count)
         size.append(np.minimum(many[0] / one[0], size[-1]))
         factor.append(coverage_factor * (many[1] / many[0]) / (one[1] / one[0]))
-    number = np.asarray([data.row[group].min() for group in longest], dtype=np.int64)
-    order = np.argsort(number)
-    number, longest = number[order], longest[order]
     found = {
         "rows": data.row[first].tolist(),
         "truth": data.targets[first].tolist(),
         "mean": mean[first].tolist(),
         "std": std[first].tolist(),
-        "average_rows": number.tolist(),
-        "average_truth": data.targets[longest[:, 0]].tolist(),
-        "average_mean": mean[longest].mean(axis=1).tolist(),
-        "average_std": std[longest].mean(axis=1).tolist(),
         "repeats": repeats,
         "repeat_std": size,
         "repeat_coverage_factor": factor,
     }
     return HeldOutErrors.of(HeldOutErrors.of(found).entry())  # as it is read back from the file
-
-
-def score_repeats(
-    held_out: HeldOutErrors,
-    mean: Floats,
-    std: Floats,
-    data: Dataset,
-    prior_std: Floats,
-) -> dict[int, Metrics]:
-    """Metrics of the mean of repeated readings, by their number, on rows of `data`."""
-    runs = steady_runs(data)
-    scores = {}
-    for count in REPEATS:
-        groups = row_groups(runs, count)
-        if len(groups) < LEAST_GROUPS:
-            break
-        size, factor = held_out.repeated(count)
-        claimed = std[groups].mean(axis=1) * size * factor / Z_90
-        truth = data.targets[groups[:, 0]]
-        scores[count] = compute_metrics(truth, mean[groups].mean(axis=1), claimed, prior_std)
-    return scores
 
 
 def steady_runs(data: Dataset) -> list[Rows]:

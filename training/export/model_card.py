@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from soilml.onboard.held_out_errors import HeldOutErrors
 from training.calibration.recalibration import Metrics
 from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.validation import table_of
@@ -20,11 +19,6 @@ SINGLE_READING = (
 PER_ROW = (
     "Slip differs between rows: each reading is estimated by itself. How much the estimate depends "
     "on the prior depends on how well the soil is known; the standard deviation shows it."
-)
-REPEATED = (
-    "Repeated readings of one soil at one slip and load (`soilml.onboard.multi_sensor`). The error "
-    "of the model on this soil is common to them and does not average out. On half of the runs, "
-    "calibrated on the others."
 )
 MEASURED = (
     "On {rows} rows, each estimated by a fit that has not seen its run. Error is RMSE / prior std; "
@@ -42,9 +36,10 @@ ONE_RUN = (
     "is known of others."
 )
 HELD_OUT = (
-    "The file has its errors on {rows} rows left out, and on {runs} averages of repeated readings: "
-    "fused with another file that was trained from the same data, it is weighed by the correlation "
-    "of their errors, and the interval is calibrated for the pair."
+    "The file has its errors on {rows} rows left out: fused with another file that was trained "
+    "from the same data, it is weighed by the correlation of their errors, and the interval is "
+    "calibrated for the pair. Repeated readings of one soil at one slip and load share so much of "
+    "the variance of their error, which does not average out: {shares}."
 )
 SET_POSTERIOR = (
     "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
@@ -85,7 +80,9 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
             lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
     elif trained.errors is not None:
-        lines += _repeats(trained.errors, trained.repeat_scores, targets)
+        parts = zip(targets, trained.errors.common_share(), strict=True)
+        shares = ", ".join(f"{target} {share:.0%}" for target, share in parts)
+        lines += [HELD_OUT.format(rows=len(trained.errors.rows), shares=shares), ""]
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
 
@@ -182,19 +179,3 @@ def _metrics_table(scores: Mapping[str, Metrics], targets: list[str]) -> list[st
         label = f"**{name}**" if name == "estimator" else name
         lines.append(f"| {label} | {' | '.join(values)} |")
     return lines
-
-
-def _repeats(errors: HeldOutErrors, scores: Mapping[int, Metrics], targets: list[str]) -> list[str]:
-    """What the file carries for fusion, and metrics of repeated readings."""
-    lines = [HELD_OUT.format(rows=len(errors.rows), runs=len(errors.average_rows)), ""]
-    if not scores:
-        return [*lines, "The data have no repeated readings: in fusion they count as one.", ""]
-    shares = errors.common_share()
-    common = [f"{t} {share:.2f}" for t, share in zip(targets, shares, strict=True)]
-    lines += [REPEATED, "", f"Share of the error variance in common: {', '.join(common)}.", ""]
-    heads = [f"{what} {target}" for what in ("error", "90 %") for target in targets]
-    lines += [f"| readings | sets | {' | '.join(heads)} |", "|---:|---:|" + "---:|" * len(heads)]
-    for count, metrics in scores.items():
-        values = [f"{v:.3f}" for v in metrics.relative] + [f"{v:.1%}" for v in metrics.cover90]
-        lines.append(f"| {count} | {metrics.rows} | {' | '.join(values)} |")
-    return [*lines, ""]
