@@ -149,7 +149,7 @@ def measured(case: Row) -> Row | list[Row]:
 
 def shares(files: Sequence[Estimator]) -> list[str]:
     """Correlation between the two sensors' errors, and share that each repeats on one soil."""
-    errors = tuple(f.pooling.held_out for f in files if f.pooling.held_out is not None)
+    errors = tuple(f.errors for f in files if f.errors is not None)
     joint = joint_errors(errors)
     common = ", ".join(f"{e.common_share()[0]:.2f}" for e in errors)
     return [f"{joint[0].correlation[0, 1]:.2f}", common] if joint else ["", ""]

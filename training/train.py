@@ -12,16 +12,10 @@ from datagen.recipe import parse_recipe
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.gaussian_pooling import PoolingCalibration
+from soilml.onboard.held_out_errors import HeldOutErrors
 from training.available_memory import available_memory
-from training.calibration.held_out import carry_errors
-from training.calibration.recalibration import CalibratedRegressor, Metrics, covariance_matrices
-from training.calibration.row_pooling import (
-    calibrate_pooling,
-    run_conditions,
-    score_pooling,
-    single_rows,
-)
+from training.calibration.held_out import measure_held_out
+from training.calibration.recalibration import CalibratedRegressor, Metrics
 from training.calibration.training_domain import TrainingDomain
 from training.cross_fit import LeftOut, cross_fit
 from training.dataset import Dataset
@@ -50,19 +44,13 @@ class TrainedModel:
     spec: Spec  # what it was trained from
     estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
     domain: TrainingDomain  # where estimates are in range
-    #: calibration of single rows, and of several rows of one soil that are pooled as
-    #: Gaussians; rows are not pooled where they have targets of their own, or a set posterior
-    pooling: PoolingCalibration
     prior: PriorSummary  # prior of the targets
     data: Dataset
     #: of single rows: of each member, of each fusion rule, and of the estimator
     scores: dict[str, Metrics]
-    #: of pooled rows, by pattern of operating conditions and number of rows
-    pooled_scores: dict[str, dict[int, Metrics]]
     members: tuple[CalibratedRegressor, ...]  # the single regressors
     left_out: LeftOut  # estimates of all rows by fits that have not seen their runs
-    #: of repeated readings at one slip, by their number, for targets that differ between rows
-    repeat_scores: dict[int, Metrics] = field(default_factory=dict)
+    errors: HeldOutErrors | None = None  # on rows left out, for targets that differ between rows
     #: posterior of several rows, where the spec asks for it
     set_posterior: SetPosteriorGraph | None = None
     #: its metrics by number of rows
@@ -126,31 +114,22 @@ def train(
     # first, because it refuses loads that the soils do not carry
     set_posterior, set_figures = _train_set_posterior(spec, data, progress)
     found = cross_fit(spec, data, prior, labels, progress)
-    left, conditions = found.left_out, run_conditions(data)
-    pooling = single_rows(conditions, left.factor)
-    pooled_scores: dict[str, dict[int, Metrics]] = {}
-    repeats: dict[int, Metrics] = {}
-    if not spec.per_row and spec.set_posterior is None:
-        covariance = covariance_matrices(left.std, found.estimator.correlation)
-        parts = (left.mean, covariance, data, prior, conditions, left.factor)
-        pooling, pooled_scores = calibrate_pooling(*parts), score_pooling(*parts)
+    left, errors = found.left_out, None
     if spec.per_row:
         mean = np.clip(left.mean, prior.lower, prior.upper)
         # with few runs, all rows are kept
         rows = replace(data, run=np.arange(len(data))) if left.few else data
-        pooling, repeats = carry_errors(mean, left.std, pooling, rows, prior.std)
+        errors = measure_held_out(mean, left.std, rows, left.factor)
     return TrainedModel(
         spec=spec,
         estimator=found.estimator,
         domain=TrainingDomain.of(data.features, spec.features, spec.seed, left.few),
-        pooling=pooling,
         prior=prior,
         data=data,
         scores=found.scores,
-        pooled_scores=pooled_scores,
         members=found.members,
         left_out=left,
-        repeat_scores=repeats,
+        errors=errors,
         set_posterior=set_posterior,
         set_figures=set_figures,
     )

@@ -168,6 +168,7 @@ class Estimate(Result):
         in_range: NDArray[np.bool_],
         coverage_factor: Floats,
         errors: HeldOutErrors | None = None,
+        load: Floats | None = None,
     ) -> Estimate:
         """An estimate whose 90 % interval is ``mean -+ coverage_factor * std``.
 
@@ -186,6 +187,7 @@ class Estimate(Result):
             in_range=in_range,
             prior=prior,
             errors=errors,
+            load=_NOT_GIVEN if load is None else load,
         )
 
     @staticmethod

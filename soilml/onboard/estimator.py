@@ -15,15 +15,17 @@ from soilml.errors import InputError, ModelFileError
 from soilml.onboard.estimate import Estimate, PriorSummary
 from soilml.onboard.exact_check import with_exact_check
 from soilml.onboard.features import flatten_readings, readings_of_frame, without_copies
-from soilml.onboard.gaussian_pooling import PoolingCalibration, pool_run
+from soilml.onboard.gaussian_product import product_of_rows
+from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.memory import Memory, check_memory, memory_identity
 from soilml.onboard.metadata import read_fields, read_prior, read_probe
 from soilml.onboard.model_file import Session, find_model, open_model
-from soilml.onboard.set_contract import OPTIONAL_READINGS, Floats
+from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS, Floats
 from soilml.onboard.set_posterior import SetPosterior, estimate_of_set
 
 NoiseModels = Mapping[str, tuple[float, float]]
 
+READINGS = (*REQUIRED_READINGS, *OPTIONAL_READINGS)
 ROW_OUTPUTS = ("mean", "std", "covariance", "in_range")  # Outputs of the graph for single readings
 #: Rows fed to the graph at a time: bounds its working memory, which the runtime keeps.
 ROWS_PER_CALL = 4096
@@ -53,8 +55,10 @@ class Estimator:
         Provenance, validity and figures of the file.
     prior : PriorSummary
         Prior of the estimated quantities.
-    pooling : PoolingCalibration
-        Calibration of Gaussian pooling, for files without a set posterior.
+    coverage_factor : ndarray, shape (q,)
+        Half-width of the 90 % interval of a single row, in its standard deviations.
+    errors : HeldOutErrors or None
+        Errors on rows that the file was not trained on, of a file of slip.
     sets : SetPosterior or None
         Posterior of several readings by their exact joint likelihood.
     """
@@ -66,7 +70,8 @@ class Estimator:
     per_row: tuple[str, ...]
     metadata: dict[str, str] = field(repr=False)
     prior: PriorSummary
-    pooling: PoolingCalibration = field(repr=False)
+    coverage_factor: Floats = field(repr=False)
+    errors: HeldOutErrors | None = field(repr=False)
     sets: SetPosterior | None = field(repr=False)
     session: Session = field(repr=False)
 
@@ -158,9 +163,10 @@ class Estimator:
         if self.sets is not None and self.sets.sets_only:
             return self._rows_as_sets(self.sets, measured)
         flat, shape = flatten_readings(self.inputs, measured)
-        found = run_rows(self.session, dict(zip(self.inputs, flat, strict=True)))
+        rows = dict(zip(self.inputs, flat, strict=True))
+        found = run_rows(self.session, rows)
         q = len(self.names)
-        estimate = Estimate.gaussian(
+        return Estimate.gaussian(
             self.names,
             self.units,
             self.prior,
@@ -168,11 +174,10 @@ class Estimator:
             found["covariance"].reshape(*shape, q, q),
             found["std"].reshape(*shape, q),
             found["in_range"].reshape(shape),
-            self.pooling.single_row_coverage_factor,
-            self.pooling.held_out,
+            self.coverage_factor,
+            self.errors,
+            rows["load"].reshape(shape) if "load" in rows else None,
         )
-        load = dict(zip(self.inputs, flat, strict=True)).get("load")
-        return estimate if load is None else replace(estimate, load=load.reshape(shape))
 
     @overload
     def run(self, frame: None = None, /, **measured: Any) -> Estimate: ...
@@ -181,12 +186,12 @@ class Estimator:
     def run(self, frame: Any = None, /, **measured: Any) -> Any:
         """One estimate from all readings (rows,) of one soil.
 
-        Uses the set posterior where the file has one. Other files pool their estimates of single
-        rows as Gaussians, which is far less certain than the joint likelihood of many rows. Rows
-        that repeat another in every reading count once. Rows out of range are set aside
-        (`rows_set_aside`); where they are more than half of the rows, `in_range` is false and the
-        estimate is the prior. It is false also where no soil of the prior is consistent with all
-        rows; the estimate is then widened.
+        Uses the set posterior where the file has one; where no soil of the prior is consistent with
+        all rows, `in_range` is false and the estimate is widened. Other files multiply their
+        estimates of single rows as correlated Gaussians, which is far less certain than the joint
+        likelihood of many rows. Rows that repeat another in every reading count once. Rows out of
+        range are set aside (`rows_set_aside`); where they are more than half of the rows,
+        `in_range` is false and the estimate is the prior.
 
         Parameters
         ----------
@@ -219,7 +224,8 @@ class Estimator:
         if frame is not None:
             return self.run(**readings_of_frame(frame, self.inputs, self._optional)).to_frame()
         if self.sets is not None:
-            rows = without_copies(self._configured_sets.rows(measured))
+            rows = self._configured_sets.rows(measured)
+            rows = without_copies(rows, READINGS)
             if rows["slip"].size == 0:
                 raise InputError("no reading given; needed is one or more")
             return self._set_estimate(rows, self.start())[0]
@@ -232,7 +238,7 @@ class Estimator:
         rows = dict(zip(self.inputs, flat, strict=True))
         if flat[0].size == 0:
             raise InputError("no reading given; needed is one or more")
-        return pool_run(self(**rows), rows, self.pooling)
+        return product_of_rows(self(**without_copies(rows, self.inputs)))
 
     @property
     def _optional(self) -> list[str]:
@@ -249,16 +255,9 @@ class Estimator:
         rows = self._configured_sets.rows(measured)
         return self.sets.rows_in_range(self.session, rows)
 
-    def start(self, keep: int = 0) -> Memory:
-        """The memory of a soil before its first reading; see `step`.
-
-        keep: Rows that are kept as they were read until there are so many. Errors of model and
-            sensors are linear at the soil that is known from them all, so that up to so many rows
-            the answers are those of `run`. A step then takes as long as a call with these rows.
-
-        Raises `InputError` if `keep` is not a whole number of rows, from 0 to 256.
-        """
-        return self._configured_sets.start(self.memory_id).keeping(keep).sealed()
+    def start(self) -> Memory:
+        """The memory of a soil before its first reading; see `step`."""
+        return self._configured_sets.start(self.memory_id).sealed()
 
     @cached_property
     def memory_id(self) -> str:
@@ -270,8 +269,7 @@ class Estimator:
         """The estimate from all readings so far, after one or more new ones, and the new memory.
 
         The memory does not grow with the number of readings, and their order matters little. Errors
-        of model and sensors are linear at the soil that is known when a row arrives; `start` can
-        keep rows so that the answer is that of one call.
+        of model and sensors are linear at the soil that is known when a row arrives.
 
         Parameters
         ----------
@@ -293,18 +291,12 @@ class Estimator:
         """
         sets = self._configured_sets
         before = check_memory(memory, sets.columns, self.memory_id, self.path)
-        rows = sets.rows(measured)
-        if before.kept is None:
-            estimate, memory = self._set_estimate(rows, before)
-            return estimate, memory.packed(len(before.system)).sealed()
-        rows = before.kept.with_rows(rows)
-        estimate, memory = self._set_estimate(rows, before.kept.before)
-        kept = before.kept.after(rows, memory)
-        return estimate, replace(memory.packed(), kept=kept).sealed()
+        estimate, memory = self._set_estimate(sets.rows(measured), before)
+        return estimate, memory.packed(len(before.system)).sealed()
 
     def prior_estimate(self, *shape: int) -> Estimate:
         """The prior as an estimate of shape `shape` + (q,), flagged as out of range."""
-        return Estimate.from_prior(self.names, self.units, self.prior, shape, self.pooling.held_out)
+        return Estimate.from_prior(self.names, self.units, self.prior, shape, self.errors)
 
     @cached_property
     def _configured_sets(self) -> SetPosterior:

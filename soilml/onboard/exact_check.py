@@ -20,7 +20,6 @@ from soilml.onboard.set_contract import (
     REQUIRED_READINGS,
     SENSOR_ERROR_COLUMNS,
     SET_PREFIX,
-    Floats,
 )
 from soilml.onboard.set_posterior import SetPosterior, of_reason
 
@@ -51,18 +50,16 @@ def check_exact(
 ) -> ExactCheck:
     """Compare the rows of a memory with an exact model; `estimate` is the answer from them.
 
-    One call of the graph without rows, of the system without its columns of errors: those of the
-    model are left out, those of the sensors integrated out. It is not needed where the answer took
-    the model as exact.
+    One call of the graph without rows, of the system without columns of errors of the model. It is
+    not needed where the answer took the model as exact.
     """
     readings = float(memory.counts[0])
     if sets.common_errors.get(MODEL_ERROR_INPUT, 0.0):
         exact = sets.exact
         outputs = (SET_PREFIX + "misfit", SET_PREFIX + "in_range")
-        system = without_errors(memory.system, sets.terms)
-        padded = np.zeros((len(system), sets.columns))
-        padded[:, : sets.terms] = system
-        fed = exact.feed(exact.rows(NO_ROWS), Memory(padded, memory.counts))
+        system = memory.system.copy()
+        system[:, sets.terms + len(SENSOR_ERROR_COLUMNS) :] = 0.0
+        fed = exact.feed(exact.rows(NO_ROWS), Memory(system, memory.counts))
         misfit, in_range = (one[0] for one in session.run(outputs, fed))
         reason = of_reason(bool(in_range), memory, sets.least_share_in_range)
     else:
@@ -70,23 +67,6 @@ def check_exact(
     limit = misfit_limit(sets.misfit_limits, readings)
     probability = exact_probability(float(misfit), readings, limit)
     return ExactCheck(float(misfit), probability, reason == Reason.INCONSISTENT)
-
-
-def without_errors(system: Floats, terms: int) -> Floats:
-    r"""A residual system (m, terms + errors) with the errors of sensors integrated out, (m, terms).
-
-    .. math:: A' = S^{-1} A, \qquad I + g g^T = S S^T
-
-    for one column g after another. Columns of errors of the model are left out.
-    """
-    whole = system[:, : terms + len(SENSOR_ERROR_COLUMNS)].copy()
-    for last in range(whole.shape[1] - 1, terms - 1, -1):
-        g = whole[:, last]
-        determinant = 1.0 + float(g @ g)
-        if determinant > 1.0:
-            change = g @ whole[:, :last]
-            whole[:, :last] -= np.outer(g / (determinant + math.sqrt(determinant)), change)
-    return whole[:, :terms]
 
 
 def misfit_limit(limits: Mapping[str, Sequence[float]], readings: float) -> float:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.onboard.set_contract import OPTIONAL_READINGS, REQUIRED_READINGS, Floats
+from soilml.onboard.set_contract import Floats
 from soilml.quantities import QUANTITIES, column
 
 #: Quantities that a model can read, with the open interval of possible readings.
@@ -125,20 +125,15 @@ def parts_of_rows(rows: Mapping[str, Floats], most: int) -> Iterator[Mapping[str
         yield {name: values[first : first + most] for name, values in rows.items()}
 
 
-def without_copies(rows: Mapping[str, Floats]) -> dict[str, Floats]:
+def without_copies(rows: Mapping[str, Floats], readings: Sequence[str]) -> dict[str, Floats]:
     """Rows without those that repeat another in every reading: copies carry no information."""
-    if len(rows["slip"]) < 2:
+    count = len(rows[readings[0]])
+    # nearly always one reading differs from row to row
+    if count < 2 or any(len(set(rows[name].tolist())) == count for name in readings):
         return dict(rows)
-    slip = rows["slip"]
-    if len(set(slip.tolist())) == len(slip):
-        return dict(rows)
-    table = np.stack([rows[name] for name in (*REQUIRED_READINGS, *OPTIONAL_READINGS)], axis=1)
-    first: dict[bytes, int] = {}
-    for i, row in enumerate(table):
-        first.setdefault(row.tobytes(), i)
-    if len(first) == len(table):
-        return dict(rows)
-    return {name: values[list(first.values())] for name, values in rows.items()}
+    table = np.stack([rows[name] for name in readings], axis=1)
+    first = np.sort(np.unique(table, axis=0, return_index=True)[1])
+    return {name: values[first] for name, values in rows.items()}
 
 
 def readings_of_frame(frame: Any, inputs: Sequence[str], optional: Sequence[str]) -> dict[str, Any]:

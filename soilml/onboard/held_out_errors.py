@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 from soilml.onboard.set_contract import Floats
 
-#: Keys of the metadata entry, which are the names of the arrays: those of whole numbers, of single
-#: readings, of averages of repeated readings, and by number of readings.
-WHOLE = ("rows", "average_rows", "repeats")
-SINGLE = ("truth", "mean", "std")
-AVERAGE = ("average_truth", "average_mean", "average_std")
-KEYS = (*WHOLE, *SINGLE, *AVERAGE, "repeat_std", "repeat_coverage_factor")
+#: Keys of the metadata entry, which are the names of the arrays: of whole numbers, of single
+#: readings, and by number of readings.
+WHOLE, SINGLE = ("rows", "repeats"), ("truth", "mean", "std")
+KEYS = (*WHOLE, *SINGLE, "repeat_std", "repeat_coverage_factor")
+#: Keys of both entries that earlier versions read as well; they are empty.
+FORMER = tuple(f"average_{key}" for key in ("rows", *SINGLE))
+FORMER_TOGETHER = ("over", "lower", "upper", "std", "kinds", "doubt")
 
 
 @dataclass(frozen=True)
@@ -30,10 +31,6 @@ class HeldOutErrors:
 
     rows (n,): Number of each row in the data file, rising.
     truth, mean, std (n, q): True values and the file's estimates, in SI units.
-    average_rows (g,): Number of the first row of each run of `repeats[-1]` readings of one soil at
-        one slip and load, rising; empty where the data have no such runs.
-    average_truth, average_mean, average_std (g, q): Their true values, and the averages of the
-        file's estimates and standard deviations.
     repeats (k,): Numbers of readings of one soil at one slip and load, from 1.
     repeat_std (k, q): Standard deviation of the error of their mean, over that of one: the square
         root of c + (1 - c) / m for m readings that have the share c of their error variance in
@@ -47,10 +44,6 @@ class HeldOutErrors:
     truth: Floats
     mean: Floats
     std: Floats
-    average_rows: NDArray[np.int64]
-    average_truth: Floats
-    average_mean: Floats
-    average_std: Floats
     repeats: NDArray[np.int64]
     repeat_std: Floats
     repeat_coverage_factor: Floats
@@ -67,9 +60,8 @@ class HeldOutErrors:
             for key in KEYS
         }
         q = arrays["repeat_std"].shape[1]
-        for names, rows in ((SINGLE, "rows"), (AVERAGE, "average_rows")):
-            for key in names:
-                arrays[key] = arrays[key].reshape(len(arrays[rows]), q)
+        for key in SINGLE:
+            arrays[key] = arrays[key].reshape(len(arrays["rows"]), q)
         if not (arrays["repeats"][0] == 1 and (arrays["std"] > 0.0).all()):
             raise ValueError("held-out errors")
         text = json.dumps([np.asarray(entry[key]).tolist() for key in KEYS])
@@ -77,7 +69,7 @@ class HeldOutErrors:
 
     def entry(self) -> dict[str, Any]:
         """The metadata entry, with four significant digits."""
-        found: dict[str, Any] = {}
+        found: dict[str, Any] = {key: [] for key in FORMER}
         for key in KEYS:
             values = getattr(self, key)
             rounded = [float(f"{v:.4g}") for v in values.ravel()]
@@ -111,3 +103,10 @@ class HeldOutErrors:
 
     def __hash__(self) -> int:
         return hash(self.key)
+
+
+def together(factor: Floats, errors: HeldOutErrors | None = None) -> dict[str, Any]:
+    """The metadata entry "together": half-width (q,) of intervals of single rows, and errors."""
+    found: dict[str, Any] = {key: [] for key in FORMER_TOGETHER}
+    own = {} if errors is None else {"held_out": errors.entry()}
+    return found | {"alone": factor.tolist()} | own

@@ -13,8 +13,7 @@ from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.set_contract import Floats
 from soilml.quantities import Z_90
 
-#: Fewest held-out rows that two files must have in common, and fewest averages of repeated ones.
-LEAST_COMMON_ROWS, LEAST_AVERAGES = 12, 100
+LEAST_COMMON_ROWS = 12  # Fewest held-out rows that two files must have in common
 BINS = 6  # Intervals are calibrated by the fused mean, in so many bins of equal numbers of rows
 #: With fewer common rows there are fewer bins, of so many rows or more; no gain is fitted, and the
 #: interval is widened for a scale that is known from few rows.
@@ -44,10 +43,6 @@ class JointErrors:
         to 1.
     middles, low, high (bins,): Fused means, and the 5 % and 95 % quantiles of true value minus mean
         there, in fused standard deviations.
-    repeats, repeat_std, repeat_interval: Number of repeated readings of each sensor, and the
-        factors that their averages need on the fused standard deviation and on the interval;
-        between 1 and this number the factors are interpolated in its logarithm. 1 where the data
-        have no repeated readings.
 
     References: Comin and Saaj 2017, eq. 26, is the case of independent errors. Bates and Granger,
     J. Oper. Res. Soc. 20(4), 1969. Birge, Phys. Rev. 40(2), 1932.
@@ -61,19 +56,13 @@ class JointErrors:
     middles: Floats
     low: Floats
     high: Floats
-    repeats: float = 1.0
-    repeat_std: float = 1.0
-    repeat_interval: float = 1.0
 
-    def fuse(
-        self, mean: Floats, std: Floats, ratio: Floats, count: float = 1.0
-    ) -> tuple[Floats, Floats, Floats]:
+    def fuse(self, mean: Floats, std: Floats, ratio: Floats) -> tuple[Floats, Floats, Floats]:
         """Fused mean and standard deviation, and disagreement, (n,), of estimates (m, n).
 
         mean, std (m, n): Estimates, or averages of the estimates of repeated readings.
         ratio (m,): Standard deviation of each over that of a single reading: what independent noise
             loses by repetition, the correlation of the rest gains.
-        count: Number of readings in an average; the geometric mean where it differs.
         """
         correlation = self.correlation
         if (ratio != 1.0).any():
@@ -85,21 +74,12 @@ class JointErrors:
         else:
             centre, spread = mean[self.alone], std[self.alone]
         widening = np.maximum(1.0, disagreement / DISAGREEMENT)
-        scale = self.std_scale * self._between(self.repeat_std, count)
-        return centre, scale * widening * spread, disagreement
+        return centre, self.std_scale * widening * spread, disagreement
 
-    def interval(self, mean: Floats, std: Floats, count: float = 1.0) -> tuple[Floats, Floats]:
+    def interval(self, mean: Floats, std: Floats) -> tuple[Floats, Floats]:
         """Ends (n,) of the 90 % interval of fused means and standard deviations (n,)."""
         low, high = (np.interp(mean, self.middles, end) for end in (self.low, self.high))
-        reach = self._between(self.repeat_interval, count) * std
-        return mean + low * reach, mean + high * reach
-
-    def _between(self, factor: float, count: float) -> float:
-        """The factor for a number of repeated readings, interpolated in its logarithm."""
-        if self.repeats == 1.0:
-            return 1.0
-        share = float(np.log(count) / np.log(self.repeats))
-        return 1.0 + (factor - 1.0) * min(share, 1.0)
+        return mean + low * std, mean + high * std
 
 
 @lru_cache(maxsize=64)
@@ -109,44 +89,31 @@ def joint_errors(files: tuple[HeldOutErrors, ...]) -> tuple[JointErrors, ...] | 
     Rows are common where number and true value agree; with fewer than `MANY_ROWS`, they must be
     half of a file's.
     """
-    single = _common_rows(files, "")
-    if single is None:
-        return None
-    rows, fewest = len(single[0]), min(len(file.rows) for file in files)
+    truth, mean, std = _common_rows(files)
+    rows, fewest = len(truth), min(len(file.rows) for file in files)
     if rows < MANY_ROWS and rows < max(LEAST_COMMON_ROWS, fewest / 2):
         return None  # rows of other data agree by chance
-    rules = tuple(_measure(*(part[..., k] for part in single)) for k in range(single[0].shape[1]))
-    average, repeats = _common_rows(files, "average_"), float(files[0].repeats[-1])
-    same = all(file.repeats[-1] == repeats for file in files)
-    if average is None or not same or len(average[0]) < LEAST_AVERAGES:
-        return rules
-    ratio = np.stack([file.repeat_std[-1] for file in files])
-    return tuple(
-        _with_repeats(rule, repeats, ratio[:, k], *(part[..., k] for part in average))
-        for k, rule in enumerate(rules)
-    )
+    return tuple(_measure(truth[:, k], mean[..., k], std[..., k]) for k in range(truth.shape[1]))
 
 
-def _common_rows(
-    files: tuple[HeldOutErrors, ...], kind: str
-) -> tuple[Floats, Floats, Floats] | None:
+def _common_rows(files: tuple[HeldOutErrors, ...]) -> tuple[Floats, Floats, Floats]:
     """True values (n, q), means and standard deviations (m, n, q) of the files' common rows.
 
-    None where the files have different numbers of quantities.
+    There are none where the files have different numbers of quantities.
     """
-    rows = [getattr(file, kind + "rows") for file in files]
-    common = rows[0]
-    for other in rows[1:]:
-        common = np.intersect1d(common, other)
-    at = [np.searchsorted(own, common) for own in rows]
+    common = files[0].rows
+    for other in files[1:]:
+        common = np.intersect1d(common, other.rows)
+    if len({file.truth.shape[1] for file in files}) > 1:
+        common = common[:0]
+        files = files[:1]
+    at = [np.searchsorted(file.rows, common) for file in files]
     truth, mean, std = (
-        [getattr(file, kind + key)[i] for file, i in zip(files, at, strict=True)]
+        np.stack([getattr(file, key)[i] for file, i in zip(files, at, strict=True)])
         for key in ("truth", "mean", "std")
     )
-    if any(values.shape != truth[0].shape for values in truth):
-        return None
-    same = np.logical_and.reduce([(values == truth[0]).all(axis=1) for values in truth])
-    return truth[0][same], np.stack(mean)[:, same], np.stack(std)[:, same]
+    same = (truth == truth[0]).all(axis=(0, 2))
+    return truth[0][same], mean[:, same], std[:, same]
 
 
 def are_comparable(files: Sequence[HeldOutErrors | None]) -> bool:
@@ -189,16 +156,6 @@ def _measure(truth: Floats, mean: Floats, std: Floats) -> JointErrors:
     if few:  # Student's 95 % quantile over the Gaussian one, to first order
         factor *= 1.0 + (Z_90**2 + 1.0) / (4.0 * (len(truth) - len(mean)))
     return replace(rule, low=factor * rule.low, high=factor * rule.high)
-
-
-def _with_repeats(
-    rule: JointErrors, repeats: float, ratio: Floats, truth: Floats, mean: Floats, std: Floats
-) -> JointErrors:
-    """The rule with its factors for averages (m, n) of repeated readings of true values (n,)."""
-    fused, spread, _ = rule.fuse(mean, std * ratio[:, None], ratio)
-    size = float(np.sqrt(np.mean(((truth - fused) / spread) ** 2)))
-    reach = _reach(rule, truth, fused, size * spread)
-    return replace(rule, repeats=repeats, repeat_std=size, repeat_interval=reach)
 
 
 def _reach(rule: JointErrors, truth: Floats, mean: Floats, std: Floats) -> float:
@@ -271,9 +228,8 @@ def fuse_rows(mean: Floats, std: Floats, files: Sequence[HeldOutErrors]) -> Fuse
     rules = joint_errors(distinct)
     if rules is None:
         raise ValueError("the files have too few held-out rows in common")
-    count = float(np.exp(np.mean([np.log(len(m)) for m in members])))
     columns = []
     for k, rule in enumerate(rules):
-        fused, spread, disagreement = rule.fuse(means[..., k], stds[..., k], ratio[:, k], count)
-        columns.append((fused, spread, *rule.interval(fused, spread, count), disagreement))
+        fused, spread, disagreement = rule.fuse(means[..., k], stds[..., k], ratio[:, k])
+        columns.append((fused, spread, *rule.interval(fused, spread), disagreement))
     return FusedRows(*(np.stack(column, axis=-1) for column in zip(*columns, strict=True)))

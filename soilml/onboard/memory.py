@@ -39,32 +39,6 @@ def memory_identity(metadata: Mapping[str, str], context: Mapping[str, float]) -
     return f"{metadata['graph_sha256'][:16]}-{hashlib.sha256(values).hexdigest()[:8]}"
 
 
-@dataclass(frozen=True)
-class KeptRows:
-    """The last rows as they were read, and the memory of those before them.
-
-    most: Rows that are kept before they join the others.
-    rows: Row inputs of the graph (m,) by name; none after they have joined.
-    before: Memory of the earlier rows.
-    """
-
-    most: int
-    rows: Mapping[str, Floats]
-    before: Memory
-
-    def with_rows(self, rows: Mapping[str, Floats]) -> dict[str, Floats]:
-        """These rows and further ones."""
-        if not self.rows:
-            return dict(rows)
-        return {name: np.concatenate([self.rows[name], part]) for name, part in rows.items()}
-
-    def after(self, rows: Mapping[str, Floats], memory: Memory) -> KeptRows:
-        """What is kept after a step with these rows, kept ones and new ones, and its memory."""
-        if len(rows["slip"]) < self.most:
-            return replace(self, rows=rows)
-        return replace(self, rows={}, before=replace(memory.packed(), kept=None))
-
-
 @final
 @dataclass(frozen=True)
 class Memory:
@@ -81,8 +55,6 @@ class Memory:
         Which file, wheel and prior the memory is of: `Estimator.memory_id`.
     format : str
         Version of the content.
-    kept : KeptRows or None
-        The last rows as they were read, where `Estimator.start` was asked to keep some.
     checksum : int
         Of all that, as `Estimator.start` and `Estimator.step` wrote it. A memory whose content has
         changed since is refused.
@@ -92,7 +64,6 @@ class Memory:
     counts: Singles
     file: str = ""
     format: str = MEMORY_FORMAT
-    kept: KeptRows | None = None
     checksum: int = 0
 
     def sealed(self) -> Memory:
@@ -107,24 +78,11 @@ class Memory:
     def _parts(self) -> Iterator[object]:
         yield from (self.format, self.file)
         yield from (np.asarray(self.system, np.float64), np.asarray(self.counts, np.float32))
-        if self.kept is not None:
-            yield self.kept.most
-            for name, values in self.kept.rows.items():
-                yield from (name, values)
-            yield from self.kept.before._parts()
 
     @property
     def rows(self) -> int:
         """Number of rows that were read."""
         return int(self.counts[1])
-
-    def keeping(self, rows: int) -> Memory:
-        """This memory, which keeps up to so many further rows as they are read."""
-        if isinstance(rows, bool) or not isinstance(rows, int) or not 0 <= rows <= ROWS_PER_CALL:
-            raise InputError(
-                f"keep is {rows!r}; needed is a whole number from 0 to {ROWS_PER_CALL}"
-            )
-        return replace(self, kept=KeptRows(rows, {}, self) if rows else None)
 
     def packed(self, rows_before: int | None = None) -> Memory:
         r"""An equivalent memory of fewer rows, where it has more rows than columns.
@@ -183,8 +141,6 @@ def check_memory(memory: object, columns: int, identity: str, path: str) -> Memo
             f"this memory is damaged: its system has shape {system.shape}; needed are finite "
             f"numbers of shape (rows, {columns}): {begin}"
         )
-    if memory.kept is not None:
-        check_memory(memory.kept.before.sealed(), columns, identity, path)
     if not memory.is_sealed:
         raise InputError(f"this memory is damaged: its checksum does not match: {begin}")
     return memory

@@ -16,7 +16,7 @@ import numpy as np
 
 from soilml.onboard.estimate import PriorSummary
 from soilml.onboard.features import READABLE
-from soilml.onboard.gaussian_pooling import read_pooling
+from soilml.onboard.held_out_errors import HeldOutErrors
 from soilml.onboard.set_contract import INFERRED, MODEL_ERROR_INPUT
 from soilml.onboard.set_posterior import SetPosterior
 from soilml.quantities import QUANTITIES
@@ -41,7 +41,8 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
     outputs = _read_quantities(metadata, "outputs", QUANTITIES)
     _check_provenance(metadata)
     _check_prior(outputs)
-    pooling = read_pooling(json.loads(metadata["together"]))
+    together = json.loads(metadata["together"])
+    factor = np.asarray(together["alone"], np.float64).reshape(-1)
     sets = SetPosterior.of(json.loads(metadata["set"])) if "set" in metadata else None
     if sets is not None:
         _check_set(sets)
@@ -49,10 +50,8 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
         raise ValueError("outputs: a scale that is no plain text")
     per_row = tuple(entry["name"] for entry in outputs if entry.get("per_row", False))
     alone = sets is not None and sets.sets_only  # without estimates of single rows
-    if pooling.single_row_coverage_factor.size != len(outputs) and not alone:
+    if factor.size != len(outputs) and not alone:
         raise ValueError("together: not of these outputs")
-    if not (pooling.patterns or per_row or sets is not None):
-        raise ValueError("together: no kinds of runs")
     return {
         "inputs": tuple(entry["name"] for entry in inputs),
         "names": tuple(entry["name"] for entry in outputs),
@@ -60,7 +59,8 @@ def _read_fields(metadata: Mapping[str, str]) -> dict[str, Any]:
         "per_row": per_row,
         "metadata": dict(metadata),
         "prior": read_prior(metadata, {}),
-        "pooling": pooling,
+        "coverage_factor": factor,
+        "errors": HeldOutErrors.of(together["held_out"]) if "held_out" in together else None,
         "sets": sets,
     }
 

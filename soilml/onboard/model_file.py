@@ -2,9 +2,7 @@
 
 This is the one place where onnxruntime is imported: sessions run on the CPU, without telemetry. A
 file that refers to other files, which its checksums do not cover, is refused: the runtime would
-read them from the working folder as soon as it opens the model. Whether it does is read from its
-protobuf messages, of which only those on the way to a tensor are opened (onnx.proto, IR version 3
-to 11).
+read them from the working folder as soon as it opens the model.
 """
 
 from __future__ import annotations
@@ -13,6 +11,7 @@ import errno
 import hashlib
 import json
 import os
+import re
 import stat
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,21 +28,10 @@ import onnxruntime as ort
 
 Session: TypeAlias = ort.InferenceSession  # A loaded ONNX file
 
-#: message -> field number -> message in that field
-_INSIDE: dict[str, dict[int, str]] = {
-    "model": {7: "graph", 20: "training", 25: "function"},
-    "training": {1: "graph", 2: "graph"},
-    "function": {7: "node", 11: "attribute"},
-    "graph": {1: "node", 5: "tensor", 15: "sparse"},
-    "node": {5: "attribute"},
-    "attribute": {5: "tensor", 6: "graph", 10: "tensor", 11: "graph", 22: "sparse", 23: "sparse"},
-    "sparse": {1: "tensor", 2: "tensor"},
-}
-#: Fields external_data and data_location of a tensor.
-_EXTERNAL, _LOCATION = 13, 14
-#: Fields graph and metadata_props of a model.
-_GRAPH, _METADATA = 7, 14
-_VARINT, _EIGHT_BYTES, _BYTES, _FOUR_BYTES = 0, 1, 2, 5
+#: The key by which a tensor names the file that it is in (onnx.proto, TensorProto.external_data),
+#: with the last byte of its length before it: the runtime reads no other file without it.
+_OF_ANOTHER_FILE = re.compile(rb"[\x00\x08]location")
+_METADATA = 14  # Field metadata_props of a model
 FORMAT = "3"  # Version of the file format: names of inputs and outputs, keys of the metadata
 #: Largest model file, bytes. Those that `soilml train` writes have some MB at most.
 MOST_BYTES = 256 << 20
@@ -85,7 +73,7 @@ def find_model(path: str | os.PathLike[str]) -> Path:
 
 
 def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
-    """Verify the checksums of a model file and open it: the runtime sees no damaged one.
+    """Open a model file and verify its checksums: nothing is computed with a damaged one.
 
     Returns: The session, on the CPU with one thread, and all metadata of the file.
     Raises `ModelFileError` for a file that cannot be read, was not written by `soilml train`, has
@@ -93,7 +81,7 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
     """
     file = find_model(path)
     content = _read_content(file)
-    metadata = _read_metadata(file, content)
+    session, metadata = _open(file, content)
     if metadata.get("soilml_kind") == SLIP_STEP:
         raise ModelFileError(
             f"{file} is the slip filter of a rover, for SlipStream; needed is a file that soilml "
@@ -120,14 +108,15 @@ def open_model(path: str | os.PathLike[str]) -> tuple[Session, dict[str, str]]:
             f"{file} is one step of a stream, written by soilml export step for other programs; "
             "needed is the file that it was made from"
         )
-    return _open_intact(file, content, metadata), metadata
+    _check_intact(file, content, metadata)
+    return session, metadata
 
 
 def open_slip_step(path: str | os.PathLike[str], form: str) -> tuple[Session, dict[str, str]]:
     """As `open_model`, for a slip filter in this version of its format."""
     file = Path(path)
     content = _read_content(file)
-    metadata = _read_metadata(file, content)
+    session, metadata = _open(file, content)
     if metadata.get("soilml_kind") != SLIP_STEP:
         raise ModelFileError(f"{file} is no file of soilml export slip")
     if (found := metadata.get("soilml_format", "1")) != form:
@@ -135,13 +124,8 @@ def open_slip_step(path: str | os.PathLike[str], form: str) -> tuple[Session, di
             f"{file} has format {_shown(found)} of slip filters; this version of soilml reads "
             f"format {form}: write it again with soilml export slip"
         )
-    return _open_intact(file, content, metadata), metadata
-
-
-def _open_intact(file: Path, content: bytes, metadata: Mapping[str, str]) -> Session:
-    if not _is_intact(content, metadata):
-        raise ModelFileError(f"{file} is damaged: its checksum does not match; copy it again")
-    return _create_session(file, content)
+    _check_intact(file, content, metadata)
+    return session, metadata
 
 
 def with_checksums(graph: bytes, metadata: dict[str, str]) -> bytes:
@@ -177,15 +161,12 @@ def _field(number: int, content: bytes) -> bytes:
     return bytes((number << 3 | 2, *length, size)) + content
 
 
-def _is_intact(content: bytes, metadata: Mapping[str, str]) -> bool:
-    """Whether the file is exactly the graph and the metadata that were written."""
-    tail = serialise_metadata(metadata)
-    graph = content.removesuffix(tail)
-    return (
-        len(graph) + len(tail) == len(content)
-        and hashlib.sha256(graph).hexdigest() == metadata.get("graph_sha256")
-        and metadata_checksum(metadata) == metadata.get("metadata_sha256")
-    )
+def _check_intact(file: Path, content: bytes, metadata: Mapping[str, str]) -> None:
+    """Raise `ModelFileError` unless the file is exactly the graph and metadata as written."""
+    graph = content.removesuffix(serialise_metadata(metadata))
+    known = metadata.get("graph_sha256"), metadata.get("metadata_sha256")
+    if known != (hashlib.sha256(graph).hexdigest(), metadata_checksum(metadata)):
+        raise ModelFileError(f"{file} is damaged: its checksum does not match; copy it again")
 
 
 def _shown(text: str) -> str:
@@ -213,33 +194,16 @@ def _read_content(file: Path) -> bytes:
     )
 
 
-def _read_metadata(file: Path, content: bytes) -> dict[str, str]:
-    """The metadata of an ONNX file (field 14 of its message), without the runtime."""
-    found: dict[str, str] = {}
-    has_graph = False
+def _open(file: Path, content: bytes) -> tuple[Session, dict[str, str]]:
+    """A session and the metadata of a file, which may be damaged."""
     try:
-        for number, value, first, last in _fields(content, 0, len(content)):
-            has_graph |= number == _GRAPH
-            if number == _METADATA and value is None:
-                entry = {
-                    key: content[start:stop]
-                    for key, text, start, stop in _fields(content, first, last)
-                    if text is None
-                }
-                found[entry.get(1, b"").decode()] = entry.get(2, b"").decode()
-    except ValueError as error:
-        raise ModelFileError(f"{file} is not a valid ONNX model: {error}") from None
-    if not has_graph:
-        raise ModelFileError(f"{file} is not a valid ONNX model: it has no graph")
-    return found
-
-
-def _create_session(file: Path, content: bytes) -> Session:
-    try:
-        return create_session(content)
+        session = create_session(content)
+        return session, dict(session.get_modelmeta().custom_metadata_map)
     except Exception as error:  # onnxruntime raises many kinds, none with a public base
         first = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise ModelFileError(f"{file} is not a valid ONNX model: {first[:160]}") from None
+        raise ModelFileError(
+            f"{file} is not a valid ONNX model, or is damaged: {first[:160]}"
+        ) from None
 
 
 def create_session(content: bytes) -> Session:
@@ -247,7 +211,7 @@ def create_session(content: bytes) -> Session:
 
     Raises exceptions of many kinds, which have no public base class, where the bytes are no model.
     """
-    if refers_to_files(content):
+    if _OF_ANOTHER_FILE.search(content):
         raise ValueError("it refers to weights in other files, which its checksums do not cover")
     options = ort.SessionOptions()
     options.intra_op_num_threads = 1
@@ -256,68 +220,3 @@ def create_session(content: bytes) -> Session:
     return ort.InferenceSession(
         content, options, providers=["CPUExecutionProvider"], enable_fallback=0
     )
-
-
-def refers_to_files(content: bytes) -> bool:
-    """Whether a tensor of the ONNX model is in another file; `ValueError` for what is no model."""
-    pending = [("model", 0, len(content))]
-    while pending:
-        kind, at, end = pending.pop()
-        inside = _INSIDE.get(kind)
-        for number, value, first, last in _fields(content, at, end):
-            if inside is None:  # a tensor
-                if number == _EXTERNAL or (number == _LOCATION and value != 0):
-                    return True
-            elif number in inside:
-                if value is not None:
-                    raise ValueError("a number where a message is expected")
-                pending.append((inside[number], first, last))
-    return False
-
-
-def _fields(content: bytes, at: int, end: int) -> list[tuple[int, int | None, int, int]]:
-    """The fields of the protobuf message in these bytes.
-
-    Each has its number, its value where it is a number of variable length, else None, and the
-    place where its bytes begin and end. Numbers of one byte, which nearly all are, are read here:
-    a file has some ten thousand fields.
-    """
-    found: list[tuple[int, int | None, int, int]] = []
-    while at < end:
-        key = content[at]
-        at += 1
-        if key > 127:
-            key, at = _varint(content, at - 1, end)
-        wire = key & 7
-        if wire == _BYTES:
-            size = content[at] if at < end else 128
-            at += 1
-            if size > 127:
-                size, at = _varint(content, at - 1, end)
-        elif wire == _VARINT:
-            first = at
-            value, at = _varint(content, at, end)
-            found.append((key >> 3, value, first, at))
-            continue
-        elif wire in (_EIGHT_BYTES, _FOUR_BYTES):
-            size = 8 if wire == _EIGHT_BYTES else 4
-        else:
-            raise ValueError(f"wire type {wire}")
-        if at + size > end:
-            raise ValueError("the message ends early")
-        found.append((key >> 3, None, at, at + size))
-        at += size
-    return found
-
-
-def _varint(content: bytes, at: int, end: int) -> tuple[int, int]:
-    """A number of variable length, and the place behind it."""
-    value = shift = 0
-    while True:
-        if at >= end or shift > 63:
-            raise ValueError("the message ends early")
-        byte = content[at]
-        value |= (byte & 127) << shift
-        at, shift = at + 1, shift + 7
-        if byte < 128:
-            return value, at

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from soilml.errors import InputError
 from soilml.onboard.estimate import Estimate, PriorSummary, Reason
 from soilml.onboard.fusion_rules import BEST_LINEAR, RULES
-from soilml.onboard.gaussian_pooling import pool
+from soilml.onboard.gaussian_product import gaussian_product
 from soilml.onboard.joint_errors import are_comparable, fuse_rows
 from soilml.onboard.set_contract import Floats
 from soilml.quantities import Z_90
@@ -176,9 +176,8 @@ def _fuse_by_variance(
 ) -> tuple[Floats, Floats, Floats, Floats]:
     """Mean (n, q), covariance (n, q, q) and ends of the interval, of estimates (m, n, ...)."""
     if rule == PRIOR_ONCE:
-        weights = np.ones((mean.shape[1], mean.shape[0]))
-        pooled = pool(np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1), prior, weights)
-        centre, fused = pooled.mean, pooled.covariance
+        by_row = np.moveaxis(mean, 0, 1), np.moveaxis(covariance, 0, 1)
+        centre, fused = gaussian_product(*by_row, prior)
     else:
         found = RULES[rule](mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)))
         centre, std = found.mean, found.std

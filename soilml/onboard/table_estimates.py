@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from typing import Any
 
@@ -97,20 +97,11 @@ def estimates_of_runs(
     estimator: Estimator,
     readings: Sequence[Mapping[str, Any]],
     box: Mapping[str, tuple[float, float]],
-) -> tuple[NDArray[np.int64], Estimate]:
-    """Estimates (runs,) from the readings of each run, within a narrower prior if there is one.
-
-    Before them the numbers of rows in range (runs,).
-    """
-    in_range = np.zeros(len(readings), dtype=np.int64)
-
-    def estimates() -> Iterator[Estimate]:
-        for i, one in enumerate(readings):
-            in_range[i] = estimator.rows_in_range(**one).sum()
-            found = estimator.run(**one)
-            yield found.within(**box) if box else found
-
-    return in_range, Estimate.stack(estimates(), (len(readings),))
+) -> Estimate:
+    """Estimates (runs,) from the readings of each run, within a narrower prior if there is one."""
+    found = (estimator.run(**one) for one in readings)
+    shape = (len(readings),)
+    return Estimate.stack((one.within(**box) if box else one for one in found), shape)
 
 
 def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | None = None) -> Any:
@@ -147,13 +138,12 @@ def estimate(rows: Rows, model: Estimator | str | os.PathLike[str], by: str | No
     if by is None:
         alone = estimator.sets is not None and estimator.sets.sets_only
         own = joint_readings if alone else row_readings
-        readings = own(estimator, table.rows(usable))
-        found = estimates_of_rows(estimator, readings, usable, lambda _: None)
+        given = own(estimator, table.rows(usable))
+        found = estimates_of_rows(estimator, given, usable, lambda _: None)
         return found.to_frame().set_axis(rows.index) if is_frame(rows) else found  # type: ignore[union-attr]
     groups = list(table.rows(usable).groups(by))
-    _, found = estimates_of_runs(
-        estimator, [joint_readings(estimator, own) for _, own in groups], {}
-    )
+    readings = [joint_readings(estimator, own) for _, own in groups]
+    found = estimates_of_runs(estimator, readings, {})
     if is_frame(rows):
         return found.to_frame().set_axis([name for name, _ in groups]).rename_axis(by)
     return found.at(0) if by == ALL else found

@@ -44,7 +44,7 @@ def test_intervals_of_few_rows_hold_for_other_soils(tmp_path, soils, rows):
     for seed in range(24):
         trained = trained_on(strides(tmp_path / "c.csv", soils, rows, seed))
         mean, std, inside = trained.predict(test.features)
-        near = np.abs(test.targets - mean) <= trained.pooling.single_row_coverage_factor * std
+        near = np.abs(test.targets - mean) <= trained.left_out.factor * std
         held.append(near[inside].mean())
         assert inside.mean() > 0.7
     assert 0.85 <= np.mean(held) <= 0.95
@@ -64,7 +64,7 @@ def test_files_of_few_rows_are_exported_and_fused_by_their_correlation(tmp_path)
         card = model_card(trained, metadata, name)
         assert "campaign of few rows" in card and "60, all for training" in card
         files.append(Estimator.load(tmp_path / f"{name}.onnx"))
-    assert [len(f.pooling.held_out.rows) for f in files] == [60, 60]
+    assert [len(f.errors.rows) for f in files] == [60, 60]
     readings = files[0](torque=2.1, load=25.0), files[1](vibration=4.0, load=25.0)
     fused = fuse_estimates(readings)
     assert fused.rule == "correlated" and fused.used.all()

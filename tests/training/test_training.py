@@ -40,19 +40,6 @@ def test_every_row_trains_and_is_estimated_by_a_fit_that_has_not_seen_its_run(da
     assert (other.mean[~out] != left.mean[~out]).any()
 
 
-@pytest.mark.slow
-def test_pooling_is_calibrated_by_pattern_and_number_of_rows(data):
-    trained = train(read_spec("linear"), data)
-    assert trained.pooling.conditions.names == ("slip", "load")
-    steady, one_slip, one_load, free = trained.pooling.patterns
-    np.testing.assert_allclose(free.rows, [1, 2, 3, 4, 6, 8, 12, 16, 24, 32], rtol=0.12)
-    assert (free.information[1:] <= free.information[0]).all()
-    # none in the data: pooling does not reduce the uncertainty
-    for pattern in (steady, one_slip, one_load):
-        assert pattern.rows.tolist() == [1.0]
-        assert np.exp(pattern.interpolate(32)[0]) == pytest.approx(1 / 32)
-
-
 def test_train_writes_model_card_and_picture(small_model):
     from matplotlib.image import imread
 

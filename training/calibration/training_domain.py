@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from training.calibration.row_pooling import OPERATING_CONDITIONS
 from training.onnx_graph.builder import Graph
 from training.regressors.standardisation import Standardisation
 
+#: Readings that are operating conditions: the driver sets them, the soil does not.
+OPERATING_CONDITIONS = ("slip", "load")
 MOST_KNOTS = (24, 8)  # Largest number of knots along the first and the second operating condition
 #: Rows per knot, at least, so that the extremes of a cell are close to those of the population.
 LEAST_ROWS = 60

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from soilml import __version__
-from soilml.onboard.gaussian_pooling import PoolingCalibration, RunConditions, write_pooling
+from soilml.onboard.held_out_errors import together
 from soilml.onboard.model_file import FORMAT
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES, SHEAR, Z_90, column
@@ -32,18 +32,10 @@ from training.spec import AnyWheelSpec
 
 #: The input that the prior of an output scales with.
 SCALES = {"cohesion": "cohesion_max", "shear_modulus": "shear_modulus_max"}
-NONE = np.zeros(0)
 #: What a card says of a file for a microcontroller.
 SMALL = (
-    "For a microcontroller: the response has fewer monomials and a smaller network, fewer points "
-    "are sampled, and uncertain bearing values are integrated out as errors that all rows share."
-)
-#: Pooling of a file without estimates of single rows: nothing is pooled.
-NO_POOLING = PoolingCalibration(
-    conditions=RunConditions((), NONE, NONE, NONE),
-    patterns=(),
-    single_row_coverage_factor=np.full(len(SHEAR), round(Z_90, 3)),
-    inconsistency_limits=NONE,
+    "For a microcontroller: the response has fewer monomials and a smaller network, and fewer "
+    "points are sampled."
 )
 
 
@@ -84,7 +76,7 @@ def export_any_wheel(
         ),
         "outputs": json.dumps(outputs),
         "gear": json.dumps({"type": "wheel"}),
-        "together": json.dumps(write_pooling(NO_POOLING)),
+        "together": json.dumps(together(np.full(len(SHEAR), round(Z_90, 3)))),
         "set": json.dumps(metadata_of(posterior, sets_only=True)),
         "probe": json.dumps(probe_of_sets(posterior)),
         "spec": spec.text,
@@ -122,7 +114,8 @@ def any_wheel_card(
         "    estimator.run(slip=..., torque=..., load=...)",
         "",
         "The exact likelihood of all readings under a learned response of the wheel is sampled in "
-        "the graph; the posterior itself is not learned. Bearing values: the pressure is "
+        "the graph; the posterior itself is not learned. Uncertain bearing values are integrated "
+        "out as errors that all rows share. Bearing values: the pressure is "
         "bearing_modulus z^n, with bearing_modulus = kc / b + kphi; bearing_std is the standard "
         "deviation of its logarithm at a sinkage of r / 20, and four times that of n. theta_m / "
         "theta_1 is 0.4 + 0.15 s. The prior is uniform: cohesion from 0 to cohesion_max, friction "

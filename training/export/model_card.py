@@ -6,7 +6,6 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from soilml.onboard.held_out_errors import HeldOutErrors
 from training.calibration.recalibration import Metrics
 from training.regressors.gaussian_regressor import FeatureSubset
 from training.set_posterior.validation import table_of
@@ -20,16 +19,6 @@ SINGLE_READING = (
 PER_ROW = (
     "Slip differs between rows: each reading is estimated by itself. How much the estimate depends "
     "on the prior depends on how well the soil is known; the standard deviation shows it."
-)
-POOLED = (
-    "Several readings of one soil, pooled (`run`), by the operating conditions that the run "
-    "varied, on half of the runs, with pooling calibrated on the others. Rows of nearly the same "
-    "slip and load count as one; for a run between these patterns, the calibration is interpolated."
-)
-REPEATED = (
-    "Repeated readings of one soil at one slip and load (`soilml.onboard.multi_sensor`). The error "
-    "of the model on this soil is common to them and does not average out. On half of the runs, "
-    "calibrated on the others."
 )
 MEASURED = (
     "On {rows} rows, each estimated by a fit that has not seen its run. Error is RMSE / prior std; "
@@ -47,9 +36,10 @@ ONE_RUN = (
     "is known of others."
 )
 HELD_OUT = (
-    "The file has its errors on {rows} rows left out, and on {runs} averages of repeated readings: "
-    "fused with another file that was trained from the same data, it is weighed by the correlation "
-    "of their errors, and the interval is calibrated for the pair."
+    "The file has its errors on {rows} rows left out: fused with another file that was trained "
+    "from the same data, it is weighed by the correlation of their errors, and the interval is "
+    "calibrated for the pair. Repeated readings of one soil at one slip and load share so much of "
+    "the variance of their error, which does not average out: {shares}."
 )
 SET_POSTERIOR = (
     "Several readings of one soil by the set posterior (`run`, `step`): the exact likelihood of "
@@ -89,10 +79,10 @@ def model_card(trained: TrainedModel, metadata: Mapping[str, str], name: str) ->
         if (carried := trained.set_posterior.response.carried) < 1.0:
             lines += [CARRIED.format(carried), ""]
         lines += [*trained.set_posterior.scales.for_card(), ""]
-    elif not trained.spec.per_row and trained.pooled_scores:
-        lines += [POOLED, "", *_pooled_table(trained.pooled_scores, targets), ""]
-    elif trained.pooling.held_out is not None:
-        lines += _repeats(trained.pooling.held_out, trained.repeat_scores, targets)
+    elif trained.errors is not None:
+        parts = zip(targets, trained.errors.common_share(), strict=True)
+        shares = ", ".join(f"{target} {share:.0%}" for target, share in parts)
+        lines += [HELD_OUT.format(rows=len(trained.errors.rows), shares=shares), ""]
     lines += ["## Made by", "", *_provenance(trained, metadata), ""]
     return "\n".join(lines)
 
@@ -188,35 +178,4 @@ def _metrics_table(scores: Mapping[str, Metrics], targets: list[str]) -> list[st
         values += [f"{v:.1%}" for v in metrics.cover90]
         label = f"**{name}**" if name == "estimator" else name
         lines.append(f"| {label} | {' | '.join(values)} |")
-    return lines
-
-
-def _repeats(errors: HeldOutErrors, scores: Mapping[int, Metrics], targets: list[str]) -> list[str]:
-    """What the file carries for fusion, and metrics of repeated readings."""
-    lines = [HELD_OUT.format(rows=len(errors.rows), runs=len(errors.average_rows)), ""]
-    if not scores:
-        return [*lines, "The data have no repeated readings: in fusion they count as one.", ""]
-    shares = errors.common_share()
-    common = [f"{t} {share:.2f}" for t, share in zip(targets, shares, strict=True)]
-    lines += [REPEATED, "", f"Share of the error variance in common: {', '.join(common)}.", ""]
-    heads = [f"{what} {target}" for what in ("error", "90 %") for target in targets]
-    lines += [f"| readings | sets | {' | '.join(heads)} |", "|---:|---:|" + "---:|" * len(heads)]
-    for count, metrics in scores.items():
-        values = [f"{v:.3f}" for v in metrics.relative] + [f"{v:.1%}" for v in metrics.cover90]
-        lines.append(f"| {count} | {metrics.rows} | {' | '.join(values)} |")
-    return [*lines, ""]
-
-
-def _pooled_table(scores: Mapping[str, Mapping[int, Metrics]], targets: list[str]) -> list[str]:
-    """Error and coverage of every target, a line for each pattern and number of rows."""
-    heads = [f"{what} {target}" for what in ("error", "90 %") for target in targets]
-    lines = [f"| run | rows | sets | {' | '.join(heads)} |"]
-    lines.append("|---|---:|---:|" + "---:|" * len(heads))
-    for pattern, by_length in scores.items():
-        for rows, metrics in by_length.items():
-            values = [f"{v:.3f}" for v in metrics.relative]
-            values += [f"{v:.1%}" for v in metrics.cover90]
-            lines.append(f"| {pattern} | {rows} | {metrics.rows} | {' | '.join(values)} |")
-        if not by_length:
-            lines.append(f"| {pattern} | | 0 |{' |' * len(heads)}")
     return lines

@@ -18,7 +18,7 @@ from soilml.errors import SoilmlError
 from soilml.io.atomic_files import atomic_output
 from soilml.io.toml_settings import Settings
 from soilml.onboard.features import READABLE, compute_features, inputs_of, numerator_denominator
-from soilml.onboard.gaussian_pooling import write_pooling
+from soilml.onboard.held_out_errors import together
 from soilml.onboard.model_file import FORMAT, with_checksums
 from soilml.onboard.set_contract import INTERFACE
 from soilml.quantities import QUANTITIES
@@ -151,7 +151,7 @@ def file_metadata(
         "inputs": json.dumps(inputs),
         "outputs": json.dumps(outputs),
         "gear": json.dumps(_gear_in_si(json.loads(recipe).get("gear", {})), sort_keys=True),
-        "together": json.dumps(write_pooling(trained.pooling)),
+        "together": json.dumps(together(trained.left_out.factor, trained.errors)),
         "probe": json.dumps(probe),
         **_set_metadata(trained.set_posterior),
         "spec": spec.text,
@@ -172,19 +172,6 @@ def file_metadata(
             }
         ),
         "metrics_of_posterior": json.dumps(figures_of(trained.set_figures)),
-        "metrics_of_sets": json.dumps(
-            {
-                label: {
-                    length: {
-                        "rmse_share_of_prior": score.relative.tolist(),
-                        "cover90": score.cover90.tolist(),
-                        "sets": score.rows,
-                    }
-                    for length, score in scores.items()
-                }
-                for label, scores in trained.pooled_scores.items()
-            }
-        ),
         "parity": f"{parity:.3e}",
         "opset": str(OPSET),
         "ir_version": str(IR_VERSION),

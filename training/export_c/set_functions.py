@@ -38,6 +38,7 @@ from training.export_c.translation import (
 from training.set_posterior.draws import LARGEST_TANH
 from training.set_posterior.sampler import (
     DAMPING_STD,
+    LEAST_POWER,
     OUTSIDE_PENALTY,
     PRIOR_STEPS,
     PROPOSAL_SCALE,
@@ -199,7 +200,6 @@ def _values(
     others = np.where(factors == unknowns, 0, factors)[order]
     present = value(posterior, "present")
     zs: Any = value(_arguments(model, likeliest), "powers") if likeliest is not None else []
-    prior_rows = value(first, "prior_rows") if "prior_rows" in first else np.zeros((0, len(order)))
     sizes = {
         "MONOMIALS": interface.columns - len(SENSOR_ERROR_COLUMNS) - len(MODEL_ERROR_COLUMNS),
         "TERMS": len(order),
@@ -213,16 +213,13 @@ def _values(
         "LINEAR": len(zs),
         "ERRORS": len(present),
         "SCALES": len(value(posterior, "scales")),
-        "PRIOR_ROWS": len(prior_rows),
         "TILE": SMALL_TILE if interface.small else TILE,
         "FEW_ROWS": len(order) if interface.small else FEW_ROWS,
     }
     columns = sizes["TERMS"] + sizes["ERRORS"] + sizes["LINEAR"] + sizes["SENSORS"]
     sizes["WIDTH"] = -(-columns // GRAIN) * GRAIN
     sizes["POINTS"] = sizes["FIRST"] + sizes["ROUNDS"] * sizes["ADAPTED"]
-    sizes["MOST_ROWS"] = max(
-        interface.columns + CHANNELS * rows + sizes["PRIOR_ROWS"], sizes["ERRORS"]
-    )
+    sizes["MOST_ROWS"] = max(interface.columns + CHANNELS * rows, sizes["ERRORS"])
     sizes["REST"] = min(sizes["MOST_ROWS"], max(sizes["TERMS"], sizes["FEW_ROWS"]))
     arrays = {
         "column_of": order, "power_of": powers[order],
@@ -234,8 +231,6 @@ def _values(
         "error_scales": value(posterior, "scales"), "tilts": value(first, "tilts"),
         "log_probabilities": value(posterior, "log_probabilities"),
     }  # fmt: skip
-    if len(prior_rows):
-        arrays["prior_rows"] = prior_rows[:, order]
     if likeliest is not None:
         given = _arguments(model, likeliest)
         named = {"sampled_part": "part", "linear_powers": "powers"}
@@ -245,7 +240,7 @@ def _values(
         "targets": int(value(posterior, "targets").flat[0]), "damping": DAMPING_STD**-2,
         "penalty": OUTSIDE_PENALTY, "steps": PRIOR_STEPS, "widening": PROPOSAL_SCALE,
         "most_apart": TEMPERING_RANGE, "sharing": TEMPERING_SAMPLES, "floor": VARIANCE_FLOOR,
-        "least_jacobian": 1.0 - LARGEST_TANH**2,
+        "least_jacobian": 1.0 - LARGEST_TANH**2, "least_power": LEAST_POWER,
     }  # fmt: skip
     return sizes | {"arrays": arrays, "numbers": numbers}
 

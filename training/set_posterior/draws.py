@@ -7,6 +7,7 @@ faster (Owen, Monte Carlo theory, methods and examples, chapter 15).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,8 +19,7 @@ from scipy.stats import t as student_t
 from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
 from training.onnx_graph.value import Value, constant
-from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
-from training.set_posterior.families.wheel_family import WheelFamily
+from training.set_posterior.families.coordinates import PriorAxis
 
 #: Degrees of freedom of the t distributions: tails heavier than those of a normal distribution keep
 #: the importance weights bounded where the posterior has heavier tails than its normal
@@ -72,23 +72,13 @@ def sample_sizes(unknowns: int) -> SampleSizes:
 
 
 def prior_draws(
-    graph: Graph, family: WheelFamily, order: tuple[int, ...], count: int
+    graph: Graph, axes: Sequence[PriorAxis], order: tuple[int, ...], count: int
 ) -> ProposalDraws:
-    """Draws of the prior, as inverse hyperbolic tangents, and the log of the prior over proposal.
-
-    Nearly known axes are in units of `NORMAL_TRUNCATION` of their standard deviations, and
-    truncated.
-    """
+    """Draws of the prior, as inverse hyperbolic tangents, and the log of prior over proposal."""
     u = qmc.Sobol(len(order), rng=PRIOR_SEED).random(count)
-    points, log_density = np.zeros((len(order) - 1, count)), np.zeros((1, count))
     t = student_t.ppf(u[:, -1], DEGREES_OF_FREEDOM)
-    log_density -= student_t.logpdf(t, DEGREES_OF_FREEDOM)[None]
-    for row, axis in enumerate(order[:-1]):  # of a prior that is drawn from, both cancel out
-        if axis < family.free:
-            points[row] = family.axes[axis].quantile(u[:, row])
-        else:
-            points[row] = np.clip(ndtri(u[:, row]) / NORMAL_TRUNCATION, -1.0, 1.0)
-            log_density += 0.5 * (NORMAL_TRUNCATION * points[row]) ** 2
+    log_density = -student_t.logpdf(t, DEGREES_OF_FREEDOM)[None]  # the prior cancels out
+    points = np.stack([axes[axis].quantile(u[:, row]) for row, axis in enumerate(order[:-1])])
     unbounded = np.arctanh(np.clip(points, -LARGEST_TANH, LARGEST_TANH))
     return _constants(graph, "prior", unbounded, t, log_density)
 

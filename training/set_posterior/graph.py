@@ -32,7 +32,7 @@ from training.set_posterior.draws import (
 )
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScales
 from training.set_posterior.families.wheel_family import WheelFamily
-from training.set_posterior.likelihood import Likelihood, Linear, Standardised
+from training.set_posterior.likelihood import Likelihood, Linear
 from training.set_posterior.misfit_test import MisfitLimits, add_consistency
 from training.set_posterior.posterior_summary import add_posterior_outputs
 from training.set_posterior.residual_system import add_residual_rows
@@ -140,22 +140,18 @@ class SetPosteriorGraph:
         rows.in_range.node("Identity").named(prefix + ROW_IN_RANGE)
 
         family, terms, std = self.family, self.response.terms, context.axis_std
-        nearly: Linear | Standardised | None = None
-        if std is not None and self.small:
-            nearly = Linear.of(terms, family.free, std)
-            terms, family = nearly.sampled, family.with_axes(family.free)
-        elif std is not None:
-            nearly = Standardised.of(terms, family.free, std)
-        usual = self.family.model_errors()
-        polynomials = Polynomials.of(family, terms)
+        nearly = None if std is None else Linear.of(terms, family.free, std)
+        axes = family.axes[: family.free]
+        usual = family.model_errors()
+        polynomials = Polynomials.of(axes, terms if nearly is None else nearly.sampled)
         likelihood = Likelihood(
             polynomials, rows, state, inputs[MODEL_ERROR_INPUT], self.scales,
             tuple(usual[name] > 0.0 for name in MODEL_ERROR_COLUMNS), nearly,
         )  # fmt: skip
         consistency = add_consistency(counts, self.limits)
-        sizes = SIZES_SMALL if self.small else sample_sizes(len(family.axes))
+        sizes = SIZES_SMALL if self.small else sample_sizes(len(axes))
         *sample, grown = likelihood.sampled(
-            sizes, prior_draws(graph, family, polynomials.order, sizes.prior),
+            sizes, prior_draws(graph, axes, polynomials.order, sizes.prior),
             adapted_draws(graph, polynomials.unknowns, sizes.adapted), consistency.limit,
             family.targets,
         )  # fmt: skip

@@ -4,10 +4,7 @@ A row of the system is (w a, w g, w e): a reading's monomials, and its changes w
 sensors and of the model that all readings share. Errors of the sensors are integrated out, those of
 the model for each of their scales.
 
-Nearly known unknowns z have a normal prior. They are sampled in standardised coordinates
-:math:`z = x / (c \sigma)`, c the truncation in standard deviations: the coefficient of a monomial
-is multiplied by :math:`(c \sigma)^k` for its power k of z, and the prior is the residual
-:math:`c z`. In a file of few points they are instead errors, in which residuals are linear:
+Nearly known unknowns z have a normal prior. They are errors, in which residuals are linear:
 
 .. math:: r(x, z) \approx A \, b(x, \bar z)
     + \sum_a (z_a - \bar z_a) \, A \frac{\partial b}{\partial z_a}(\bar x, \bar z),
@@ -27,45 +24,18 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.onboard.set_contract import MODEL_ERROR_COLUMNS, SENSOR_ERROR_COLUMNS
-from training.onnx_graph.value import Value, composite, concat, constant, exp, gemm, log
+from training.onnx_graph.value import Value, composite, concat, constant, gemm
 from training.set_posterior.draws import ProposalDraws, SampleSizes
 from training.set_posterior.error_scales import ErrorScales
-from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.monomials import ONE, Terms, derivative
 from training.set_posterior.residual_system import ResidualRows
 from training.set_posterior.sampler import Polynomials, adapted_rounds, first_round
-from training.set_posterior.scale_mixture import (
-    Scaled,
-    integrate_out,
-    judged_first,
-    scale_mixture,
-)
+from training.set_posterior.scale_mixture import integrate_out, judged_first, scale_mixture
 
 #: Columns of errors in the residual system: of the sensors, and of the model.
 OF_SENSORS, OF_MODEL = len(SENSOR_ERROR_COLUMNS), len(MODEL_ERROR_COLUMNS)
 #: Sweeps over the linear unknowns, one solved after another, to their likeliest values at a soil.
 SWEEPS = 2
-
-
-@dataclass(frozen=True)
-class Standardised:
-    """Nearly known unknowns that are sampled in standardised coordinates."""
-
-    factors: Value  # (1, terms)
-    prior: Floats  # (nearly known unknowns, terms) residuals
-
-    @staticmethod
-    def of(terms: Terms, free: int, std: Value) -> Standardised:
-        """Of unknowns after the first `free`, with standard deviations (unknowns, 1)."""
-        unknowns = range(1, max(map(max, terms)) + 1)
-        powers = np.asarray([[t.count(k) if k > free else 0 for t in terms] for k in unknowns])
-        padding = (ONE,) * (len(terms[0]) - 1)
-        linear = [terms.index((*padding, axis)) for axis in unknowns if axis > free]
-        log_std = log(std * NORMAL_TRUNCATION)
-        return Standardised(
-            exp(gemm(log_std, powers, transpose_a=True)),
-            NORMAL_TRUNCATION * np.eye(len(terms))[linear],
-        )
 
 
 @dataclass(frozen=True)
@@ -185,7 +155,7 @@ class Likelihood:
     scales, present
         Their sizes where that is inferred, and which of `MODEL_ERROR_COLUMNS` the model can have.
     nearly_known
-        How nearly known unknowns are treated; None where there are none.
+        Unknowns in which residuals are linear; None where there are none.
     """
 
     polynomials: Polynomials
@@ -194,7 +164,7 @@ class Likelihood:
     size: Value
     scales: ErrorScales
     present: tuple[bool, ...]
-    nearly_known: Standardised | Linear | None
+    nearly_known: Linear | None
 
     def sampled(
         self, sizes: SampleSizes, prior: ProposalDraws, adapted: ProposalDraws, limit: Value,
@@ -204,17 +174,14 @@ class Likelihood:
         system = {
             "state": self.state, "columns": self.rows.columns_at(None), "used": self.rows.used,
         }  # fmt: skip
-        nearly = self.nearly_known
-        linear = nearly if isinstance(nearly, Linear) else None
-        given = {} if nearly is None else {"unknowns": _of_unknowns(nearly)}
+        linear = self.nearly_known
+        given = {} if linear is None else {"unknowns": linear.in_the_middle()}
         graph, polynomials = self.size.graph, self.polynomials
         # what follows is for C, which has these methods as templates
         of_c = {
             "terms": self.size.indices(polynomials.rows),
             "tilts": constant(graph, polynomials.tilts, name="tilts"),
         }
-        if isinstance(nearly, Standardised):
-            of_c["prior_rows"] = constant(graph, nearly.prior, name="prior_rows")
         of_columns, probabilities = judged_first(self.scales)
         present = np.flatnonzero(self.present)
         of_scales = {
@@ -246,11 +213,8 @@ class Likelihood:
         ) -> list[Value]:  # fmt: skip
             whole, sensors = _joined(state, columns, used, [OF_SENSORS])
             whole, taken = self._in_unknowns(whole, sensors, unknowns)
-            system = self._with_prior(integrate_out(concat([whole, taken], axis=1), self._taken))
-            soil, *rest = first_round(self.polynomials, system, draws, t, log_prior)
-            if isinstance(self.nearly_known, Standardised) and unknowns is not None:
-                soil = soil * unknowns.node("Transpose")
-            return [soil, *rest]
+            system = integrate_out(concat([whole, taken], axis=1), self._taken)
+            return first_round(self.polynomials, system, draws, t, log_prior)
 
         return body
 
@@ -270,8 +234,6 @@ class Likelihood:
             system = integrate_out(concat([whole, model, taken], axis=1), self._taken)
             system, model = system.last_columns(len(present))
             mixture = scale_mixture(system, model, size, self.scales, self.present)
-            systems = self._with_prior(mixture.systems, len(self.scales.scales))
-            mixture = Scaled(systems, mixture.log_weight)
             first = (prior, solved, free, outside)
             draws = ProposalDraws(normal, t, log_density)
             found = adapted_rounds(self.polynomials, mixture, limit, targets, sizes, first, draws)
@@ -282,30 +244,14 @@ class Likelihood:
     @property
     def _taken(self) -> int:
         """Number of columns that are integrated out as errors of sensors are."""
-        linear = self.nearly_known
-        return OF_SENSORS + (len(linear.axes) if isinstance(linear, Linear) else 0)
+        return OF_SENSORS + (len(self.nearly_known.axes) if self.nearly_known else 0)
 
     def _in_unknowns(
         self, whole: Value, sensors: Value, unknowns: Value | None
     ) -> tuple[Value, Value]:
         """Columns of the sampled monomials, and those that are integrated out."""
-        if isinstance(self.nearly_known, Standardised) and unknowns is not None:
-            return whole * unknowns, sensors
-        if isinstance(self.nearly_known, Linear) and unknowns is not None:
+        if self.nearly_known is not None and unknowns is not None:
             both = whole @ unknowns
             whole, of_z = both.last_columns(len(self.nearly_known.axes))
             sensors = concat([of_z, sensors], axis=1)
         return whole, sensors
-
-    def _with_prior(self, systems: Value, copies: int = 0) -> Value:
-        """A system (m, terms), or copies of it, with the prior of standardised unknowns below."""
-        if not isinstance(self.nearly_known, Standardised):
-            return systems
-        prior = self.nearly_known.prior
-        if copies:
-            prior = np.broadcast_to(prior, (copies, *prior.shape))
-        return concat([systems, constant(systems.graph, prior)], axis=1 if copies else 0)
-
-
-def _of_unknowns(nearly: Standardised | Linear) -> Value:
-    return nearly.factors if isinstance(nearly, Standardised) else nearly.in_the_middle()

@@ -199,7 +199,7 @@ def _parameters(family: WheelFamily, order: tuple[int, ...], points: Value) -> V
 
     as two products with points (1, x), see `PriorAxis`.
     """
-    linear, exponent = np.zeros((2, family.targets, 1 + len(family.axes)))
+    linear, exponent = np.zeros((2, family.targets, 1 + len(order)))
     for k, axis in enumerate(family.axes[: family.targets]):
         column = 1 + order.index(k)
         linear[k, [0, column]] = axis.shift, axis.slope

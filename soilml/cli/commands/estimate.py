@@ -219,7 +219,7 @@ def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> Non
         raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.others:
         raise InputError("--with fuses single rows; omit --by")
-    known = are_comparable([e.pooling.held_out for e in estimators])
+    known = are_comparable([e.errors for e in estimators])
     if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
@@ -298,27 +298,13 @@ def _all_rows(
         return table_estimates.estimates_of_rows(estimator, readings, usable, done)
 
 
-def _estimates_of_runs(
-    estimator: Estimator,
-    readings: list[dict[str, Any]],
-    by: str,
-    box: dict[str, tuple[float, float]],
-) -> tuple[NDArray[np.int64], Estimate]:
-    """Rows in range (groups,), and the estimates of groups of readings, within a narrower prior."""
-    from soilml.cli.progress import row_progress
-    from soilml.onboard import table_estimates
-
-    rows = sum(len(next(iter(one.values()))) for one in readings)
-    with row_progress(f"estimating by {by}", estimator, 2 * rows) as counted:
-        return table_estimates.estimates_of_runs(counted, readings, box)
-
-
 def _group_estimates(
     estimator: Estimator, table: Table, usable: NDArray[np.bool_], by: str, case: Case | None
 ) -> tuple[dict[str, Any], list[Remark]]:
     """Columns with a line for every value of a column, from all its usable rows, and remarks."""
     import numpy as np
 
+    from soilml.cli.progress import row_progress
     from soilml.experiment_design.advice_after_results import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
@@ -335,15 +321,17 @@ def _group_estimates(
         for _, rows in groups
     ]
     box = {} if case is None else narrower_priors(estimator, case)
-    in_range, estimate = _estimates_of_runs(estimator, readings, by, box)
+    counts = np.asarray([len(rows) for _, rows in groups])
+    with row_progress(f"estimating by {by}", estimator, int(counts.sum())) as counted:
+        estimate = table_estimates.estimates_of_runs(counted, readings, box)
+    outside = estimate.rows_set_aside
     position = {name: i for i, name in enumerate(names)}
     answered = np.asarray([name in position for name in order])
     index = np.asarray([position.get(name, 0) for name in order])
-    counts = np.asarray([len(rows) for _, rows in groups])
     columns: dict[str, Any] = {
         by: np.asarray(order),
         "rows": np.where(answered, counts[index], 0),
-        "rows_in_range": np.where(answered, in_range[index], 0),
+        "rows_in_range": np.where(answered, (counts - outside)[index], 0),
     }
     for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values[index], np.nan)
@@ -371,5 +359,5 @@ def _group_estimates(
                 box,
             )
         ]
-    remarks += presentation.refusal_remarks(by, names, counts - in_range, counts, estimate)
+    remarks += presentation.refusal_remarks(by, names, outside, counts, estimate)
     return columns, remarks

@@ -86,10 +86,6 @@ def test_single_readings_and_pooled_ones_have_their_reasons(whole, pooling):
     assert (stray.rows_used, stray.rows_set_aside) == (19, 1)
     assert stray.reason == Reason.ESTIMATED
     assert pooling.run(**many(20, torque=[90.0] * 11)).reason == Reason.OUT_OF_RANGE
-    slip, load = np.asarray([0.1, 0.3, 0.5] * 4), np.asarray([40.0, 60.0, 80.0] * 4)
-    torque = load * 0.15 * np.asarray([0.45, 0.40, 0.35] * 4)
-    wild = pooling.run(slip=slip, torque=torque, load=load)
-    assert not wild.in_range and wild.reason == Reason.INCONSISTENT
 
 
 def test_stacked_and_fused_estimates_keep_the_reasons(whole):

@@ -1,7 +1,5 @@
 """Rules of fusion against their equations, evaluated by hand."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from test_joint_errors import Sensors
@@ -9,7 +7,6 @@ from test_joint_errors import Sensors
 from soilml.onboard.fusion_rules import best_linear
 from soilml.onboard.joint_errors import (
     DISAGREEMENT,
-    LEAST_AVERAGES,
     JointErrors,
     joint_errors,
 )
@@ -25,9 +22,6 @@ RULE = JointErrors(
     middles=np.asarray([0.0, 1.0]),
     low=np.asarray([-1.0, -2.0]),
     high=np.asarray([1.5, 3.5]),
-    repeats=16.0,
-    repeat_std=2.0,
-    repeat_interval=3.0,
 )
 
 
@@ -45,34 +39,6 @@ def test_the_std_grows_with_the_disagreement_over_its_limit():
     _, spread, disagreement = RULE.fuse(mean, std, ONE)
     assert disagreement == pytest.approx([4.0 * DISAGREEMENT])
     assert spread == pytest.approx([4.0 * 1.5 * 0.1 / np.sqrt(2.0)])
-
-
-@pytest.mark.parametrize(
-    ("count", "factor", "reach"), [(1.0, 1.0, 1.0), (4.0, 1.5, 2.0), (64.0, 2.0, 3.0)]
-)
-def test_factors_of_repetition_are_interpolated_in_the_logarithm(count, factor, reach):
-    mean, std = np.asarray([[0.5], [0.5]]), np.full((2, 1), 0.1)
-    _, spread, _ = RULE.fuse(mean, std, ONE, count)
-    assert spread == pytest.approx([factor * 1.5 * 0.1 / np.sqrt(2.0)])
-    low, high = RULE.interval(np.asarray([0.5]), np.asarray([0.1]), count)
-    assert low == pytest.approx([0.5 - 1.5 * reach * 0.1])
-    assert high == pytest.approx([0.5 + 2.5 * reach * 0.1])
-
-
-def test_repetition_needs_enough_averages_of_the_same_number_of_readings():
-    first, second = Sensors().files()
-    (rule,) = joint_errors((first, second))
-    assert rule.repeats == 8.0
-
-    def changed(file, key, **values):
-        return replace(file, key=key, **values)
-
-    other = changed(second, "other", repeats=np.asarray([1, 5]))
-    (rule,) = joint_errors((first, other))
-    assert rule.repeats == 1.0
-    few = changed(second, "few", average_rows=second.average_rows + 700 - LEAST_AVERAGES + 1)
-    (rule,) = joint_errors((first, few))
-    assert rule.repeats == 1.0
 
 
 def test_a_box_scales_the_std_as_the_estimate_differs_from_a_normal_one():
@@ -101,11 +67,3 @@ def test_gain_and_ends_of_the_interval_are_those_of_the_held_out_rows():
     assert rule.gain == pytest.approx(away @ (truth - truth.mean()) / (away @ away))
     assert np.all((rule.low < -1.2) & (rule.low > -2.4))  # normal errors: near 1.645
     assert np.all((rule.high > 1.2) & (rule.high < 2.4))
-
-
-def test_the_interval_of_repeated_readings_is_widened_by_their_number():
-    """By half at the 16 readings that were measured, by a quarter at 4, by no more beyond."""
-    rule = replace(RULE, repeats=16.0, repeat_interval=1.5)
-    mean, std = np.asarray([0.5]), np.asarray([0.4])
-    ends = [rule.interval(mean, std, count)[1][0] - 0.5 for count in (1.0, 4.0, 16.0, 99.0)]
-    assert np.asarray(ends) / ends[0] == pytest.approx([1.0, 1.25, 1.5, 1.5])

@@ -42,7 +42,6 @@ class Sensors:
     def files(self):
         """Held-out errors of each sensor, with repeated readings."""
         truth, mean, std = self.draw(ROWS)
-        same, many, spread = self.draw(700, REPEATS)
         ratio = np.sqrt(self.soil + (1.0 - self.soil) / REPEATS)
         return [
             HeldOutErrors.of(
@@ -51,10 +50,6 @@ class Sensors:
                     "truth": truth,
                     "mean": mean[i, 0],
                     "std": std[i, 0],
-                    "average_rows": range(700),
-                    "average_truth": same,
-                    "average_mean": many[i].mean(axis=0),
-                    "average_std": spread[i].mean(axis=0),
                     "repeats": [1, REPEATS],
                     "repeat_std": [[1.0], [ratio]],
                     "repeat_coverage_factor": [[1.645], [1.645]],
@@ -147,7 +142,6 @@ def test_what_a_file_carries_is_read_back_as_it_was_written():
     assert HeldOutErrors.of(again.entry()) == again
     np.testing.assert_allclose(again.std, file.std, rtol=1e-3)
     without = file.entry() | {
-        "average_rows": [], "average_truth": [], "average_mean": [], "average_std": [],
         "repeats": [1], "repeat_std": [[1.0]], "repeat_coverage_factor": [[1.6]],
     }  # fmt: skip
     alone = HeldOutErrors.of(without)

@@ -29,7 +29,7 @@ def test_the_runtime_loads_numpy_and_onnxruntime_only(small_model, tmp_path):
         "soilml.onboard.estimator",
         "soilml.onboard.exact_check",
         "soilml.onboard.features",
-        "soilml.onboard.gaussian_pooling",
+        "soilml.onboard.gaussian_product",
         "soilml.onboard.held_out_errors",
         "soilml.onboard.memory",
         "soilml.onboard.metadata",

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from soilml.onboard.estimate import Estimate, PriorSummary
-from soilml.onboard.gaussian_pooling import RunConditions
 from soilml.onboard.narrower_prior import (
     within_box,
 )
@@ -26,29 +25,6 @@ def test_a_mean_within_one_and_a_half_standard_deviations_of_an_end_is_at_the_ed
     )
     at_edge = [[False, False], [True, False], [False, False], [False, True], [False, True]]
     assert found.at_edge.tolist() == at_edge
-
-
-def test_weights_of_several_runs_keep_their_dimensions():
-    box = RunConditions(
-        ("slip", "load"), np.asarray([0.0, 20.0]), np.asarray([0.5, 120.0]), np.ones(2)
-    )
-    rng = np.random.default_rng(0)
-    runs = {
-        "slip": rng.uniform(0.0, 0.5, (2, 3, 7)).round(1),
-        "load": rng.uniform(20.0, 120.0, (2, 3, 7)).round(-1),
-    }
-    weights = box.row_weights(runs)
-    assert weights.shape == (2, 3, 7)
-    for i, j in np.ndindex(2, 3):
-        alike = [
-            sum(
-                runs["slip"][i, j, k] == runs["slip"][i, j, m]
-                and runs["load"][i, j, k] == runs["load"][i, j, m]
-                for m in range(7)
-            )
-            for k in range(7)
-        ]
-        assert weights[i, j] == pytest.approx(1.0 / np.asarray(alike))
 
 
 def test_a_box_that_fixes_a_quantity_leaves_the_others():

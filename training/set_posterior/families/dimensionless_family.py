@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -99,10 +99,6 @@ class DimensionlessFamily:
                 PriorAxis.of("exponent_deviation", Prior(-EXPONENT_RANGE, EXPONENT_RANGE)),
             ),
         )
-
-    def with_axes(self, count: int) -> DimensionlessFamily:
-        """See `WheelFamily`."""
-        return replace(self, axes=self.axes[:count])
 
     def designs(self, count: int, seed: int) -> Floats:
         """Operating conditions (count, 8) whose sinkage and ground pressure are in range.

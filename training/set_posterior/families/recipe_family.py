@@ -102,10 +102,6 @@ class RecipeFamily:
             return family
         return replace(family, linear_torque=noise.constant / max(noise.share, LEAST_SHARE))
 
-    def with_axes(self, count: int) -> RecipeFamily:
-        """See `WheelFamily`."""
-        return replace(self, axes=self.axes[:count])
-
     def designs(self, count: int, seed: int) -> Floats:
         """Slips and loads (count, 2)."""
         u = qmc.Sobol(2, rng=seed).random(1 << (count - 1).bit_length())[:count]

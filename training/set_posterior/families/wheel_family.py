@@ -150,10 +150,6 @@ class WheelFamily(Protocol):
         """Degree of the polynomial, and of its terms of the estimated axes alone."""
         ...
 
-    def with_axes(self, count: int) -> WheelFamily:
-        """The family with its first unknowns alone."""
-        ...
-
     def designs(self, count: int, seed: int) -> Floats:
         """Operating conditions (count, d) that the soil carries, spread over the range."""
         ...

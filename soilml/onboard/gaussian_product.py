@@ -1,0 +1,70 @@
+"""The product of Gaussian estimates of one soil, for files without a set posterior."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from soilml.onboard.estimate import Estimate, PriorSummary
+from soilml.onboard.set_contract import LEAST_SHARE_IN_RANGE, Floats
+from soilml.quantities import Z_90
+
+#: Correlation of the errors of two rows of one soil. 90 % intervals of 4 to 32 rows then cover 81
+#: to 97 %, whether slip and load vary or not: tests/soilml/onboard/test_gaussian_product.py. With 0
+#: they cover 40 % of steady runs of 32 rows; with 0.5 runs of varied ones are a tenth less exact.
+CORRELATION = 0.3
+#: Least ratio of an estimate's standard deviation to the prior's, along any direction.
+LEAST_STD_RATIO = 1e-3
+
+
+def gaussian_product(
+    mean: Floats, covariance: Floats, prior: PriorSummary, weight: float = 1.0
+) -> tuple[Floats, Floats]:
+    r"""Mean (..., q) and covariance (..., q, q) of m estimates, with their common prior once.
+
+    .. math::
+        P^{-1} = P_0^{-1} + w \sum_i (P_i^{-1} - P_0^{-1}), \quad
+        P^{-1} \mu = P_0^{-1} \mu_0 + w \sum_i (P_i^{-1} \mu_i - P_0^{-1} \mu_0)
+
+    Directions in which an estimate is no more certain than the prior contribute nothing.
+
+    mean, covariance: Estimates (..., m, q) and (..., m, q, q).
+    weight: Share w of their information that is used.
+
+    References: Tresp, Neural Computation 12, 2000.
+    """
+    variance, axes = np.linalg.eigh(covariance / np.outer(prior.std, prior.std))
+    precision = 1.0 / np.clip(variance, LEAST_STD_RATIO**2, 1.0)
+    scaled = np.einsum("...ji,...j->...i", axes, (mean - prior.mean) / prior.std)
+    right = weight * np.einsum("...mij,...mj->...i", axes, precision * scaled)
+    added = weight * np.einsum("...mik,...mk,...mjk->...ij", axes, precision - 1.0, axes)
+    inverse = np.linalg.inv(np.eye(len(prior.std)) + added)
+    centre = np.einsum("...ij,...j->...i", inverse, right)
+    return prior.mean + prior.std * centre, inverse * np.outer(prior.std, prior.std)
+
+
+def product_of_rows(single: Estimate) -> Estimate:
+    r"""One estimate from those of the m rows of a soil, each by itself, (m,).
+
+    Rows whose errors have the correlation :math:`\rho` are worth
+    :math:`m / (1 + (m - 1) \rho)` independent ones. The answer is the prior where more than half of
+    the rows are out of range.
+    """
+    valid = single.in_range
+    used, head = int(valid.sum()), (single.names, single.units, single.prior)
+    if valid.size == 1:
+        return single.at(0)
+    found = Estimate.from_prior(*head)
+    if used >= LEAST_SHARE_IN_RANGE * valid.size:
+        weight = 1.0 / (1.0 + (used - 1) * CORRELATION)
+        parts = single.mean[valid], single.covariance[valid]
+        mean, covariance = gaussian_product(*parts, single.prior, weight)
+        mean, std = (
+            np.clip(mean, single.prior.lower, single.prior.upper),
+            np.sqrt(np.diag(covariance)),
+        )
+        factor = np.full(len(std), Z_90)
+        found = Estimate.gaussian(*head, mean, covariance, std, np.asarray(True), factor)
+    aside = np.asarray(valid.size - used)
+    return replace(found, rows_used=np.asarray(used), rows_set_aside=aside)
