@@ -23,7 +23,7 @@ KINDS = ("nothing", "repeat", "random", "advised")
 EXPECTED = "advised, as expected"
 ABOUT = (
     "Remaining fraction of the prior width after one more reading, where that is the advised one, "
-    "a repetition, or a random one (docs/how-to/next-measurement.md), and the error: root mean "
+    "a repetition, or a random one (docs/how-to/priors-and-noise.md), and the error: root mean "
     "squares over "
     f"{SOILS} soils, in standard deviations of the prior."
 )

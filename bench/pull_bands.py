@@ -12,24 +12,24 @@ from scipy.stats import binom
 
 from soilml import Estimator, SlipSinkage, read_case
 from soilml.config.case import Case
-from soilml.fitting.coordinates import select_free
-from soilml.fitting.usable_readings import usable_readings
 from soilml.io.table import Table
 from soilml.numerics.quantiles import QUANTILES, quantile_band
 from soilml.physics.operating_point import Operating
 from soilml.quantities import column
 from soilml.traction.draws import SoilDraws
 from soilml.traction.pull_and_slope import predict_traction
-from soilml.traction.soil_draws import estimated_soil, posterior_draws
+from soilml.traction.report import pull_report
 
-#: Soils that nothing was settled with; draws; a load among those driven, and one that is not (N).
-SEEDS, DRAWS, LOADS = range(20_000, 20_200), 200, (75.0, 200.0)
-#: Slips of the predictions; rows of each soil; range of their loads, N.
-SLIPS = np.round(np.linspace(0.1, 0.6, 6), 12)
+#: Soils that nothing was settled with; a load among those driven, and one that is not (N).
+SEEDS, LOADS = range(20_000, 20_100), (75.0, 200.0)
+#: Slips of the rows and of the table; rows of each soil; range of their loads, N.
+SLIPS = (0.1, 0.3, 0.6)
 ROWS, DRIVEN_LOADS = 6, (30.0, 120.0)
-KINDS = ("posterior", "exported/wheel.onnx", "posterior, slip-sinkage missing")
+#: Who answers, and in which world.
+DEFAULT, EXACT, FILE, LACKING = "default", "--exact-model", "--from wheel", ", slip-sinkage missing"
+KINDS = (DEFAULT, EXACT, FILE, DEFAULT + LACKING, EXACT + LACKING)
 ABOUT = (
-    "Coverage of 90 % bands of drawbar pull and of the steepest slope (docs/pull.md), over "
+    "Coverage of 90 % bands of drawbar pull and of the steepest slope (docs/how-to/pull.md), over "
     f"{len(SEEDS)} simulated soils: 95 of 100 exact bands show "
     + " to ".join(f"{100 * x / len(SEEDS):.0f}" for x in binom.interval(0.95, len(SEEDS), 0.9))
     + " %. Each soil has six rows of torque with the case's noise. Of the steepest slope, in "
@@ -44,51 +44,41 @@ def cases(sample: Sample) -> list[Row]:
 
 
 @cache
-def known(kind: str) -> tuple[Case, Case, Estimator | None]:
-    """The assumed case, that which simulates, and the estimator in the posterior's place."""
+def known() -> tuple[Case, Case, Estimator]:
+    """The assumed case, the world with an effect that it lacks, and the trained file."""
     case = read_case(ROOT / "examples/wheel/model.toml")
-    world = case
-    if kind == KINDS[2]:
-        digging = SlipSinkage(n1=SlipSinkage.about.reference["n1"])
-        world = replace(case, model=case.model + digging)
-    file = Estimator.load(ROOT / "exported/wheel.onnx") if kind == KINDS[1] else None
-    return case, world, file
+    digging = SlipSinkage(n1=SlipSinkage.about.reference["n1"])
+    lacking = replace(case, model=case.model + digging)
+    return case, lacking, Estimator.load(ROOT / "exported/wheel.onnx")
 
 
 def one_soil(asked: Row) -> list[Row]:
-    """Bands of a soil under each load, beside the truth."""
-    case, world, estimator = known(asked["by"])
-    return soil_bands(case, world, estimator, asked["seed"], DRAWS)
-
-
-def soil_bands(
-    case: Case, world: Case, estimator: Estimator | None, seed: int, count: int
-) -> list[Row]:
-    """Bands of pull and slope of a soil that is drawn from the prior, from `count` draws.
-
-    Rows and truths are simulated by `world`.
-    """
-    rng = np.random.default_rng(seed)
+    """Bands of a soil of the prior under each load, beside the truth of its world."""
+    case, lacking, file = known()
+    by = asked["by"]
+    world = lacking if by.endswith(LACKING) else case
+    rng = np.random.default_rng(asked["seed"])
     truth = {name: prior.at(rng.random(1)) for name, prior in case.prior.items()}
     true = SoilDraws(tuple(truth), np.stack(list(truth.values()), axis=1))
-    table = simulated_rows(case, world, true, rng)
-    if estimator is not None:
-        draws = estimated_soil(estimator, case, table).draws
-    else:
-        readings = usable_readings(case, table)
-        draws = posterior_draws(case, readings, select_free(case, None), count, seed)[0]
+    report = pull_report(
+        case,
+        simulated_rows(case, world, true, rng),
+        loads=LOADS,
+        slip_limit=SLIPS[-1],
+        estimator=file if by == FILE else None,
+        exact_model=by.startswith(EXACT),
+    )
     rows = []
-    for load in LOADS:
-        found, real = (
-            predict_traction(model, own, load, SLIPS)
-            for model, own in ((case, draws), (world, true))
-        )
-        slope = quantile_band(found.steepest_slope)
+    for load, found in zip(LOADS, report.by_load, strict=True):
+        band = found.posterior
+        shown = [int(np.argmin(np.abs(band.slip - s))) for s in SLIPS]
+        real = predict_traction(world, true, load, band.slip)
+        slope = quantile_band(band.steepest_slope)
         rows.append(
             {
                 "load": f"{load:g}",
-                "pull": inside(found.pull, real.pull[0]),
-                "steepest": inside(found.steepest_slope, real.steepest_slope[0]),
+                "pull": inside(band.pull, real.pull[0])[shown],
+                "steepest": inside(band.steepest_slope, real.steepest_slope[0]),
                 "width": np.rad2deg(slope.width),
                 "error": np.rad2deg(real.steepest_slope[0] - slope.middle),
             }

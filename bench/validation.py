@@ -122,7 +122,8 @@ def worlds_table() -> str:
             for line in section.splitlines():
                 cells = [c.strip() for c in line.strip("|").split("|")]
                 if "mean" in cells[0] and cells[1] in ANSWERS:
-                    rows.append((f"`wheel`, {short}, {channels}", ANSWERS[cells[1]], *cells[3:5]))
+                    name = f"`wheel`, {short}, {channels}"
+                    rows.append((name, ANSWERS[cells[1]], cells[3], cells[-1]))
     for line in lines_of("identify-errors", "what is wrong", "channels", "answer"):
         if line["what is wrong"] == "mean":
             name = f"`identify`, {PARTS['Wrong sensors, wrong laws']}, {line['channels']}"

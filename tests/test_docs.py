@@ -14,9 +14,8 @@ PAGES = sorted(
     for pattern in ("*.md", "docs/**/*.md", "exported/*.md", "examples/*/*.md")
     for page in ROOT.glob(pattern)
 )
-#: pages beside README whose Python blocks are run
+#: pages whose Python blocks are run
 RUN = (
-    "docs/index.md",
     "docs/concepts/sets.md",
     "docs/how-to/choose-wheels.md",
     "docs/how-to/import.md",
@@ -26,8 +25,6 @@ RUN = (
     "docs/how-to/train.md",
     "docs/papers/comin2017.md",
     "docs/papers/nagatani2009.md",
-    "docs/papers/nagatani_climbing.md",
-    "docs/papers/wang2018.md",
     "docs/reference/tables.md",
     "exported/README.md",
 )
@@ -56,19 +53,10 @@ def test_python_blocks_run(page, monkeypatch, tmp_path):
         exec(block, {"__name__": "documented"})
 
 
-def test_the_estimates_of_the_readme_are_answered(monkeypatch):
+def test_the_analyses_of_the_first_page_find_the_hidden_effect(monkeypatch):
     monkeypatch.chdir(ROOT)
     names: dict = {}
-    _, board = blocks("README.md", "python")
-    exec(board, names)
-    assert names["one"].mean.shape == names["all_"].mean.shape == (3,)
-    assert bool(names["one"].in_range) and bool(names["all_"].in_range)
-
-
-def test_the_analyses_of_the_readme_find_the_hidden_effect(monkeypatch):
-    monkeypatch.chdir(ROOT)
-    names: dict = {}
-    exec(blocks("README.md", "python")[0], names)
+    exec(blocks("docs/index.md", "python")[0], names)
     assert names["fit"].names == ("cohesion", "friction_angle", "shear_modulus")
     assert any(remark.code == "excess-residuals" for remark in names["fit"].warnings)
     assert names["fit"].explanations[0].effects == ("slip-sinkage",)
@@ -98,7 +86,7 @@ def test_the_recipe_and_the_spec_can_be_generated_and_trained(tmp_path, monkeypa
 def test_the_answer_of_a_design_is_what_the_command_prints(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(ROOT)
     page = (ROOT / "docs/how-to/choose-wheels.md").read_text()
-    command = re.findall(r"```\nsoilml (design .*)\n```", page)[1].split()
+    command = re.findall(r"```\nsoilml (plan wheels .*)\n```", page)[1].split()
     assert main([*command, "--out", str(tmp_path / "design.json")]) == 0
     verdict = capsys.readouterr().out.splitlines()[0]
     (printed,) = blocks("docs/how-to/choose-wheels.md", "text")[1].splitlines()

@@ -36,9 +36,10 @@ def _parameters(
     """Add unit, bounds and meaning of each declared parameter."""
     if what != "class" or not dataclasses.is_dataclass(obj):
         return
-    found = declared(obj)
-    if not found:
+    # types that are imported for type checkers alone cannot be resolved: only these have to be
+    if not any("Parameter(" in str(field.type) for field in dataclasses.fields(obj)):
         return
+    found = declared(obj)
     lines += ["", ".. rubric:: Declared parameters", ""]
     for field, parameter in found.items():
         unit = "" if parameter.unit in ("1", "-") else f" {parameter.unit}"

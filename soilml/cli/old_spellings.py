@@ -21,6 +21,7 @@ COMMANDS = {
     "advise": "plan next",
     "design-runs": "plan runs",
     "export-c": "export c",
+    "export-fusion": "export fusion",
     "export-step": "export step",
     "export-slip": "export slip",
     "export-soil": "export soil",
@@ -64,6 +65,9 @@ def present_words(words: list[str]) -> list[str]:
         rest = _renamed(rest, old, new)
     if (first := FIRST.get(command)) is not None:
         rest = _moved(rest, first)
+    if command == "export fusion" and len(rest) > 1 and rest[0].endswith(".c"):
+        rest = [*rest[1:], rest[0]]
+        _hint("the C file is now the last argument: soilml export fusion MODEL.onnx ... OUT.c")
     return [*found[:length], *rest]
 
 

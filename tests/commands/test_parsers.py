@@ -74,6 +74,8 @@ def test_former_orders_of_arguments_lead_to_present_ones():
             "r.toml",
             "drive.csv",
         ]
+    found = old_spellings.present_words(["export-fusion", "o.c", "a.onnx", "b.onnx"])
+    assert found == ["export", "fusion", "a.onnx", "b.onnx", "o.c"]
 
 
 def test_hints_at_former_words_are_for_a_terminal(monkeypatch, capsys):

@@ -59,6 +59,7 @@ ELSEWHERE = {
     "train",
     "plan runs",
     "export c",
+    "export fusion",
     "drive slip",
     "drive map",
     "export soil",  # in the units of the program that it writes for

@@ -46,8 +46,8 @@ drawbar_pull_N, sinkage_m, speed_m_s (below zero in reverse), pass,
 slip_angle_rad, time_s and <column>_std. FOLDER receives report.html (start here),
 gap.json, model.toml (the model with the effect that is missing, or all likely
 explanations with their weights, by whose mixture other commands predict) and
-next_runs.csv (runs to measure next). The exit status is 0 whatever the result
-and 2 for bad input.
+next_runs.csv (runs to measure next). The exit status is 0 whatever the result,
+3 where the data cannot be analysed, and 2 for bad input.
 
 Runs of several wheels on one soil: write each as [gears.NAME] in MODEL.toml,
 and name it in the column gear. An effect of one wheel is then grousers@NAME.

@@ -170,8 +170,7 @@ class MeasuredStress:
     """Mean stress over the sensing area (Pa) against the angle on the rim (rad), (points,) each.
 
     std: Standard deviation of the mean, Pa; of readings by the scatter between turns.
-    in_range: Points where every sample of every sensor lies between deadband and saturation; only
-        there is `normal` an unbiased mean.
+    in_range: Points whose samples all lie between deadband and saturation: `normal` is unbiased.
     saturated: Fraction of the samples with contact that are at saturation.
     """
 

@@ -82,8 +82,8 @@ class SlipRelation:
     r"""Slip from a reading x of a stride, i = a + b x, with the soil in a and b (SI units).
 
     of_soil (2, 3): (a, b) = of_soil (1, phi, sigma_1).
-    to_soil (2, 1 + k): (phi, sigma_1) = to_soil (1, y), with y = (a, b) of a regression of slip on
-        the reading, or the one unknown y of a relation that a single stride determines.
+    to_soil (2, 1 + k): (phi, sigma_1) = to_soil (1, y); y is (a, b) of a regression of slip on x,
+    or the one unknown of a relation that a single stride determines.
     single: (p, q, r, s) of such a relation, i = p + q x + y (r + s x); None for a regression.
     slip_std: Standard error of the slip.
 
