@@ -144,18 +144,16 @@ class Estimate(Result):
     def __post_init__(self) -> None:
         """Fields that are not given are those of single readings."""
         inside = np.asarray(self.in_range)
-        for name in ("misfit", "exact_misfit", "exact_probability", "load"):
+        made: Any = dict.fromkeys(
+            ("misfit", "exact_misfit", "exact_probability", "load"),
+            lambda: np.full(inside.shape, np.nan),
+        )
+        made |= {"disagrees": lambda: np.zeros(inside.shape, dtype=bool)}
+        made |= {"rows_used": lambda: inside.astype(int)}
+        made |= dict.fromkeys(("rows_set_aside", "reason"), lambda: (~inside).astype(int))
+        for name, value in made.items():  # out of range is reason 1
             if getattr(self, name) is _NOT_GIVEN:
-                object.__setattr__(self, name, np.full(inside.shape, np.nan))
-        if self.disagrees is _NOT_GIVEN:
-            object.__setattr__(self, "disagrees", np.zeros(inside.shape, dtype=bool))
-        if self.rows_used is _NOT_GIVEN:
-            object.__setattr__(self, "rows_used", inside.astype(int))
-        if self.rows_set_aside is _NOT_GIVEN:
-            object.__setattr__(self, "rows_set_aside", 1 - inside.astype(int))
-        if self.reason is _NOT_GIVEN:
-            reason = np.where(inside, int(Reason.ESTIMATED), int(Reason.OUT_OF_RANGE))
-            object.__setattr__(self, "reason", reason)
+                object.__setattr__(self, name, value())
 
     @staticmethod
     def gaussian(
@@ -317,8 +315,7 @@ class Estimate(Result):
         if name not in self.names:
             raise InputError(f"{name!r} is not estimated; there are: {', '.join(self.names)}")
         i = self.names.index(name)
-        parts = (self.mean[..., i], self.std[..., i], self.low[..., i], self.high[..., i])
-        mean, std, low, high = parts
+        mean, std, low, high = (x[..., i] for x in (self.mean, self.std, self.low, self.high))
         return EstimatedValue(mean, std, self.units[i], low, high)
 
     def interval(self, level: float = LEVEL) -> tuple[Floats, Floats]:

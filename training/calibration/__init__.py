@@ -1,1 +1,1 @@
-"""Recalibration and pooling calibration on held-out rows, the training domain, and metrics."""
+"""Recalibration and errors on held-out rows, the training domain, and metrics."""

@@ -66,8 +66,3 @@ def calibrated(regressor: Any, mean: Floats, std: Floats, truth: Floats) -> Cali
     z = (truth - mean) / std
     std_scale = np.sqrt(np.mean(z**2, axis=0))
     return CalibratedRegressor(regressor, std_scale, np.corrcoef(z.T).reshape(z.shape[1], -1))
-
-
-def covariance_matrices(std: Floats, correlation: Floats) -> Floats:
-    """Covariances (n, q, q) from standard deviations (n, q) and one correlation (q, q)."""
-    return np.asarray(std[:, :, None] * correlation * std[:, None, :])

@@ -55,7 +55,7 @@ def test_it_is_nearly_the_posterior_with_that_prior(rover):
     rng, case = np.random.default_rng(3), read_recipe("wheel").case
     scale = np.asarray([case.prior[name].std for name in SHEAR])
     errors, exact, wide, held = [], [], [], []
-    for _ in range(20):
+    for _ in range(12):
         truth = np.asarray([case.prior[name].at(rng.random()) for name in SHEAR])
         box = {}
         for name, value in zip(SHEAR, truth, strict=True):

@@ -85,7 +85,7 @@ def compare_sets(model, name, sets, seed):
 @pytest.mark.parametrize("compiler", ONE_FIRST)
 @pytest.mark.parametrize("name", SETS)
 def test_sets(name, compiler, compiled):
-    compare_sets(compiled(name, compiler), name, 120 if name.startswith("wheel") else 60, 2)
+    compare_sets(compiled(name, compiler), name, 120 if name == "wheel" else 40, 2)
 
 
 @pytest.mark.slow

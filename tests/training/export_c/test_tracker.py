@@ -88,7 +88,7 @@ def test_a_day_with_other_soils_glitches_stuck_sensors_and_a_drift(seed, name, c
     estimator = Estimator.load(ROOT / "exported" / f"{name}.onnx")
     estimator = estimator.on(**context) if context else estimator
     rows = spoilt(day(seed), np.random.default_rng(seed))
-    rows = rows if name == "wheel" else rows[:160]
+    rows = rows[:260] if name == "wheel" else rows[:130]
     events, apart = drive(compiled(name), estimator, rows, context)
     assert [own for own, _ in events] == [expected for _, expected in events]
     assert np.quantile(apart, 0.99) < OFTEN and apart.max() < WORST
@@ -108,7 +108,7 @@ def test_one_row_at_a_time_takes_the_same_decisions(tmp_path):
     stated = model.numbers["WHEEL_SMALL_TRACKER_BYTES"]
     assert ctypes.sizeof(model.structs["wheel_small_tracker"]) <= stated < 32_000
     estimator = Estimator.load(ROOT / "exported" / "wheel_small.onnx")
-    rows = spoilt(day(0), np.random.default_rng(0))[:170]
+    rows = spoilt(day(0), np.random.default_rng(0))[:150]
     events, apart = drive(model, estimator, rows, length=32)
     assert [own for own, _ in events] == [expected for _, expected in events]
     assert {Event.SET_ASIDE, Event.SOIL_CHANGED} <= {own for own, _ in events}
@@ -128,15 +128,15 @@ def test_a_constant_load_with_noise_is_not_stuck(compiled):
     assert [own for own, _ in events].count(Event.ACCEPTED) >= 20
 
 
-@pytest.mark.parametrize("value", [-1.0, np.inf])
-def test_a_bad_standard_deviation_changes_nothing(value, compiled):
+def test_a_bad_standard_deviation_changes_nothing(compiled):
     model = compiled("wheel")
     own = CompiledTracker(model, {})
     for row in day(0)[:5]:
         own.read(**row)
     before = bytes(own.tracker)
-    code, _, _ = own.read(**day(0)[5] | {"torque_std": value})
-    assert code == model.codes["BAD_STD"] and bytes(own.tracker) == before
+    for value in (-1.0, np.inf):
+        code, _, _ = own.read(**day(0)[5] | {"torque_std": value})
+        assert code == model.codes["BAD_STD"] and bytes(own.tracker) == before
 
 
 def flip_bits(struct, count, rng):
@@ -160,7 +160,7 @@ def test_a_tracker_in_which_a_bit_has_flipped_is_refused(compiled):
     code, event, _ = own.read(**rows[60])
     expected = code, event, bytes(own.estimate)
     ctypes.memmove(ctypes.byref(own.tracker), sound, len(sound))
-    for before in flip_bits(own.tracker, 1000, rng):
+    for before in flip_bits(own.tracker, 400, rng):
         code, event, _ = own.read(**rows[60])
         codes.append(code)
         if code == model.codes["NOT_STARTED"]:
@@ -182,7 +182,7 @@ def test_a_memory_in_which_a_bit_has_flipped_is_refused(compiled):
     assert model.call("set_answer", memory, estimate, model.work) == 0
     gap = ctypes.sizeof(memory) - sum(getattr(type(memory), n).size for n, _ in memory._fields_)
     read = 0
-    for before in flip_bits(memory, 3000, rng):
+    for before in flip_bits(memory, 1000, rng):
         own = model.new("set_estimate")
         if model.call("set_answer", memory, own, model.work) == 0:
             read += 1

@@ -28,7 +28,7 @@ def compare(posterior, sets, index, session):
     return answer, found.mean, np.sqrt(np.diag(found.covariance)), ends
 
 
-@pytest.mark.parametrize("rows", [1, 4, 16, 32])
+@pytest.mark.parametrize("rows", [1, 16])
 def test_mean_spread_and_interval_are_those_of_the_exact_sampler(wheel_posterior, rows):
     session, sets = posterior_session(wheel_posterior), wheel_posterior.family.sets(8, rows, 9)
     apart, ratios, ends = [], [], []
@@ -60,7 +60,7 @@ def test_the_thin_posterior_of_constant_operating_conditions_is_sampled(wheel_po
             assert (np.abs(np.log(answer["set_std"] / std)) < 0.25).all()
 
 
-@pytest.mark.parametrize("corner", [(0.97, 0.97, -0.97), (-0.97, -0.97, 0.97)])
+@pytest.mark.parametrize("corner", [(0.97, 0.97, -0.97)])
 def test_a_soil_in_a_corner_of_the_prior_is_found(wheel_posterior, corner):
     family, session = wheel_posterior.family, posterior_session(wheel_posterior)
     sets, rng = family.sets(4, 16, 21), np.random.default_rng(0)

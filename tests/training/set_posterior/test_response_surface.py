@@ -60,7 +60,7 @@ def test_loads_that_soils_of_the_prior_do_not_carry_are_refused_before_anything_
 
 def test_designs_and_soils_are_learned_from_where_the_wheel_is_carried():
     family = family_with(kphi=Prior(2e4, 1e6, log=True))
-    response = fit_response(family, ResponseSettings(512, 24, 80, 0), lambda *_: None)
+    response = fit_response(family, ResponseSettings(256, 24, 80, 0), lambda *_: None)
     designs = family.designs(100, 99)
     rng = np.random.default_rng(1)
     x = np.stack([axis.quantile(rng.random(60)) for axis in family.axes], axis=1)

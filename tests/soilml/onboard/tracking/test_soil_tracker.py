@@ -47,13 +47,19 @@ def driven(tracker, rows):
     return [tracker.read(**row) for row in rows]
 
 
-@pytest.fixture
-def settled(estimator, wheel_posterior):
-    """A tracker after 40 rows of one soil."""
+@pytest.fixture(scope="module")
+def after_40_rows(estimator, wheel_posterior):
+    """The state of a tracker after 40 rows of one soil."""
     tracker = SoilTracker(estimator)
     states = driven(tracker, rows_of(wheel_posterior, 40))
     assert {state.event for state in states} == {Event.ACCEPTED}
-    return tracker
+    return tracker.save()
+
+
+@pytest.fixture
+def settled(estimator, after_40_rows):
+    """A tracker after 40 rows of one soil."""
+    return SoilTracker.restore(estimator, after_40_rows)
 
 
 def test_sound_rows_give_the_estimate_of_a_run(settled, estimator, wheel_posterior):
@@ -134,8 +140,7 @@ def test_a_stuck_slip_is_told_where_slip_has_noise(estimator, wheel_posterior):
     assert Event.STUCK not in {exact.read(**row | {"slip": slip}).event for row in rows[:9]}
 
 
-@pytest.mark.parametrize("glitches", [0, 2])
-def test_a_constant_load_with_declared_noise_is_not_stuck(estimator, wheel_posterior, glitches):
+def test_a_constant_load_with_declared_noise_is_not_stuck(estimator, wheel_posterior):
     """Two rows were used, and none after them."""
     noisy = estimator.on(noise={"slip": (0.02, 0.0), "load": (0.5, 0.01)})
     tracker, rows = SoilTracker(noisy), rows_of(wheel_posterior, 40)
@@ -144,12 +149,11 @@ def test_a_constant_load_with_declared_noise_is_not_stuck(estimator, wheel_poste
         row | {"load": 60.0, "torque": row["torque"] * r}
         for row, r in zip(rows, ratio, strict=True)
     ]
-    for i in range(glitches):
-        rows[10 + i]["load"] = 200.0 + i
+    rows[10]["load"], rows[11]["load"] = 200.0, 201.0  # glitches
     states = driven(tracker, rows)
     events = [state.event for state in states]
     assert Event.STUCK not in events
-    assert states[-1].rows_remembered >= 38 - glitches
+    assert states[-1].rows_remembered >= 36
     again = SoilTracker.restore(noisy, tracker.save())
     assert again.read(**rows[0] | {"slip": 0.3}).event is not Event.STUCK
 
@@ -206,14 +210,14 @@ def test_what_is_wrong_in_a_program_raises_an_error(settled, estimator):
 
 def test_what_is_remembered_does_not_grow(estimator, wheel_posterior):
     tracker = SoilTracker(estimator, length=32)
-    rows = rows_of(wheel_posterior, 150)
+    rows = rows_of(wheel_posterior, 90)
     sizes, remembered = [], []
     for row in rows:
         state = tracker.read(**row)
         remembered.append(state.rows_remembered)
         sizes.append(sum(array.nbytes for array in tracker.save().values()))
-    assert max(sizes[75:]) <= max(sizes[:75])
-    assert 32 <= min(remembered[40:]) <= max(remembered) <= 34 and state.rows_since_change == 150
+    assert max(sizes[60:]) <= max(sizes[:60])
+    assert 32 <= min(remembered[40:]) <= max(remembered) <= 34 and state.rows_since_change == 90
 
 
 def test_a_stored_state_continues_where_it_stopped(settled, estimator, wheel_posterior, tmp_path):
@@ -306,7 +310,7 @@ def test_restart_forgets_the_soil(settled):
     assert not state.estimate.in_range
 
 
-@pytest.mark.parametrize("drift", ["friction", "zero"])
+@pytest.mark.parametrize("drift", ["friction", pytest.param("zero", marks=pytest.mark.long)])
 def test_a_simulated_day(estimator, drift):
     day = simulate_day(7, drift)
     configured = estimator.on(noise={"slip": (SLIP_STD, 0.0)})
