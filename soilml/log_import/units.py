@@ -51,7 +51,7 @@ _EXACT = {"mNm": "mN*m", "MNm": "MN*m", "Nm": "N*m", "kNm": "kN*m", "G": "g_0", 
 _SUFFIXES = (
     "deg_s rad_s m_s mm_s cm_s m_s2 counts ticks rpm mnm nm rad deg degs mm cm ma ms us ns sec "
     "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
-    "newtons amps inc mn mm_min cm_min m_min mv uv"
+    "newtons amps inc mn mm_min cm_min m_min mv uv pa kpa mpa psi"
 )
 #: Per cent of something that a data sheet states.
 _SHARE = re.compile(

@@ -14,8 +14,7 @@ from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import wheels_by_gear
 from soilml.log_import.channels.runs import as_rows, runs_of, runs_of_rows
 from soilml.log_import.channels.shared_errors import largest_errors
-from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns import liveliest, words_of
+from soilml.log_import.guesses.columns import is_size, liveliest
 from soilml.log_import.guesses.other_columns import with_other_columns
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import read_log
@@ -31,8 +30,6 @@ from soilml.remarks import Remark
 PathLike = str | os.PathLike[str]
 _LOOKED = 8  # Runs among which a lively one is looked for
 _MOST_LEFT = 5  # Most rows of tables of which is said why they are left out
-#: Words of columns with the size of the wheel of each row.
-_SIZES = {"radius", "diameter", "durchmesser", "radio", "rayon", "raggio", "dia", "diam", "width"}
 
 
 def import_log(
@@ -137,7 +134,6 @@ def import_recordings(
     else:
         remarks += _without_torque(table)
     remarks += _several_wheels(table, recordings)
-    remarks += table_hints(table.columns, table.columns.get("wheel_radius_m"))
     bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
@@ -200,7 +196,7 @@ def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[R
     sizes: dict[str, set[float]] = {}
     for recording in (own for log in logs for own in log):
         for name, values in recording.columns.items():
-            if {*words_of(name)} & _SIZES and dimension(recording.units.get(name, "m")) == "m":
+            if is_size(name) and dimension(recording.units.get(name, "m")) == "m":
                 sizes.setdefault(name, set()).update(np.unique(values[np.isfinite(values)]))
     for name, found in sizes.items():
         if len(found) > 1:

@@ -13,7 +13,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.checks.slip_definition import definition_by_speeds
-from soilml.log_import.checks.speed_hints import rate_hints
+from soilml.log_import.checks.speed_hints import rate_hints, slip_without_cause
 from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.log_import.units import spelling
 
@@ -23,9 +23,10 @@ LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 _MOST_PULL, _MOST_LEVER, _MOST_SINKAGE = 1.2, 0.8, 0.7
 _USUAL_SINKAGE = (0.02, 0.7)  # Range of the usual sinkage over the radius
 _SLIPS = 0.05  # Slip from which a driving wheel has a torque worth judging
+_OTHER_RADIUS = 0.15  # Largest slip that odometry with another radius gives
 _NO_SLIP = 1e-6  # Slip of rows whose travel and rotation are one measurement
 _LEAST_LOAD = 1.0  # Load, N, below which no wheel is driven: it is then rather in kN
-_FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
+FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
 #: Mistakes that make T / (W r) too large, by factor. One of thousand is of the torque, or where the
 #: load is that of no wheel, of the load; and those that make it too small.
 _TOO_LARGE = (
@@ -89,6 +90,13 @@ class RowsToCheck:
         """What to change in the map; nothing for a table."""
         return f"; write {line} in [{role}]" if self.wheel is not None else ""
 
+    def _effort(self) -> Floats:
+        """Torque over load (rows,), m; NaN where it is not known."""
+        slip = self.rows["slip"]
+        torque, load = (self.rows.get(n, np.full(slip.shape, np.nan)) for n in ("torque", "load"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(torque / load)
+
     def _angles(self) -> Iterator[Hint]:
         for name in ("slope", "slip_angle"):
             largest = float(np.max(np.abs(self._known(name)), initial=0.0))
@@ -101,7 +109,7 @@ class RowsToCheck:
         """Rotation and travel, from which slip follows."""
         if self.wheel is not None and {"rim_speed", "speed"} <= self.rows.keys():
             for code, text, about in rate_hints(
-                self.wheel, self.rows["rim_speed"], self.rows["speed"]
+                self.wheel, self.rows["rim_speed"], self.rows["speed"], self._effort()
             ):
                 yield Hint(code, text, about)
 
@@ -113,7 +121,15 @@ class RowsToCheck:
         if slip.size < 3:
             return
         lowest, largest = float(np.min(slip)), float(np.max(np.abs(slip)))
-        if 0.9 < lowest < 1.0:
+        by_speeds = self.wheel is not None and not logged
+        alike = by_speeds and slip_without_cause(1.0 - self.rows["slip"], self._effort())
+        if alike and largest < _OTHER_RADIUS:  # more is a slip that was set
+            text = (
+                f"slip is {float(np.median(slip)):.2g} in all rows, however much the wheel works: "
+                "was the travel computed from the rotation of the wheel?"
+            )
+            yield Hint("one-sensor", text, ("speed", "slip"), wrong=False)
+        elif 0.9 < lowest < 1.0:
             text = (
                 f"slip is {lowest:.2g} or more in all rows: probably the rotation was measured "
                 "before a gearbox, or is in another unit"
@@ -134,7 +150,7 @@ class RowsToCheck:
         elif largest < _NO_SLIP:
             text = "slip is 0 in all rows: was the travel computed from the rotation of the wheel?"
             yield Hint("one-sensor", text, ("slip",), wrong=False)
-        elif largest < 0.01:
+        elif largest < 0.01 and not by_speeds:
             text = "slip is below 0.01 in all rows: was it divided by 100 twice?"
             yield Hint("slip-unit", text, ("slip",), wrong=False)
 
@@ -191,7 +207,7 @@ class RowsToCheck:
             if 0.7 < weight / middle / 9.80665 < 1.4:
                 text = f"the load of {middle:.3g} N is a tenth of the weight: probably it is in kg"
                 yield Hint("unit", text + self._write("unit = 'kgf'", "load"), ("load",))
-            elif not 1.0 / _FAR_FROM_WEIGHT < middle / weight < _FAR_FROM_WEIGHT:
+            elif not 1.0 / FAR_FROM_WEIGHT < middle / weight < FAR_FROM_WEIGHT:
                 text = (
                     f"the load is {middle:.3g} N in the middle of the rows, and the mass of "
                     f"[vehicle] gives {weight:.3g} N for each wheel: probably one of them is "

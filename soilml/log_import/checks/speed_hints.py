@@ -28,15 +28,33 @@ _SLOW_ROTATION = (
 _TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
 #: Share of the rim speed from which a wheel moves, fewest rows, and how near to 1 and how constant
 #: travel over rim speed is where one is computed from the other.
-_MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 4, 0.03, 1e-3
+_MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 3, 0.03, 1e-3
+#: Slips that are alike, and the ratio of the largest to the least effort that one slip seldom has:
+#: at a slip of 0.3 loads of 20 to 150 N give 1.2.
+_ALIKE, _WORKS = 0.01, 1.4
+
+
+def slip_without_cause(ratio: Floats, effort: Floats) -> bool:
+    """Whether travel over rotation stays the same while the wheel works more and less.
+
+    ratio, effort: Travel over rotation, and torque over load, (n,), in any unit. A wheel slips more
+    where it pulls more; the odometry of wheels shows one slip, whatever the radius it has.
+    """
+    good = np.isfinite(ratio) & np.isfinite(effort)
+    if good.sum() < _FEWEST:
+        return False
+    low, high = (float(x) for x in np.percentile(np.abs(effort[good]), [5, 95]))
+    own = np.abs(ratio[good])
+    return high > _WORKS * low and float(np.std(own)) < _ALIKE / 2.0 * float(np.median(own))
 
 
 def rate_hints(
-    wheel: WheelMap, rim: Floats, ground: Floats
+    wheel: WheelMap, rim: Floats, ground: Floats, effort: Floats
 ) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Code, text and channels of what is wrong.
 
     rim, ground: Speeds of rim and travel (rows,), m/s, in the sensors' own direction.
+    effort: Torque over load (rows,), m; NaN where it is not known.
     """
     channels = wheel.channels
     rotation = next((r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in channels), "")
@@ -45,7 +63,7 @@ def rate_hints(
         return
     ratio = ground[good] / rim[good]
     travel = "position" if "position" in channels else "ground_speed"
-    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good]):
+    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good], effort[good]):
         yield "one-sensor", why, (rotation, travel)
         return
     if float(np.median(ratio)) < -0.02:
@@ -78,11 +96,13 @@ def rate_hints(
         yield "radius-as-diameter", text, ("radius",)
 
 
-def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats) -> str:
+def one_sensor(
+    wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats, effort: Floats
+) -> str:
     """Why rotation and travel are one measurement, from which no slip follows; "" where two are.
 
     rim, ground: Means of windows or samples (n,), m/s. The travel of an odometry of the wheels is r
-    omega within its resolution, also where the speed changes.
+    omega within its resolution, also where the speed or the `effort` changes.
     """
     ours, theirs = wheel.channels[rotation].columns, wheel.channels[travel].columns
     needed = "needed is a travel from another sensor, or [slip]"
@@ -98,6 +118,7 @@ def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground:
     middle = float(np.median(ratio))
     alike = abs(middle - 1.0) < _ODOMETRY and float(np.std(ratio)) < _RESOLUTION
     changes = float(np.std(rim[moves])) > 10.0 * _RESOLUTION * float(np.median(np.abs(rim[moves])))
+    changes |= slip_without_cause(ratio, effort[moves])
     if not (alike and (changes or float(np.ptp(ratio)) == 0.0)):
         return ""
     return (

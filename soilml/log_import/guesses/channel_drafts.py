@@ -21,7 +21,7 @@ from soilml.log_import.guesses.signs_and_tares import (
     signs,
     tares,
 )
-from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.mapping.channel_map import GEARED, ROLES
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
 
@@ -178,7 +178,7 @@ def draft_of(
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")
-    if role in ("wheel_angle", "wheel_speed", "motor_current"):
+    if role in GEARED and (role != "torque" or {"motor", "mot"} & {*words_of(column.name)}):
         _put_gear_ratio(draft, role, column, stated.get("gear_ratio"))
     if role == "motor_current":
         if said := stated.get("torque_constant"):

@@ -20,7 +20,7 @@ from soilml.log_import.guesses.vertical_axis import axis_in, families, with_sink
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import factor
 
-_FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "effort", "力"}
+_FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "力"}
 _MOMENTS = {"m", "mx", "my", "mz", "t", "tx", "ty", "tz", "moment", "torque", "drehmoment", "tau"}
 _MOMENTS |= {"momento", "couple", "coppia"}
 #: Words of cells that carry a wheel together, whose forces are added.

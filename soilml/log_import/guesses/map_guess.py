@@ -29,6 +29,7 @@ from soilml.log_import.guesses.columns import (
     candidates_of,
     describe,
     describe_texts,
+    is_size,
     liveliest,
     name_scores,
     words_of,
@@ -88,7 +89,8 @@ class MapGuess:
         columns = candidates_of(self.run.recordings, self.steady > 0)
         self.columns = [c for c in columns if c.name not in clocks]
         self.errors = [c for c in self.columns if is_error(c)] if self.steady else []
-        behaved = by_behaviour([c for c in self.columns if c not in self.errors], self.run)
+        self.usable = [c for c in self.columns if c not in self.errors and not is_size(c.name)]
+        behaved = by_behaviour(self.usable, self.run)
         self.reasons = behaved.reasons
         self.found = assign(behaved.candidates)
         self.run_names = [run.name for run in self.runs]
@@ -170,7 +172,7 @@ class MapGuess:
                     draft.after = [f"# or: {', '.join(others)}"]
                 if role in _BIASES:
                     draft.put("bias", _BIASES[role], "calibration error that all rows share")
-        absent = AbsentChannels(self.found, self.columns, self.stated, self.run_names)
+        absent = AbsentChannels(self.found, self.usable, self.stated, self.run_names)
         tables = [*self._files(), *self._time_tables(), *self._wheel_tables(first)]
         if "load" not in self.found.roles():
             tables.append(absent.load(len(self.labels)))
@@ -202,7 +204,7 @@ class MapGuess:
         constants, explained = self._constants(), []
         for name, group in drafts.items():
             evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
-                             self.columns, self.reasons)  # fmt: skip
+                             self.usable, self.reasons)  # fmt: skip
             for one in evidence:
                 if not group[one.role].is_marked:  # one mark suffices
                     one.against = one.against or doubts.get(one.role, "")
