@@ -12,10 +12,9 @@ import numpy as np
 from soilml.errors import FitError, InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import wheels_by_gear
-from soilml.log_import.channels.runs import as_rows, runs_of, runs_of_rows
+from soilml.log_import.channels.runs import runs_of, runs_of_rows
 from soilml.log_import.channels.shared_errors import largest_errors
-from soilml.log_import.guesses.columns import is_size, liveliest
-from soilml.log_import.guesses.other_columns import with_other_columns
+from soilml.log_import.guesses.columns import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import log_files
@@ -28,7 +27,6 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 
 PathLike = str | os.PathLike[str]
-_LOOKED = 8  # Runs among which a lively one is looked for
 _MOST_LEFT = 5  # Most rows of tables of which is said why they are left out
 
 
@@ -116,10 +114,7 @@ def import_recordings(
         for wheel, (_, own) in zip(wheels, parts, strict=True)
         if i in own
     ]
-    wrong = []
-    for wheel in wheels:
-        example = as_rows(recordings[0], "") if steady else liveliest(wheel.runs[:_LOOKED])
-        wrong += with_other_columns(wheel.hints(), wheel.wheel, example, steady)
+    wrong = [hint for wheel in wheels for hint in wheel.hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
     groups = [(w.wheel, run, w.kept[k]) for run, w, k in by_run]

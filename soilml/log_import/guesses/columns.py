@@ -239,7 +239,12 @@ def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -
 
 
 def _unit_by_name(name: str) -> str:
-    """The unit that ends a name; "" where it contradicts the rest, as newton does in `v_N`."""
+    """The unit that ends a name; "" where it contradicts the rest, as newton does in `v_N`.
+
+    What an analogue-digital converter gives are counts.
+    """
+    if "adc" in words_of(name):
+        return "count"
     unit = unit_in_name(name)
     if not unit or len(unit) > 1:
         return unit

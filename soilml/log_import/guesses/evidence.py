@@ -16,7 +16,7 @@ from soilml.log_import.channels.inputs import Inputs, moving
 from soilml.log_import.checks.row_hints import FAR_FROM_WEIGHT
 from soilml.log_import.checks.speed_hints import slip_without_cause
 from soilml.log_import.guesses.columns import Candidate, says_role, wheel_word
-from soilml.log_import.guesses.draft import Draft
+from soilml.log_import.guesses.draft import Draft, driving_means, travel_over_rotation
 from soilml.log_import.mapping.channel_map import UNITS
 from soilml.log_import.mapping.written_map import Marked
 
@@ -163,15 +163,6 @@ def as_table(evidence: Iterable[GuessEvidence]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _means(inputs: Inputs) -> dict[str, Floats]:
-    """Means (blocks,) of the channels over about a second of driving."""
-    kept = np.flatnonzero(moving(inputs))
-    width = max(1, min(round(1.0 / inputs.step), kept.size // 60))
-    blocks = kept[: kept.size // width * width].reshape(-1, width)
-    means = {role: own[blocks].mean(axis=1) for role, own in inputs.values.items()}
-    return {role: own for role, own in means.items() if np.isfinite(own).any()}
-
-
 def _confirmed(
     found: Mapping[str, GuessEvidence],
     drafts: Mapping[str, Draft],
@@ -180,16 +171,14 @@ def _confirmed(
     columns: Sequence[Candidate],
 ) -> Iterable[tuple[str, str]]:
     """Roles that another channel confirms, and how."""
-    means, radius = _means(inputs), constants.get("radius", 0.0)
+    means, radius = driving_means(inputs), constants.get("radius", 0.0)
     rotation = [r for r in ("rim_speed", "wheel_speed", "wheel_angle") if r in found]
     travel = [r for r in ("ground_speed", "position") if r in found]
-    rim = means.get("rim_speed", means.get("wheel_speed"))
-    if rotation and travel and rim is not None and "ground_speed" in means:
+    ratio = travel_over_rotation(means)
+    if rotation and travel and ratio.size:
         turning = rotation[0]
         gear = float(drafts[turning].keys.get("gear_ratio", 1.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.abs(means["ground_speed"] / rim) * gear
-        ratio = ratio[np.isfinite(ratio)]
+        ratio = gear * ratio[np.isfinite(ratio)]
         radius_here = 1.0 if turning == "rim_speed" else radius
         if ratio.size and _travels_by_itself(ratio):
             low, high = (float(x) for x in np.percentile(ratio, [5, 95]))
@@ -262,12 +251,12 @@ def _impossible(inputs: Inputs, constants: Mapping[str, float]) -> dict[str, str
         if role in inputs.values and np.isfinite(inputs.values[role][driven]).any()
     }
     found: dict[str, str] = {}
-    means = _means(inputs)
-    rim, load = means.get("rim_speed", means.get("wheel_speed")), means.get("load", 1.0)
-    if rim is not None and {"ground_speed", "torque"} <= means.keys():
+    means = driving_means(inputs)
+    ratio = travel_over_rotation(means)
+    if ratio.size and "torque" in means:
         with np.errstate(divide="ignore", invalid="ignore"):
-            alike = slip_without_cause(means["ground_speed"] / rim, means["torque"] / load)
-        if alike:
+            effort = means["torque"] / means.get("load", 1.0)
+        if slip_without_cause(ratio, effort):
             why = "it follows the rotation however much the wheel works: computed from it?"
             found |= dict.fromkeys(("ground_speed", "position"), why)
     load = sizes.get("load", inputs.constants.get("load", 0.0))

@@ -116,8 +116,7 @@ def _is_alike(candidate: Candidate, moments: bool) -> bool:
 def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
     """Give the load, the pull and the torque of alike columns the roles that they behave as.
 
-    What the first wheel's sensor shows holds for those of the others; a place along the axis of
-    the load is the sinkage.
+    A place along the axis of the load is the sinkage.
     """
     of_forces = families(c for c in candidates if _is_alike(c, False))
     of_moments = families(c for c in candidates if _is_alike(c, True))
@@ -160,8 +159,6 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
             (("load", of_forces), ("drawbar_pull", of_forces), ("torque", of_moments))
             if role in given and own]  # fmt: skip
     found = _rescored(candidates, forces, moments, {r: [a] for r, a in given.items()})
-    for own in (*of_forces[1:], *of_moments[1:]):
-        found = _as_first(found, own, dict(axes), own in of_moments)
     vertical = dict(axes).get("load", "")
     if vertical and not isinstance(reasons["load"], Marked):
         found, sinkage = with_sinkage_along(found, vertical)
@@ -170,16 +167,6 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
                 f"CHANGE: a place along {vertical}, the axis of the load: is it the wheel's height?"
             )
     return Behaved(found, reasons)
-
-
-def _as_first(
-    candidates: list[Candidate], family: dict[str, Candidate], axes: dict[str, str], moments: bool
-) -> list[Candidate]:
-    """Give the columns of a further sensor the roles that the first one's axes have."""
-    roles = ("torque",) if moments else ("load", "drawbar_pull")
-    given = {r: [family[a].address] for r, a in axes.items() if r in roles and a in family}
-    members = [*family.values()]
-    return _rescored(candidates, [] if moments else members, members if moments else [], given)
 
 
 def _named(

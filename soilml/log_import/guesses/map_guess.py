@@ -46,7 +46,6 @@ from soilml.log_import.mapping.written_map import (
     Marked,
     WrittenMap,
     WrittenTable,
-    key_line,
     toml_value,
 )
 from soilml.log_import.recording import Recording
@@ -56,9 +55,6 @@ _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of
 _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
-_OF_GEAR = re.compile(
-    r"(?i)(?<![a-z])((?:width|wheel|b|w|lug|grouser|h)[_-]?\d+(?:mm)?)(?![a-z0-9])"
-)
 #: Calibration errors that all rows share, where nothing states one.
 _BIASES = {"torque": "2 %", "load": "1 %"}
 
@@ -293,8 +289,6 @@ class MapGuess:
                 table.put(key, f"{value} +- 1 %", "by the names")
                 tables.append(table)
             return tables
-        matches = [_OF_GEAR.search(name) for name in self.run_names]
-        names = dict.fromkeys(match[1] for match in matches if match)
         for key in ("radius", "diameter"):
             if key in stated and not wheel.keys:
                 value, line = stated[key]
@@ -304,12 +298,6 @@ class MapGuess:
                 wheel.put(key, f"{value if ' ' in value else f'{value} m'} +- 1 %", why)
         if not wheel.keys:
             self._put_implied_radius(wheel, drafts)
-        if len(names) > 1 and all(matches):
-            why = (
-                f"the names say {', '.join(list(names)[:4])}; where these are wheels: [gears.NAME]"
-            )
-            line = key_line("gear_from", _OF_GEAR.pattern, f"{why} of the model file")
-            wheel.after.append(f"# {line}")
         return [wheel]
 
     def _put_implied_radius(self, wheel: WrittenTable, drafts: dict[str, Draft]) -> None:
