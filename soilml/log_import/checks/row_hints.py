@@ -27,18 +27,7 @@ _OTHER_RADIUS = 0.15  # Largest slip that odometry with another radius gives
 _NO_SLIP = 1e-6  # Slip of rows whose travel and rotation are one measurement
 _LEAST_LOAD = 1.0  # Load, N, below which no wheel is driven: it is then rather in kN
 FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
-#: Mistakes that make T / (W r) too large, by factor. One of thousand is of the torque, or where the
-#: load is that of no wheel, of the load; and those that make it too small.
-_TOO_LARGE = (
-    (9.80665, "the load is in kg and was read as N"),
-    (100.0, "the torque is in N cm and was read as N m"),
-)
-_MILLI = (1000.0, "the torque is in mN m and was read as N m")
-_KILO = (1000.0, "the load is in kN and was read as N")
-_TOO_SMALL = (
-    (1000.0, "the torque is in kN m, or the radius in mm"),
-    (9.80665, "the torque is in kgf m"),
-)
+_BY_UNIT = 4.0  # How far from the usual T / (W r) another unit may bring it, as a factor
 _OURS = "1 - v/(r omega)"
 
 
@@ -267,23 +256,37 @@ class RowsToCheck:
             yield Hint("constant-reading", f"{text}dead", about[:1], wrong=False)
 
     def _traction_cause(self, traction: float, load: float) -> str:
-        """The likely cause of T / (W r) out of its range, by the map where there is one."""
-        cause = traction_cause(traction, load)
+        """The likely cause of T / (W r) outside of its range; "" where it is inside.
+
+        Of several mistakes, that whose correction comes nearest to a usual wheel.
+        traction, load: In the middle of the rows; load in N.
+        """
+        if LEAST_TRACTION <= traction <= MOST_TRACTION:
+            return ""
         role = self._channel("torque", "motor_current")
-        if not cause or self.wheel is None or not role or self.wheel.radius is None:
+        ratio = self.wheel.channels[role].gear_ratio.value if self.wheel and role else 1.0
+        if ratio > 1.0 and LEAST_TRACTION < traction / ratio < MOST_TRACTION:
+            return f"[{role}] is at the wheel already; remove gear_ratio"
+        factors = [(1.0 / 9.80665, "the load is in kg and was read as N")]
+        if role == "motor_current":
+            factors += [(1e-3, "torque_constant is in mN m/A, or the current in mA")]
+        elif role and spelling(self._unit(role)) == "mN*m":
+            factors += [(1e3, f"[torque] is in N m, and was read as {self._unit(role)}")]
+        else:
+            factors += [(1e3, "the torque is in kN m, or the radius in mm"),
+                        (9.80665, "the torque is in kgf m"),
+                        (1e-2, "the torque is in N cm and was read as N m"),
+                        (1e-3, "the load is in kN and was read as N") if load < _LEAST_LOAD else
+                        (1e-3, "the torque is in mN m and was read as N m")]  # fmt: skip
+        distance, cause = min((abs(np.log(max(traction * factor, 1e-30) / USUAL_TRACTION)), text)
+                              for factor, text in factors)  # fmt: skip
+        if distance < np.log(_BY_UNIT):
             return cause
-        channel, current = self.wheel.channels[role], role == "motor_current"
+        if role == "motor_current":
+            return "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
         if traction > MOST_TRACTION:
-            ratio = channel.gear_ratio.value
-            if ratio > 1.0 and 0.02 < traction / ratio < 1.0:
-                return f"[{role}] is at the wheel already; remove gear_ratio"
-            if current and 0.02 < traction / 1000.0 < 1.0:
-                return "torque_constant is in mN m/A, or the current in mA"
-            return "the radius is in another unit" if self.wheel.radius.value < 0.01 else cause
-        if spelling(channel.unit) == "mN*m" and 0.02 < 1000.0 * traction < MOST_TRACTION:
-            return f"[torque] is in N m, and was read as {channel.unit}"
-        wrong = "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
-        return wrong if current else cause
+            return "the torque is wrong by a gear ratio, or the radius by its unit"
+        return "the torque lacks a gear ratio, or its sensor is dead"
 
     def _pull(self) -> Iterator[Hint]:
         if not {"drawbar_pull", "load"} <= self.rows.keys():
@@ -334,24 +337,6 @@ class RowsToCheck:
                 f"sinkage is {float(np.median(sinkage)):.3g} m in the middle of the rows: probably "
             )
             yield Hint("sign", f"{text}its sign is turned", ("sinkage",), wrong=False)
-
-
-def traction_cause(traction: float, load: float) -> str:
-    """The likely cause of T / (W r) outside of its range; "" where it is inside.
-
-    traction, load: In the middle of the rows; load in N.
-    """
-    if LEAST_TRACTION <= traction <= MOST_TRACTION:
-        return ""
-    if traction > MOST_TRACTION:
-        mistakes = (*_TOO_LARGE, _KILO if load < _LEAST_LOAD else _MILLI)
-        options = [(traction / factor, text) for factor, text in mistakes]
-        other = "the torque is wrong by a gear ratio, or the radius by its unit"
-    else:
-        options = [(traction * factor, text) for factor, text in _TOO_SMALL]
-        other = "the torque lacks a gear ratio, or its sensor is dead"
-    distance, text = min((abs(np.log(max(q, 1e-30) / USUAL_TRACTION)), text) for q, text in options)
-    return text if distance < np.log(4.0) else other
 
 
 def falls_with_slip(rows: Mapping[str, Floats]) -> bool:
