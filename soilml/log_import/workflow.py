@@ -27,6 +27,7 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 
 PathLike = str | os.PathLike[str]
+_MOST_SIZES = 12  # Most sizes of wheels in one table
 _MOST_LEFT = 5  # Most rows of tables of which is said why they are left out
 
 
@@ -194,7 +195,7 @@ def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[R
             if is_size(name) and dimension(recording.units.get(name, "m")) == "m":
                 sizes.setdefault(name, set()).update(np.unique(values[np.isfinite(values)]))
     for name, found in sizes.items():
-        if len(found) > 1:
+        if 1 < len(found) <= _MOST_SIZES:
             text = (
                 f"the column {name!r} says {', '.join(f'{size:g}' for size in sorted(found)[:4])}: "
                 "rows of several wheels. Give each a gear ([wheel] gear_from, [gears.NAME]), or a "

@@ -65,10 +65,12 @@ COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index",
 _HEADS = ("geschwindigkeit", "drehzahl", "spannung", "pressung", "verschiebung", "durchmesser",
           "radius", "einsinkung", "tiefe", "breite", "länge", "laenge", "fläche", "flaeche",
           "druck", "kraft", "last", "moment", "strom", "winkel", "weg")  # fmt: skip
-#: Words of columns with the size of the wheel of each row.
+#: Words of columns with the size of the wheel of each row, and their signs alone.
 _SIZES = re.compile(
-    r"(?:radius|radio|rayon|raggio|dia|diam|di[aáà]m[eèé]tr[eo]|diameter|durchmesser|width|breite)"
+    r"radius|radio|rayon|raggio|dia|diam|di[aáà]m[eèé]tr[eo]|diameter|durchmesser|width|breite|"
+    r"largeur|ancho|larghezza|grouser|lug|cleat|stollen"
 )
+_SIGNS_OF_SIZES = re.compile(r"[rdb][ _]?w?", re.IGNORECASE)
 _SIDE = re.compile(r"(?:(?<=[a-z_. ])[LR]|[_. ]?(?:[lr]|left|right)(?![a-z])|\d)$")
 _UNCLEAR = 0.5  # What puts a speed of a side, without another word, before other guesses
 _MOST_TEXTS = 12  # Most columns of text that are listed
@@ -80,8 +82,9 @@ def words_of(name: str) -> list[str]:
 
 
 def is_size(name: str) -> bool:
-    """Whether a name is that of a radius, a diameter or a width."""
-    return any(_SIZES.fullmatch(word) for word in words_of(name))
+    """Whether a name is that of a radius, a diameter or a width, or of grousers."""
+    words = parts_of(words_of(name))
+    return bool(_SIGNS_OF_SIZES.fullmatch(name) or any(map(_SIZES.fullmatch, words)))
 
 
 def parts_of(words: Sequence[str]) -> list[str]:

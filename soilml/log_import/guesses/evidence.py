@@ -90,7 +90,8 @@ def weigh(
     """The evidence for each channel of a wheel that is a column.
 
     inputs: Samples as the drafts read them; None where they cannot be read.
-    constants: Stated `radius` (m), and `weight` (N) on each wheel, as far as they are known.
+    constants: Stated `radius` (m), and `weight` (N) on each wheel with the `least_weight` that it
+        may be where nothing says how many carry it, as far as they are known.
     seconds: The next columns by role.
     shown: What the behaviour of several alike columns has shown, by role.
     """
@@ -260,8 +261,11 @@ def _impossible(inputs: Inputs, constants: Mapping[str, float]) -> dict[str, str
             why = "it follows the rotation however much the wheel works: computed from it?"
             found |= dict.fromkeys(("ground_speed", "position"), why)
     load = sizes.get("load", inputs.constants.get("load", 0.0))
-    share = load / constants["weight"] if "weight" in constants else 1.0
-    if "load" in sizes and not 1.0 / FAR_FROM_WEIGHT < share < FAR_FROM_WEIGHT:
+    if "load" in sizes and "weight" in constants and not (
+        constants["least_weight"] < FAR_FROM_WEIGHT * load
+        and load < FAR_FROM_WEIGHT * constants["weight"]
+    ):  # fmt: skip
+        share = load / constants["weight"]
         found["load"] = f"it is {share:.2g} times what the stated mass gives for each wheel"
     if load > 0.0 and "torque" in sizes:
         low, high = _LEVER if radius > 0.0 else _ANY_LEVER

@@ -39,7 +39,7 @@ from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, key
 from soilml.log_import.guesses.evidence import as_table, mark, weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.roles import assign, axle_of
-from soilml.log_import.guesses.wheel_radius import PLAUSIBLE, radius_of_slip
+from soilml.log_import.guesses.wheel_radius import COMPUTED, PLAUSIBLE, radius_of_slip
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
 from soilml.log_import.mapping.written_map import (
@@ -52,6 +52,7 @@ from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
+_MOST_WHEELS = 8  # Wheels that may share a mass, where nothing says how many do
 _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
@@ -85,7 +86,8 @@ class MapGuess:
         columns = candidates_of(self.run.recordings, self.steady > 0)
         self.columns = [c for c in columns if c.name not in clocks]
         self.errors = [c for c in self.columns if is_error(c)] if self.steady else []
-        self.usable = [c for c in self.columns if c not in self.errors and not is_size(c.name)]
+        sizes = [c for c in self.columns if is_size(c.name) and c.kind in (None, "m")]
+        self.usable = [c for c in self.columns if c not in self.errors and c not in sizes]
         behaved = by_behaviour(self.usable, self.run)
         self.reasons = behaved.reasons
         self.found = assign(behaved.candidates)
@@ -217,6 +219,8 @@ class MapGuess:
             count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
             mass, _, unit = stated["mass"][0].partition(" ")
             found["weight"] = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
+            known = "wheels" in stated or len(self.found.wheels) > 1
+            found["least_weight"] = found["weight"] / (1 if known else _MOST_WHEELS)
         return found
 
     def _head(self) -> list[str]:
@@ -312,10 +316,12 @@ class MapGuess:
         slips = [*self.found.others.get("slip", [])]
         slips += [self.found.shared["slip"]] if "slip" in self.found.shared else []
         if inputs is not None and slips:
-            radius = gear * radius_of_slip(inputs, slips[0], self.run)
-            if PLAUSIBLE[0] < radius < PLAUSIBLE[1]:
+            radius, scatter = radius_of_slip(inputs, slips[0], self.run)
+            if PLAUSIBLE[0] < gear * radius < PLAUSIBLE[1]:
                 why = f"v / (omega (1 - slip)) with the slip of the column {slips[0].address!r}"
-                wheel.put("radius", f"{radius:.3g} m +- 1 %", why)
+                if scatter > COMPUTED:
+                    why = Marked(f"CHANGE: {why}, which was perhaps set and not measured")
+                wheel.put("radius", f"{gear * radius:.3g} m +- 1 %", why)
                 return
         ratio = gear * fastest_ratio(inputs) if inputs is not None and needed else math.nan
         hint = ""

@@ -271,6 +271,33 @@ def test_kinds_of_files_with_the_number_of_the_run(tmp_path, capsys):
     assert "run 2: no file of the kind 'ft'" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["Raddurchmesser (mm)", "D [mm]", "largeur (mm)", "r_w [m]"])
+def test_sizes_of_wheels_by_other_names_are_said(name, tmp_path, capsys):
+    log = write(tmp_path / "t.csv", {
+        name: [200, 200, 300, 300], "pass": [1, 2, 1, 2], "load [N]": [60] * 4,
+        "slip [-]": [0.1, 0.3, 0.1, 0.3], "torque [Nm]": [1.3, 2, 1.6, 2.4]})  # fmt: skip
+    text = init(tmp_path, [log])
+    assert imported(tmp_path, [log], text) == 0 and "[sinkage]" not in text
+    assert f"the column {name.split(' [')[0].split(' (')[0]!r} says" in capsys.readouterr().err
+    rows = np.genfromtxt(tmp_path / "runs.csv", delimiter=",", names=True, encoding=None)
+    assert rows["pass"].tolist() == [1, 2, 1, 2]
+
+
+@pytest.mark.parametrize("was_set", [True, False])
+def test_a_radius_by_a_slip_that_was_set_is_marked(was_set, tmp_path):
+    rng = np.random.default_rng(9)
+    d = drive(rng, (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    stage = np.clip(((d.t - 4) // 12).astype(int), 0, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slip = np.nan_to_num(1.0 - d.v / (RADIUS * d.omega))
+    slip = np.choose(stage, [0.07, 0.26, 0.46]) if was_set else slip
+    log = write(tmp_path / "log.csv", {
+        "time [s]": d.t, "omega [rad/s]": d.omega, "v [m/s]": d.v, "slip [-]": slip,
+        "torque [Nm]": d.torque, "Fz [N]": d.load}, digits=6)  # fmt: skip
+    text = init(tmp_path, [log])
+    assert "+- 1 %" in text and ("perhaps set and not measured" in text) == was_set
+
+
 def test_files_of_one_run_in_a_folder_each(tmp_path):
     logs = []
     for k, slip in enumerate((0.1, 0.3)):
