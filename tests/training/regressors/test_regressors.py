@@ -16,7 +16,12 @@ from training.regressors.rbf_expansion import rbf
 from training.regressors.row_groups import folds_of
 from training.regressors.tiled_cholesky import tiles_of
 
-ALL = [LSSVM(gamma=10.0, width=1.0), FixedSizeLSSVM(gamma=10.0, width=1.0), LinearGaussian(), GaussianMLP()]
+ALL = [
+    LSSVM(gamma=10.0, width=1.0),
+    FixedSizeLSSVM(gamma=10.0, width=1.0),
+    LinearGaussian(),
+    GaussianMLP(),
+]
 
 
 def curve(count, seed=0, noise=0.1):
