@@ -11,12 +11,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
-from soilml.config.model_settings import Effects, take_effects, take_prior
+from soilml.config.model_settings import Effects, changed_soil, take_effects, take_priors
 from soilml.errors import InputError
-from soilml.io.declared_settings import take_quantity
 from soilml.io.toml_settings import Settings
 from soilml.numerics.prior import Prior
-from soilml.parameters import check, declared, with_values
 from soilml.physics.effects import Effect
 from soilml.physics.model import Model
 from soilml.physics.soils import Soil
@@ -87,22 +85,8 @@ def _take(entry: Settings, effects: Effects, base: Case) -> CaseExplanation:
     weight = entry.number("weight")
     if not (math.isfinite(weight) and 0.0 < weight <= 1.0):
         entry.fail(f"weight is {weight:g}; needed is a probability above 0, at most 1")
-    own = entry.table("soil")
-    values = {
-        key: take_quantity(own, key, parameter.unit)
-        for key, parameter in declared(Soil).items()
-        if key in own
-    }
-    own.permit(declared(Soil))
-    own.finish()
-    soil = with_values(base.soil, values)
-    check(soil, f"{own.where}: ")
-    prior, settings = dict(base.prior), entry.table("prior")
-    for key, parameter in declared(Soil).items():
-        if key in settings:
-            prior[key] = take_prior(settings, key, unit=parameter.unit)
-    settings.permit(declared(Soil))
-    settings.finish()
+    soil = changed_soil(entry.table("soil"), base.soil)
+    prior = base.prior | take_priors(entry.table("prior"), Soil)
     model, gears = base.model, dict(base.gears)
     for effect in entry.tables("effect"):
         gear = effect.text("gear", "")

@@ -104,18 +104,24 @@ def take_soil(settings: Settings) -> tuple[Soil, dict[str, Prior], tuple[SoilTes
             base = soil(name)
         except InputError as error:
             settings.fail(str(error))
-        values = {
-            key: take_quantity(settings, key, parameter.unit)
-            for key, parameter in declared(Soil).items()
-            if key in settings
-        }
-        settings.permit(declared(Soil))
-        made = with_values(base, values)
-        check(made, f"{settings.where}: ")
+        made = changed_soil(settings, base)
     else:
         made = take_declared(Soil, settings)
-    settings.finish()
     return made, take_priors(priors, Soil), tests
+
+
+def changed_soil(settings: Settings, base: Soil) -> Soil:
+    """A soil with the values that a table has instead of its own."""
+    values = {
+        key: take_quantity(settings, key, parameter.unit)
+        for key, parameter in declared(Soil).items()
+        if key in settings
+    }
+    settings.permit(declared(Soil))
+    settings.finish()
+    made = with_values(base, values)
+    check(made, f"{settings.where}: ")
+    return made
 
 
 def _take_test(settings: Settings) -> SoilTest:

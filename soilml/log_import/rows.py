@@ -35,7 +35,8 @@ _MOST_WANDERING = 0.15
 _NO_SCATTER = 1e-9  # Share of a value below which a scatter is that of rounding
 #: Largest slip of a window: at 1 the wheel spins on the spot, and r omega and v say no more.
 _MOST_SLIP = 0.995
-_SIZES = ("wheel_radius", "wheel_width")  # Quantities that logs may have as columns of our names
+#: Quantities that no channel is, which logs may have as columns of our names.
+_CARRIED = ("wheel_radius", "wheel_width", "slip_angle", "pass", "progress", "load_direction")
 _OF_SAMPLES = ("wheel_angle", "position")  # Channels that only samples over time can be
 
 
@@ -101,14 +102,15 @@ def window_row(
             mean, error, _ = mean_error(series[name][rows], inputs.step)
             if error > 1e-12 * abs(mean):
                 std[name] = error
-    sizes = {name: float(np.nanmedian(v)) for name, v in _sizes(run).items()}
+    sizes = {name: float(np.nanmedian(v)) for name, v in _carried(run).items()}
     return WindowRow(window, means, values | sizes, std)
 
 
-def _sizes(run: Run) -> dict[str, Floats]:
-    """Radius and width of the wheel (n,), where the log has columns of these names."""
+def _carried(run: Run) -> dict[str, Floats]:
+    """What a log has in columns of our names, (n,); the first pass is 1, and 0 means another."""
     held = [recording.columns for recording in run.recordings]
-    return {name: own[column(name)] for own in held for name in _SIZES if column(name) in own}
+    return {name: own[column(name)] for own in held for name in _CARRIED if column(name) in own
+            and not (name == "pass" and np.any(own[name] < 1.0))}  # fmt: skip
 
 
 def _exact_speeds(
@@ -181,7 +183,7 @@ def table_rows(run: Run, conversion: Conversion) -> list[WindowRow]:
                 "steady run; needed is a speed or [slip], and no tare"
             )
         means[role], errors[role] = _readings(run, channel, count)
-    columns = conversion.of(means) | _sizes(run)
+    columns = conversion.of(means) | _carried(run)
     std = propagated(conversion, means, errors)
 
     def at(found: Mapping[str, Floats], i: int) -> dict[str, float]:
@@ -306,7 +308,7 @@ def rows_as_table(
                     # a channel that was set has no scatter: its error is not known, and not zero
                     some = std > _NO_SCATTER * max(abs(row.values[name]), _NO_SCATTER)
                     line[f"{column(name)}_std"] = std if some else float("nan")
-            for name in ("speed", *_SIZES):
+            for name in ("speed", *_CARRIED):
                 if name in row.values:
                     line[column(name)] = row.values[name]
             if timed:

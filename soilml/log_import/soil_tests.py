@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from unicodedata import combining, normalize
 
 import numpy as np
 
@@ -19,42 +20,53 @@ from soilml.log_import.recording import Recording
 from soilml.log_import.units import dimension, factor, unit_in_name
 from soilml.quantities import COLUMNS
 
-#: Words of the columns of a table of shear tests, and of a ring.
-_SHEAR = {"tau", "shear", "scher", "scherspannung", "schub", "taglio", "corte", "cisaillement"}
-_RING = {"angle", "winkel", "theta", "rotation"}
-_VERTICAL = {"vertical", "vertikal", "axial", "settlement", "dilation", "setzung"}
-_WAYS = {"displacement", "verschiebung", "weg"}
-_DIAMETER = {"d", "diameter", "dia", "durchmesser"}
-_CONFINING = {"confining", "cell", "zelldruck", "zell", "seitendruck", "lateral", "radial"}
-_DEVIATOR = {"deviator", "deviatoric", "deviatorspannung"}
+#: Words of the columns of tables of tests, without accents: beginnings of words from so many
+#: letters on, whole words below.
+_STEM = 4
+_SHEAR = ("tau", "shear", "scher", "schub", "tagli", "cort", "cisaill")
+_RING = ("angle", "angul", "angol", "winkel", "theta", "rotation")
+_VERTICAL = ("vert", "axia", "settl", "dilat", "setzung", "dv", "v")
+_WAYS = ("disp", "verschiebung", "weg", "travel", "desplaz", "deplac", "spost")
+_DIAMETER = ("d", "dia", "diam", "durchmesser")
+_VANE = ("vane", "flugel", "fluegel")
+_PORE = ("pore", "porewater", "poren", "u")
+_CONFINING = ("confin", "cell", "zell", "seitendruck", "lateral", "radial")
+_DEVIATOR = ("deviator",)
 #: Our column, its unit, and the words of which a name must have one; the first that fits counts.
-_QUANTITIES: tuple[tuple[str, str, set[str]], ...] = (
-    ("shear_stress_Pa", "Pa", _SHEAR | {"t", "strength"}),
-    ("normal_stress_Pa", "Pa", {"sigma", "normal", "normalspannung", "sn", "s", *_VERTICAL}),
-    ("pressure_Pa", "Pa", {"p", "pressure", "druck", "pressung", "contact", "stress", "q"}),
-    ("shear_displacement_m", "m", _SHEAR | {"j", "x", "horizontal", "scherweg"}),
-    ("inner_radius_m", "m", {"inner", "innen", "ri", "id"}),
-    ("outer_radius_m", "m", {"outer", "aussen", "außen", "ro", "ra", "od"}),
+_QUANTITIES: tuple[tuple[str, str, tuple[str, ...]], ...] = (
+    ("shear_stress_Pa", "Pa", (*_SHEAR, "t", "strength")),
+    ("normal_stress_Pa", "Pa", ("sigma", "normal", "sn", "s", *_VERTICAL)),
+    ("pressure_Pa", "Pa", ("p", "pres", "druck", "contact", "stress", "q")),
+    ("shear_displacement_m", "m", (*_SHEAR, "j", "x", "horiz", "orizz", "dh", "u")),
+    ("inner_radius_m", "m", ("inner", "innen", "ri", "id")),
+    ("outer_radius_m", "m", ("outer", "aussen", "ro", "ra", "od")),
     ("plate_diameter", "m", _DIAMETER),
-    ("plate_width_m", "m", {"width", "breite", "w"}),
-    ("plate_length_m", "m", {"length", "länge", "laenge", "l"}),
-    ("plate_radius_m", "m", {"r", "radius", "b"}),
-    ("sinkage_m", "m", {"z", "sinkage", "depth", "penetration", "einsinkung", "tiefe", "h"}),
-    ("displacement", "m", {"displacement", "verschiebung", "weg", "travel", *_VERTICAL}),
-    ("plate_area_m2", "m^2", {"area", "fläche", "flaeche", "a"}),
-    ("load_N", "N", {"load", "force", "f", "w", "fz", "kraft", "last", "n"}),
-    ("torque_Nm", "N m", {"torque", "moment", "t", "m", "drehmoment"}),
+    ("plate_width_m", "m", ("width", "breite", "largeur", "ancho", "larghezza", "w")),
+    ("plate_length_m", "m", ("length", "lange", "laenge", "longueur", "largo", "lunghezza", "l")),
+    ("plate_radius_m", "m", ("r", "radi", "rayon", "raggio", "b")),
+    ("sinkage_m", "m", ("z", "sink", "depth", "penetra", "einsink", "tief", "enfonc", "hundi",
+                        "affond", "h")),
+    ("displacement", "m", (*_WAYS, *_VERTICAL)),
+    ("plate_area_m2", "m^2", ("area", "aire", "flach", "flaech", "superfic", "a")),
+    ("shear_force", "N", _SHEAR),
+    ("load_N", "N", ("load", "force", "f", "w", "fz", "kraft", "last", "n", "charge", "carg",
+                     "carico", "fuerza", "forza")),
+    ("torque_Nm", "N m", ("torque", "moment", "t", "m", "drehmoment", "couple", "coppia", "par")),
     ("angle_rad", "rad", _RING),
-)
+)  # fmt: skip
 #: Columns by which a table is one of tests, and not of the runs of a wheel.
 _OF_TESTS = (
     {"shear_stress_Pa"}, {"torque_Nm", "angle_rad"}, {"torque_Nm", "outer_radius_m"},
     {"pressure_Pa"},
 )  # fmt: skip
 #: Words of stresses and torques beside those of the strength.
-_SECOND = {"pre", "preshear", "consolidation", "consol", "residual", "rest", "ultimate", "end"}
+_SECOND = ("pre", "preshear", "consol", "resid", "rest", "ultim", "end")
+#: Columns that a simulator with z upward has below zero.
+_UPWARD = ("sinkage_m", "displacement", "load_N")
+_OF_PLATES = ("plate", "plaque", "placa", "piastra", "penetra")
 _PLATES = {"plate_radius_m", "plate_diameter", "plate_width_m", "plate_area_m2"}
-_TEST = {"test", "run", "trial", "probe", "sample", "versuch", "specimen", "no", "id", "name"}
+_TEST = ("test", "run", "trial", "probe", "sample", "versuch", "specimen", "no", "id", "name",
+         "essai", "prova", "ensayo", "nr")  # fmt: skip
 #: How far a test advances, what is constant in it, and the share by which these jump to the next.
 _ADVANCE = ("shear_displacement_m", "sinkage_m", "displacement", "angle_rad")
 _CONSTANT, _BACK, _OTHER, _SELDOM = ("normal_stress_Pa", *sorted(_PLATES)), 0.5, 0.1, 0.25
@@ -95,23 +107,25 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
     own = recordings[0]
     if any(n not in TEXT and n.removesuffix("_std") in COLUMNS for n in own.columns):
         return None
-    if any({"vane", "flügel", "fluegel"} & {*parts_of(words_of(n))} for n in own.columns):
+    if any(_says(n, _VANE) for n in own.columns):
         raise InputError(
             f"{path}: vane tests are not read: they give the undrained strength alone; needed are "
             "plate, shear or triaxial tests"
         )
     found: dict[str, Floats] = {}
     taken, left_out = [], []
-    sheared = any({*parts_of(words_of(name))} & _SHEAR for name in own.columns)
+    sheared = any(_says(name, _SHEAR) for name in own.columns)
     if circles := _circles(path, own):
         return circles
     # of two stresses, the strength comes before the residual one, and the shearing before what
     # consolidated the sample
-    ordered = sorted(own.columns.items(), key=lambda c: bool({*words_of(c[0])} & _SECOND))
+    ordered = sorted(own.columns.items(), key=lambda c: _says(c[0], _SECOND))
     for name, values in ordered:
-        unit, words = _unit(own, name), {*parts_of(words_of(name)), *words_of(name)}
+        unit = _unit(own, name)
         kind = dimension(unit) if unit else None
-        column = _quantity(words, kind, {*found}, sheared)
+        weight = 9.80665 if kind == "kg" else 1.0  # a scale that shows the force in kg
+        kind = "N" if kind == "kg" else kind
+        column = _quantity(name, kind, {*found}, sheared)
         if column and not unit:
             raise InputError(
                 f"{path}: the column {name!r} states no unit; needed is one in its name, such as "
@@ -119,11 +133,15 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
             )
         if column:
             ours = next(u for c, u, _ in _QUANTITIES if c == column)
-            half = column.endswith("r_radius_m") and words & (_DIAMETER | {"id", "od"})
-            share = 0.5 if half else 1.0
-            found[column] = share * values * factor(unit, ours, f"{path}, column {name!r}")
-            taken.append(f"{'2 ' * bool(half)}{_our_name(column, sheared)} = {name!r} ({unit})")
-        elif not (words & _TEST and "test" not in found):
+            half = column.endswith("r_radius_m") and _says(name, (*_DIAMETER, "id", "od"))
+            share = weight * (0.5 if half else 1.0)
+            if column in _UPWARD and np.any(values) and not np.any(values > 0.0):
+                share = -share
+            kind = "kg" if weight > 1.0 else ours
+            found[column] = share * values * factor(unit, kind, f"{path}, column {name!r}")
+            sign = "-" * (share < 0.0) + "2 " * bool(half)
+            taken.append(f"{sign}{_our_name(column, sheared)} = {name!r} ({unit})")
+        elif not (_says(name, _TEST) and "test" not in found):
             left_out.append(repr(name))
     if "plate_radius_m" in found and "plate_length_m" in found and "plate_width_m" not in found:
         found["plate_width_m"] = found.pop("plate_radius_m")  # b of a strip is its width
@@ -135,6 +153,25 @@ def read_soil_tests(path: str | os.PathLike[str]) -> SoilTests | None:
         if radius:
             found["plate_radius_m"] = np.full(len(own), radius)
             taken.append(f"plate_radius_m = {radius:g} m, as the file or its name states")
+    if "shear_force" in found:
+        if "plate_area_m2" not in found:
+            raise InputError(
+                f"{path}: forces of a shear box need its area: a column such as 'area [cm^2]'"
+            )
+        area = found.pop("plate_area_m2")
+        found["shear_stress_Pa"] = found.pop("shear_force") / area
+        if "load_N" in found:
+            found["normal_stress_Pa"] = found.pop("load_N") / area
+    if (
+        of_plates
+        and "load_N" in found
+        and not _PLATES & found.keys()
+        and (any(_says(name, _OF_PLATES) for name in own.columns))
+    ):
+        raise InputError(
+            f"{path}: the size of the plate is missing; needed is a column such as "
+            "'plate radius [mm]', or a line before the header, such as '# plate radius: 50 mm'"
+        )
     plates = "load_N" in found and bool(_PLATES & found.keys())
     if not plates and not any(needed <= found.keys() for needed in _OF_TESTS):
         return None
@@ -156,23 +193,34 @@ def _unit(own: Recording, name: str) -> str:
     return unit if dimension(unit) else unit_in_name(name)
 
 
-def _quantity(words: set[str], kind: str | None, have: set[str], sheared: bool) -> str:
+def _says(name: str, known: Sequence[str], shortest: int = 1) -> bool:
+    """Whether a name has one of these words, or a word of `shortest` letters that begins so."""
+    words = {*parts_of(words_of(name)), *words_of(name)}
+    plain = ["".join(c for c in normalize("NFKD", w.casefold()) if not combining(c)) for w in words]
+    return any(
+        word == start or (len(start) >= _STEM and word.startswith(start))
+        for word in plain if len(word) >= shortest
+        for start in known
+    )  # fmt: skip
+
+
+def _quantity(name: str, kind: str | None, have: set[str], sheared: bool) -> str:
     """The column that a name and the kind of its unit mean; "" for none, and for one that is taken.
 
-    Without a unit only words of more than one letter count, so that the column is asked for it.
-    Beside a shear stress a vertical displacement is none of the shear.
+    Without a unit only words of some letters count, so that the column is asked for it. Beside a
+    shear stress a vertical displacement is none of the shear.
     """
-    across = words & (_VERTICAL | {"normal"}) - {"axial"}
-    if sheared and across and (kind == "m" or (kind is None and words & _WAYS)):
+    across = _says(name, (*_VERTICAL, "normal"))
+    if sheared and across and (kind == "m" or (kind is None and _says(name, _WAYS))):
         return ""
     for column, unit, known in _QUANTITIES:
         if kind is not None and kind != unit:
             continue
-        if words & {word for word in known if kind is not None or len(word) > 4}:
+        if _says(name, known, 1 if kind is not None else _STEM + 1):
             if column not in have:
                 taken = {"displacement", "shear_displacement_m" if sheared else "sinkage_m"} & have
                 return "" if column == "displacement" and taken else column
-            if not words & (_SHEAR | _SECOND | _VERTICAL) or kind != "Pa":
+            if not _says(name, (*_SHEAR, *_SECOND, *_VERTICAL)) or kind != "Pa":
                 continue
             return ""
     return ""
@@ -190,10 +238,10 @@ def _our_name(column: str, sheared: bool) -> str:
 def _names(own: Recording, found: dict[str, Floats]) -> tuple[str, list[str]]:
     """The column that names the test of each row, "" for none, and the names."""
     for name, cells in own.texts.items():
-        if {*words_of(name)} & _TEST or len(own.texts) == 1:
+        if _says(name, _TEST) or len(own.texts) == 1:
             return name, [cell or "unnamed" for cell in cells]
     for name, values in own.columns.items():
-        if {*words_of(name)} & _TEST and np.isfinite(values).all() and _in_groups(values, found):
+        if _says(name, _TEST) and np.isfinite(values).all() and _in_groups(values, found):
             return name, [f"{value:g}" for value in values]
     number = np.cumsum(_starts(found, len(own)))
     if not number.size or number[-1] == 0:
@@ -269,13 +317,13 @@ def _triaxial(own: Recording) -> Iterator[tuple[str, str]]:
     for name in reversed([*own.columns]):
         if dimension(_unit(own, name)) != "Pa":
             continue
-        words = {*parts_of(words_of(name)), *words_of(name)}
+        words = {*words_of(name)}
         sigma = bool(words & {"sigma", "σ", "s"})
-        if words & {"pore", "porewater", "poren", "u"}:
+        if _says(name, _PORE):
             yield "pore", name
-        elif words & _DEVIATOR or (sigma and {"1", "3"} <= words):
+        elif _says(name, _DEVIATOR) or (sigma and {"1", "3"} <= words):
             yield "deviator", name
-        elif words & _CONFINING or (sigma and "3" in words):
+        elif _says(name, _CONFINING) or (sigma and "3" in words):
             yield "cell", name
         elif sigma and "1" in words:
             yield "axial", name

@@ -18,6 +18,7 @@ _SPELLINGS = {
     "lb-in": "lbf*inch", "lbs": "lbf", "kgf": "kgf", "kp": "kgf", "gf": "kgf/1000",
     "kgfcm": "kgf*cm", "kgf-cm": "kgf*cm", "kg-cm": "kgf*cm", "kgcm": "kgf*cm", "kgm": "kgf*m",
     "kgfm": "kgf*m", "kgf-m": "kgf*m",
+    "oz in": "force_ounce*inch", "oz-in": "force_ounce*inch",
     "1/min": "rpm", "min-1": "rpm", "min^-1": "rpm", "u/min": "rpm", "r/min": "rpm",
     "rev/min": "rpm", "rpm": "rpm", "rps": "turn/s", "rev/s": "turn/s", "r/s": "turn/s",
     "tr/min": "rpm", "turns": "turn", "turn": "turn", "rev": "turn", "revs": "turn",
@@ -51,7 +52,7 @@ _EXACT = {"mNm": "mN*m", "MNm": "MN*m", "Nm": "N*m", "kNm": "kN*m", "G": "g_0", 
 _SUFFIXES = (
     "deg_s rad_s m_s mm_s cm_s m_s2 counts ticks rpm mnm nm rad deg degs mm cm ma ms us ns sec "
     "secs percent pct kgf mps mmps rps dps radps n m a s kg kn turns rev v lbf degps ncm newton "
-    "newtons amps inc mn mm_min cm_min m_min mv uv"
+    "newtons amps inc mn mm_min cm_min m_min mv uv pa kpa mpa psi nmm"
 )
 #: Per cent of something that a data sheet states.
 _SHARE = re.compile(

@@ -18,6 +18,7 @@ from soilml.log_import.checks.independence import with_shared_errors
 from soilml.log_import.checks.row_hints import RowsToCheck
 from soilml.log_import.checks.sensors import (
     dead_sensors,
+    drop_clipped,
     lifted_at_the_end,
     untared_load,
     untared_sensors,
@@ -105,22 +106,29 @@ class WheelRows:
         stretches = steady_windows(inputs.time, series, windows, left_out)
         self.stretches[i] += [s for s in stretches if s.why]
         kept = (s for s in stretches if not s.why)
-        return [window_row(s, inputs, quantities, run, self.conversion) for s in kept]
+        rows = [window_row(s, inputs, quantities, run, self.conversion) for s in kept]
+        self.computed += [replace(remark, text=f"run {run.name}: {remark.text}")
+                          for remark in drop_clipped(inputs, rows)]  # fmt: skip
+        return rows
 
     def hints(self) -> list[Remark]:
         """What says that the map is wrong, by all windows, left out or not."""
-        values = values_of([row for rows in self.rows for row in rows])
+        return unit_hints(self.log_map, self.wheel, self.runs[0]) + self._checked(self.rows, True)
+
+    def _checked(self, rows: Sequence[Sequence[WindowRow]], wrong: bool) -> list[Remark]:
+        """Hints at what is `wrong`, or merely odd, in rows of runs."""
+        values = values_of([row for own in rows for row in own])
         radius = self.wheel.radius.value if self.wheel.radius is not None else None
-        checked = RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints()
         of = f" of wheel {self.wheel.name}" if self.wheel.name else ""
-        return unit_hints(self.log_map, self.wheel, self.runs[0]) + [
+        return [
             Remark(hint.code, f"{self.log_map.source}{of}: {hint.text}", hint.about)
-            for hint in checked
-            if hint.wrong
+            for hint in RowsToCheck(values, radius, self.wheel, self.log_map.vehicle).hints()
+            if hint.wrong == wrong
         ]
 
     def remarks(self) -> list[Remark]:
-        """Dead and untared sensors; rows of a table that are left out."""
+        """Dead and untared sensors; odd rows, and rows of a table that are left out."""
+        self.computed += self._checked(self.kept, False)
         if self.log_map.runs.each_row:
             return self.computed + [
                 replace(s.why, text=f"row {s.start + 1:.0f} of {run.recordings[0].file.name} is "

@@ -12,11 +12,9 @@ import numpy as np
 from soilml.errors import FitError, InputError
 from soilml.io.table import Table
 from soilml.log_import.channels.gear_of_run import wheels_by_gear
-from soilml.log_import.channels.runs import as_rows, runs_of, runs_of_rows
+from soilml.log_import.channels.runs import runs_of, runs_of_rows
 from soilml.log_import.channels.shared_errors import largest_errors
-from soilml.log_import.checks.table_hints import table_hints
-from soilml.log_import.guesses.columns import liveliest, words_of
-from soilml.log_import.guesses.other_columns import with_other_columns
+from soilml.log_import.guesses.columns import is_size
 from soilml.log_import.mapping.log_map import LogMap, map_from, read_map
 from soilml.log_import.readers import read_log
 from soilml.log_import.readers.side_files import log_files
@@ -29,10 +27,8 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 
 PathLike = str | os.PathLike[str]
-_LOOKED = 8  # Runs among which a lively one is looked for
+_MOST_SIZES = 12  # Most sizes of wheels in one table
 _MOST_LEFT = 5  # Most rows of tables of which is said why they are left out
-#: Words of columns with the size of the wheel of each row.
-_SIZES = {"radius", "diameter", "durchmesser", "radio", "rayon", "raggio", "dia", "diam", "width"}
 
 
 def import_log(
@@ -119,10 +115,7 @@ def import_recordings(
         for wheel, (_, own) in zip(wheels, parts, strict=True)
         if i in own
     ]
-    wrong = []
-    for wheel in wheels:
-        example = as_rows(recordings[0], "") if steady else liveliest(wheel.runs[:_LOOKED])
-        wrong += with_other_columns(wheel.hints(), wheel.wheel, example, steady)
+    wrong = [hint for wheel in wheels for hint in wheel.hints()]
     if wrong and not accept:
         raise InputError(f"{wrong[0]} (or pass --accept to import it as it is)")
     groups = [(w.wheel, run, w.kept[k]) for run, w, k in by_run]
@@ -137,7 +130,6 @@ def import_recordings(
     else:
         remarks += _without_torque(table)
     remarks += _several_wheels(table, recordings)
-    remarks += table_hints(table.columns, table.columns.get("wheel_radius_m"))
     bias, shared = largest_errors([wheel.shared_errors() for wheel in wheels])
     radii = {wheel.wheel.radius.value if wheel.wheel.radius else None for wheel in wheels}
     radius = radii.pop() if len(radii) == 1 else None
@@ -200,10 +192,10 @@ def _several_wheels(table: Table, logs: Sequence[Sequence[Recording]]) -> list[R
     sizes: dict[str, set[float]] = {}
     for recording in (own for log in logs for own in log):
         for name, values in recording.columns.items():
-            if {*words_of(name)} & _SIZES and dimension(recording.units.get(name, "m")) == "m":
+            if is_size(name) and dimension(recording.units.get(name, "m")) == "m":
                 sizes.setdefault(name, set()).update(np.unique(values[np.isfinite(values)]))
     for name, found in sizes.items():
-        if len(found) > 1:
+        if 1 < len(found) <= _MOST_SIZES:
             text = (
                 f"the column {name!r} says {', '.join(f'{size:g}' for size in sorted(found)[:4])}: "
                 "rows of several wheels. Give each a gear ([wheel] gear_from, [gears.NAME]), or a "

@@ -133,7 +133,27 @@ def runs_of_rows(logs: Sequence[Sequence[Recording]], log_map: LogMap) -> list[R
 def matched_files(
     logs: Sequence[Sequence[Recording]], kinds: Sequence[FileKind]
 ) -> dict[str, list[Member]]:
-    """Recordings by the name of their run, with the kind of their file."""
+    """Recordings by the name of their run, with the kind of their file.
+
+    Raises `InputError` where the name of a file has no pattern, and where a run lacks a kind.
+    """
+    found = files_by_run(logs, kinds)
+    for key, members in found.items():
+        there = [kind.name for _, kind in members if kind is not None]
+        lacking = [kind.name for kind in kinds if kind.name not in there]
+        if lacking:
+            raise InputError(
+                f"run {key}: no file of the kind {lacking[0]!r}; there is "
+                f"{', '.join(str(recording.file) for recording, _ in members)}; give it, or leave "
+                "out the others of this run"
+            )
+    return found
+
+
+def files_by_run(
+    logs: Sequence[Sequence[Recording]], kinds: Sequence[FileKind]
+) -> dict[str, list[Member]]:
+    """Recordings by the name of their run, of which some may lack a kind of file."""
     files = [log[0].file for log in logs]
     names = run_names(files)
     if not kinds:
@@ -153,14 +173,6 @@ def matched_files(
         for recording in log:
             own = matching[0].name + (f"/{recording.name}" if recording.name else "")
             found.setdefault(key, []).append((replace(recording, name=own), matching[0]))
-    for key, members in found.items():
-        there = [kind.name for _, kind in members if kind is not None]
-        lacking = [kind.name for kind in kinds if kind.name not in there]
-        if lacking:
-            raise InputError(
-                f"run {key}: no file of the kind {lacking[0]!r}; there is "
-                f"{', '.join(str(recording.file) for recording, _ in members)}"
-            )
     return found
 
 
@@ -191,8 +203,15 @@ def _words(text: str) -> list[str]:
 
 
 def key_words(name: str, without: set[str]) -> list[str]:
-    """The words of a run's name that say which run, without those that say which kind of file."""
-    return [word for word in _words(name) if word not in without]
+    """The words of a run's name that say which run, without those that say which kind of file.
+
+    Of a kind with a number, as in `wheel3`, the number is left.
+    """
+    left = []
+    for word in _words(name):
+        kind = word if word in without else word.rstrip("0123456789")
+        left.append(word.removeprefix(kind) if kind in without else word)
+    return [word for word in left if word]
 
 
 def _with_times(name: str, members: list[Member], log_map: LogMap) -> Run:

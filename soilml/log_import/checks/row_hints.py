@@ -13,7 +13,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.checks.slip_definition import definition_by_speeds
-from soilml.log_import.checks.speed_hints import rate_hints
+from soilml.log_import.checks.speed_hints import rate_hints, slip_without_cause
 from soilml.log_import.mapping.log_map import Vehicle, WheelMap
 from soilml.log_import.units import spelling
 
@@ -23,21 +23,11 @@ LEAST_TRACTION, MOST_TRACTION, USUAL_TRACTION = 0.02, 1.2, 0.3
 _MOST_PULL, _MOST_LEVER, _MOST_SINKAGE = 1.2, 0.8, 0.7
 _USUAL_SINKAGE = (0.02, 0.7)  # Range of the usual sinkage over the radius
 _SLIPS = 0.05  # Slip from which a driving wheel has a torque worth judging
+_OTHER_RADIUS = 0.15  # Largest slip that odometry with another radius gives
 _NO_SLIP = 1e-6  # Slip of rows whose travel and rotation are one measurement
 _LEAST_LOAD = 1.0  # Load, N, below which no wheel is driven: it is then rather in kN
-_FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
-#: Mistakes that make T / (W r) too large, by factor. One of thousand is of the torque, or where the
-#: load is that of no wheel, of the load; and those that make it too small.
-_TOO_LARGE = (
-    (9.80665, "the load is in kg and was read as N"),
-    (100.0, "the torque is in N cm and was read as N m"),
-)
-_MILLI = (1000.0, "the torque is in mN m and was read as N m")
-_KILO = (1000.0, "the load is in kN and was read as N")
-_TOO_SMALL = (
-    (1000.0, "the torque is in kN m, or the radius in mm"),
-    (9.80665, "the torque is in kgf m"),
-)
+FAR_FROM_WEIGHT = 2.5  # Factor between a load and its share of the mass that no slope explains
+_BY_UNIT = 4.0  # How far from the usual T / (W r) another unit may bring it, as a factor
 _OURS = "1 - v/(r omega)"
 
 
@@ -89,6 +79,13 @@ class RowsToCheck:
         """What to change in the map; nothing for a table."""
         return f"; write {line} in [{role}]" if self.wheel is not None else ""
 
+    def _effort(self) -> Floats:
+        """Torque over load (rows,), m; NaN where it is not known."""
+        slip = self.rows["slip"]
+        torque, load = (self.rows.get(n, np.full(slip.shape, np.nan)) for n in ("torque", "load"))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(torque / load)
+
     def _angles(self) -> Iterator[Hint]:
         for name in ("slope", "slip_angle"):
             largest = float(np.max(np.abs(self._known(name)), initial=0.0))
@@ -101,7 +98,7 @@ class RowsToCheck:
         """Rotation and travel, from which slip follows."""
         if self.wheel is not None and {"rim_speed", "speed"} <= self.rows.keys():
             for code, text, about in rate_hints(
-                self.wheel, self.rows["rim_speed"], self.rows["speed"]
+                self.wheel, self.rows["rim_speed"], self.rows["speed"], self._effort()
             ):
                 yield Hint(code, text, about)
 
@@ -113,7 +110,15 @@ class RowsToCheck:
         if slip.size < 3:
             return
         lowest, largest = float(np.min(slip)), float(np.max(np.abs(slip)))
-        if 0.9 < lowest < 1.0:
+        by_speeds = self.wheel is not None and not logged
+        alike = by_speeds and slip_without_cause(1.0 - self.rows["slip"], self._effort())
+        if alike and largest < _OTHER_RADIUS:  # more is a slip that was set
+            text = (
+                f"slip is {float(np.median(slip)):.2g} in all rows, however much the wheel works: "
+                "was the travel computed from the rotation of the wheel?"
+            )
+            yield Hint("one-sensor", text, ("speed", "slip"), wrong=False)
+        elif 0.9 < lowest < 1.0:
             text = (
                 f"slip is {lowest:.2g} or more in all rows: probably the rotation was measured "
                 "before a gearbox, or is in another unit"
@@ -134,7 +139,7 @@ class RowsToCheck:
         elif largest < _NO_SLIP:
             text = "slip is 0 in all rows: was the travel computed from the rotation of the wheel?"
             yield Hint("one-sensor", text, ("slip",), wrong=False)
-        elif largest < 0.01:
+        elif largest < 0.01 and not by_speeds:
             text = "slip is below 0.01 in all rows: was it divided by 100 twice?"
             yield Hint("slip-unit", text, ("slip",), wrong=False)
 
@@ -191,7 +196,7 @@ class RowsToCheck:
             if 0.7 < weight / middle / 9.80665 < 1.4:
                 text = f"the load of {middle:.3g} N is a tenth of the weight: probably it is in kg"
                 yield Hint("unit", text + self._write("unit = 'kgf'", "load"), ("load",))
-            elif not 1.0 / _FAR_FROM_WEIGHT < middle / weight < _FAR_FROM_WEIGHT:
+            elif not 1.0 / FAR_FROM_WEIGHT < middle / weight < FAR_FROM_WEIGHT:
                 text = (
                     f"the load is {middle:.3g} N in the middle of the rows, and the mass of "
                     f"[vehicle] gives {weight:.3g} N for each wheel: probably one of them is "
@@ -251,23 +256,37 @@ class RowsToCheck:
             yield Hint("constant-reading", f"{text}dead", about[:1], wrong=False)
 
     def _traction_cause(self, traction: float, load: float) -> str:
-        """The likely cause of T / (W r) out of its range, by the map where there is one."""
-        cause = traction_cause(traction, load)
+        """The likely cause of T / (W r) outside of its range; "" where it is inside.
+
+        Of several mistakes, that whose correction comes nearest to a usual wheel.
+        traction, load: In the middle of the rows; load in N.
+        """
+        if LEAST_TRACTION <= traction <= MOST_TRACTION:
+            return ""
         role = self._channel("torque", "motor_current")
-        if not cause or self.wheel is None or not role or self.wheel.radius is None:
+        ratio = self.wheel.channels[role].gear_ratio.value if self.wheel and role else 1.0
+        if ratio > 1.0 and LEAST_TRACTION < traction / ratio < MOST_TRACTION:
+            return f"[{role}] is at the wheel already; remove gear_ratio"
+        factors = [(1.0 / 9.80665, "the load is in kg and was read as N")]
+        if role == "motor_current":
+            factors += [(1e-3, "torque_constant is in mN m/A, or the current in mA")]
+        elif role and spelling(self._unit(role)) == "mN*m":
+            factors += [(1e3, f"[torque] is in N m, and was read as {self._unit(role)}")]
+        else:
+            factors += [(1e3, "the torque is in kN m, or the radius in mm"),
+                        (9.80665, "the torque is in kgf m"),
+                        (1e-2, "the torque is in N cm and was read as N m"),
+                        (1e-3, "the load is in kN and was read as N") if load < _LEAST_LOAD else
+                        (1e-3, "the torque is in mN m and was read as N m")]  # fmt: skip
+        distance, cause = min((abs(np.log(max(traction * factor, 1e-30) / USUAL_TRACTION)), text)
+                              for factor, text in factors)  # fmt: skip
+        if distance < np.log(_BY_UNIT):
             return cause
-        channel, current = self.wheel.channels[role], role == "motor_current"
+        if role == "motor_current":
+            return "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
         if traction > MOST_TRACTION:
-            ratio = channel.gear_ratio.value
-            if ratio > 1.0 and 0.02 < traction / ratio < 1.0:
-                return f"[{role}] is at the wheel already; remove gear_ratio"
-            if current and 0.02 < traction / 1000.0 < 1.0:
-                return "torque_constant is in mN m/A, or the current in mA"
-            return "the radius is in another unit" if self.wheel.radius.value < 0.01 else cause
-        if spelling(channel.unit) == "mN*m" and 0.02 < 1000.0 * traction < MOST_TRACTION:
-            return f"[torque] is in N m, and was read as {channel.unit}"
-        wrong = "gear_ratio or the unit of torque_constant is wrong, or the sensor is dead"
-        return wrong if current else cause
+            return "the torque is wrong by a gear ratio, or the radius by its unit"
+        return "the torque lacks a gear ratio, or its sensor is dead"
 
     def _pull(self) -> Iterator[Hint]:
         if not {"drawbar_pull", "load"} <= self.rows.keys():
@@ -318,24 +337,6 @@ class RowsToCheck:
                 f"sinkage is {float(np.median(sinkage)):.3g} m in the middle of the rows: probably "
             )
             yield Hint("sign", f"{text}its sign is turned", ("sinkage",), wrong=False)
-
-
-def traction_cause(traction: float, load: float) -> str:
-    """The likely cause of T / (W r) outside of its range; "" where it is inside.
-
-    traction, load: In the middle of the rows; load in N.
-    """
-    if LEAST_TRACTION <= traction <= MOST_TRACTION:
-        return ""
-    if traction > MOST_TRACTION:
-        mistakes = (*_TOO_LARGE, _KILO if load < _LEAST_LOAD else _MILLI)
-        options = [(traction / factor, text) for factor, text in mistakes]
-        other = "the torque is wrong by a gear ratio, or the radius by its unit"
-    else:
-        options = [(traction * factor, text) for factor, text in _TOO_SMALL]
-        other = "the torque lacks a gear ratio, or its sensor is dead"
-    distance, text = min((abs(np.log(max(q, 1e-30) / USUAL_TRACTION)), text) for q, text in options)
-    return text if distance < np.log(4.0) else other
 
 
 def falls_with_slip(rows: Mapping[str, Floats]) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, moving
 from soilml.log_import.mapping.log_map import WheelMap
+from soilml.log_import.rows import WindowRow
 from soilml.remarks import Remark
 
 #: Sensors that respond when a wheel drives.
@@ -16,6 +17,9 @@ _DEAD_LEVEL = 0.05  # A sensor is dead below this share of its usual level in th
 _SUNK = 0.5  # Share of the radius to which a wheel sinks in at rest
 #: A reading at rest counts as an offset above this share of the reading while driving.
 _OFFSET = 0.05
+#: A sensor clips where its largest reading stands in so many samples, such a share of them, and so
+#: many times more often than any other.
+_FEWEST_CLIPPED, _CLIPPED, _OFTEN = 20, 0.02, 5
 #: Longest share of the load that a lifted wheel shows, least share that is an offset, shortest
 #: stretch in s.
 _LIFTED, _LIFTED_OFFSET, _SHORTEST = 0.3, 0.01, 1.0
@@ -69,6 +73,45 @@ def _level(inputs: Inputs, role: str) -> float:
         driving = values
     rest = inputs.rest.get(role, (0.0, 0.0))[0] if role != "load" else 0.0
     return float(np.abs(np.nanmedian(driving) - (rest if np.isfinite(rest) else 0.0)))
+
+
+def clipped_at(inputs: Inputs) -> dict[str, float]:
+    """The largest reading of sensors that cannot show more, by role.
+
+    That is a reading which stands in many samples, far more often than any other.
+    """
+    found = {}
+    for role in {*_RESPONDING} & inputs.values.keys():
+        size = np.abs(inputs.values[role][np.isfinite(inputs.values[role])])
+        levels, counts = np.unique(size, return_counts=True)
+        if counts.size < 2:
+            continue
+        others = int(np.max(counts[:-1]))
+        if counts[-1] >= max(_FEWEST_CLIPPED, _CLIPPED * size.size, _OFTEN * others):
+            found[role] = float(levels[-1])
+    return found
+
+
+def drop_clipped(inputs: Inputs, rows: Sequence[WindowRow]) -> list[Remark]:
+    """Take readings at the end of a sensor's range out of rows, and say of how many."""
+    found = []
+    for role, limit in clipped_at(inputs).items():
+        name = "torque" if role == "motor_current" else role
+        clipped = np.abs(inputs.values[role]) >= limit
+        spoilt = [
+            row for row in rows if name in row.values and np.mean(
+                clipped[(inputs.time >= row.window.start) & (inputs.time <= row.window.stop)]
+            ) > _CLIPPED
+        ]  # fmt: skip
+        for row in spoilt:
+            del row.values[name]
+            row.means[role] = float("nan")
+        text = (
+            f"[{role}] reads {limit:.4g} in {int(clipped.sum())} samples and never more: its "
+            f"sensor clips; {len(spoilt)} of {len(rows)} windows are without it"
+        )
+        found.append(Remark("clipped", text, (role,)))
+    return found
 
 
 def untared_sensors(wheel: WheelMap, runs: list[Inputs]) -> list[Remark]:

@@ -8,35 +8,47 @@ from collections.abc import Iterator
 import numpy as np
 
 from soilml.arrays import Floats
+from soilml.log_import.mapping.channel_map import UNITS
 from soilml.log_import.mapping.log_map import WheelMap
-from soilml.log_import.units import spelling
+from soilml.log_import.units import factor
 
-#: Ratio of what was read to what is meant: of rotations that are too fast; unit that was read, and
-#: the one that is meant, of those that are too slow; of travel.
-_ROTATION = (
-    (180.0 / math.pi, "deg"),
-    (30.0 / math.pi, "rpm"),
-    (2.0 * math.pi, "turns"),
-    (6.0, "deg/s, and was read as rpm"),
-)
-_SLOW_ROTATION = (
-    (6.0, "deg/s", "rpm"),
-    (180.0 / math.pi, "deg/s", "rad/s"),
-    (180.0 / math.pi, "deg", "rad"),
-    (30.0 / math.pi, "rpm", "rad/s"),
-)
-_TRAVEL = ((1000.0, "mm"), (100.0, "cm"), (3.6, "km/h"))
+#: Units that loggers write, by channel; and travel over rim speed, at the lowest slip and in the
+#: middle of the windows, that a wheel may have.
+_SPEEDS, _ANGLES = ("m/s", "cm/s", "mm/s", "km/h"), ("rad/s", "rpm", "deg/s")
+_WRITTEN = {
+    "wheel_speed": _ANGLES, "wheel_angle": ("rad", "deg", "turns"), "rim_speed": _SPEEDS,
+    "ground_speed": _SPEEDS, "position": ("m", "cm", "mm"),
+}  # fmt: skip
+_FASTEST, _MIDDLE = (0.55, 1.12), (0.4, 1.2)
 #: Share of the rim speed from which a wheel moves, fewest rows, and how near to 1 and how constant
 #: travel over rim speed is where one is computed from the other.
-_MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 4, 0.03, 1e-3
+_MOVES, _FEWEST, _ODOMETRY, _RESOLUTION = 0.2, 3, 0.03, 1e-3
+#: Slips that are alike, and the ratio of the largest to the least effort that one slip seldom has:
+#: at a slip of 0.3 loads of 20 to 150 N give 1.2.
+_ALIKE, _WORKS = 0.01, 1.4
+
+
+def slip_without_cause(ratio: Floats, effort: Floats) -> bool:
+    """Whether travel over rotation stays the same while the wheel works more and less.
+
+    ratio, effort: Travel over rotation, and torque over load, (n,), in any unit. A wheel slips more
+    where it pulls more; the odometry of wheels shows one slip, whatever the radius it has.
+    """
+    good = np.isfinite(ratio) & np.isfinite(effort)
+    if good.sum() < _FEWEST:
+        return False
+    low, high = (float(x) for x in np.percentile(np.abs(effort[good]), [5, 95]))
+    own = np.abs(ratio[good])
+    return high > _WORKS * low and float(np.std(own)) < _ALIKE / 2.0 * float(np.median(own))
 
 
 def rate_hints(
-    wheel: WheelMap, rim: Floats, ground: Floats
+    wheel: WheelMap, rim: Floats, ground: Floats, effort: Floats
 ) -> Iterator[tuple[str, str, tuple[str, ...]]]:
     """Code, text and channels of what is wrong.
 
     rim, ground: Speeds of rim and travel (rows,), m/s, in the sensors' own direction.
+    effort: Torque over load (rows,), m; NaN where it is not known.
     """
     channels = wheel.channels
     rotation = next((r for r in ("rim_speed", "wheel_angle", "wheel_speed") if r in channels), "")
@@ -45,7 +57,7 @@ def rate_hints(
         return
     ratio = ground[good] / rim[good]
     travel = "position" if "position" in channels else "ground_speed"
-    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good]):
+    if why := one_sensor(wheel, rotation, travel, rim[good], ground[good], effort[good]):
         yield "one-sensor", why, (rotation, travel)
         return
     if float(np.median(ratio)) < -0.02:
@@ -60,13 +72,13 @@ def rate_hints(
         text = (
             f"slip is {1.0 - fastest:.4g} or more in all windows: the rim would be "
             f"{1.0 / fastest:.3g} times as fast as the travel; "
-            f"{_too_fast(wheel, rotation, 1.0 / fastest)}"
+            f"{_too_fast(wheel, rotation, travel, 1.0 / fastest)}"
         )
         yield "rotation-too-fast", text, (rotation,)
     elif middle > 3.0:
         text = (
             f"travel is {middle:.3g} times as fast as the rim in the middle of the windows; "
-            f"{_too_slow(wheel, travel, rotation, middle)}"
+            f"{_too_slow(wheel, rotation, travel, middle)}"
         )
         yield "travel-too-fast", text, (travel, rotation)
     elif 0.3 <= fastest < 0.55 and ratio.size > 2 and np.ptp(ratio) > 0.02:
@@ -78,11 +90,13 @@ def rate_hints(
         yield "radius-as-diameter", text, ("radius",)
 
 
-def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats) -> str:
+def one_sensor(
+    wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground: Floats, effort: Floats
+) -> str:
     """Why rotation and travel are one measurement, from which no slip follows; "" where two are.
 
     rim, ground: Means of windows or samples (n,), m/s. The travel of an odometry of the wheels is r
-    omega within its resolution, also where the speed changes.
+    omega within its resolution, also where the speed or the `effort` changes.
     """
     ours, theirs = wheel.channels[rotation].columns, wheel.channels[travel].columns
     needed = "needed is a travel from another sensor, or [slip]"
@@ -98,6 +112,7 @@ def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground:
     middle = float(np.median(ratio))
     alike = abs(middle - 1.0) < _ODOMETRY and float(np.std(ratio)) < _RESOLUTION
     changes = float(np.std(rim[moves])) > 10.0 * _RESOLUTION * float(np.median(np.abs(rim[moves])))
+    changes |= slip_without_cause(ratio, effort[moves])
     if not (alike and (changes or float(np.ptp(ratio)) == 0.0)):
         return ""
     return (
@@ -107,40 +122,36 @@ def one_sensor(wheel: WheelMap, rotation: str, travel: str, rim: Floats, ground:
     )
 
 
-def _too_fast(wheel: WheelMap, rotation: str, excess: float) -> str:
-    unit = wheel.channels[rotation].unit
-    if rotation != "rim_speed" and unit in ("", "rad/s", "rad", "rpm"):
-        for factor, meant in _ROTATION:
-            if 0.9 * factor <= excess <= 1.8 * factor and (factor == 6.0) == (unit == "rpm"):
-                return f"probably [{rotation}] is in {meant}"
+def _other_units(
+    wheel: WheelMap, roles: tuple[str, str], ratio: float, plausible: tuple[float, float]
+) -> str:
+    """The units by which travel over rim speed would be that of a wheel; "" for none.
+
+    roles: Rotation and travel. ratio: With the units that the map has.
+    """
+    found = []
+    for role, power in zip(roles, (-1, 1), strict=True):
+        read = wheel.channels[role].unit or UNITS[role]
+        for meant in _WRITTEN[role] if not wheel.channels[role].has_scale else ():
+            larger = factor(meant, UNITS[role]) / factor(read, UNITS[role])
+            if plausible[0] < ratio * larger**power < plausible[1]:
+                found.append(f"[{role}] is in {meant}, and was read as {read}")
+    return f"probably {', or '.join(found)}" if found else ""
+
+
+def _too_fast(wheel: WheelMap, rotation: str, travel: str, excess: float) -> str:
     if wheel.radius is not None and wheel.radius.value > 2.0:
         return "probably the radius is in mm"
-    if rotation == "rim_speed":
-        # at a slip of 0 to 0.5 the rim is up to twice as fast as the travel
-        near = [u for f, u in _TRAVEL if 0.9 * f <= excess <= 2.0 * f]
-        meant = {"mm": "mm/s", "cm": "cm/s"}.get(near[0], near[0]) if near else "another unit"
-        return f"probably [rim_speed] is in {meant}, or [ground_speed] in a larger one"
-    return (
+    return _other_units(wheel, (rotation, travel), 1.0 / excess, _FASTEST) or (
         f"probably it was measured before a gearbox of up to {excess:.3g} to 1 (write gear_ratio "
         f"in [{rotation}]), or its unit is wrong"
     )
 
 
-def _too_slow(wheel: WheelMap, travel: str, rotation: str, excess: float) -> str:
-    likely = []
-    if rotation != "rim_speed" and wheel.channels[rotation].unit:
-        given = spelling(wheel.channels[rotation].unit)
-        for factor, read, meant in _SLOW_ROTATION:
-            if given == read and 0.4 * factor <= excess <= 1.2 * factor:
-                likely.append(f"[{rotation}] is in {meant}, and was read as {read}")
-    if wheel.channels[travel].unit in ("", "m", "m/s"):
-        for factor, unit in _TRAVEL:
-            if 0.4 * factor <= excess <= 1.2 * factor:
-                rate = "/s" if travel == "ground_speed" and "/" not in unit else ""
-                likely.append(f"[{travel}] is in {unit}{rate}")
-    if likely:
-        return f"probably {', or '.join(likely)}"
-    ratio = wheel.channels[rotation].gear_ratio.value if rotation != "rim_speed" else 1.0
+def _too_slow(wheel: WheelMap, rotation: str, travel: str, excess: float) -> str:
+    ratio = wheel.channels[rotation].gear_ratio.value
+    if likely := _other_units(wheel, (rotation, travel), excess, _MIDDLE):
+        return likely
     if ratio > 1.0 and excess > 0.4 * ratio:
         return f"probably [{rotation}] was measured after the gearbox; remove gear_ratio"
     return f"probably the unit of [{travel}] or of [{rotation}] is wrong"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from soilml.log_import.guesses.columns import Candidate, words_of
+from soilml.log_import.guesses.columns import CLEAR, Candidate, words_of
 from soilml.log_import.guesses.constants import StatedConstants, number_in_names
 from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.mapping.channel_map import ROLES
@@ -153,6 +153,7 @@ class AbsentChannels:
             c.address for c in self.columns
             if c.kind == ROLES[role][0] and c.address not in used and not c.about.constant
             and not (role == "sinkage" and c.about.travel > 0.6)
+            and all(score < CLEAR for other, score in c.scores.items() if other != role)
         ]  # fmt: skip
         if not names:
             return []

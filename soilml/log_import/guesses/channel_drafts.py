@@ -9,7 +9,7 @@ import numpy as np
 
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import CALIBRATED, Candidate, name_scores, words_of
-from soilml.log_import.guesses.constants import stated_radius, stated_scale
+from soilml.log_import.guesses.constants import stated_radius
 from soilml.log_import.guesses.draft import Draft, inputs_of
 from soilml.log_import.guesses.evidence import BY_NAME, LEAST_PERCENT, MOST_FRACTION
 from soilml.log_import.guesses.roles import Assignment
@@ -21,7 +21,7 @@ from soilml.log_import.guesses.signs_and_tares import (
     signs,
     tares,
 )
-from soilml.log_import.mapping.channel_map import ROLES
+from soilml.log_import.mapping.channel_map import GEARED, ROLES
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import dimension, is_raw_signal
 
@@ -139,22 +139,11 @@ def draft_of(
     if role == "position" and dimension(unit) == "count":
         draft.put("scale", "1 mm", Marked(f"CHANGE: travel for one count ({unit})"))
     elif is_raw_signal(unit) and role in CALIBRATED:
-        lines = [line for recording in run.recordings for line in recording.about]
-        scale, line = stated_scale(column.address, unit, role, ROLES[role][0], lines)
-        if scale:
-            draft.put("scale", scale, f"for 1 {unit}; stated in the log: {line[:60]}")
-        else:
-            why = f"CHANGE: what 1 {unit} is, from the calibration of the sensor"
-            draft.put("scale", f"1 {ROLES[role][0]}", Marked(why))
+        why = f"CHANGE: what 1 {unit} is, from the calibration of the sensor"
+        draft.put("scale", f"1 {ROLES[role][0]}", Marked(why))
     elif dimension(unit) == "1" and role in ("torque", "motor_current"):
-        rated, one = ("torque", "N m") if role == "torque" else ("current", "A")
-        if said := stated.get(f"rated_{rated}"):
-            number, *own = said[0].split()
-            why = f"a hundredth of the rated {rated} of the log: {said[1][:60]}"
-            draft.put("scale", f"{float(number) / 100:g} {' '.join(own) or one}", why)
-        else:
-            why = Marked(f"CHANGE: what 1 % is, a hundredth of the rated {rated}")
-            draft.put("scale", f"0.01 {one}", why)
+        why = Marked("CHANGE: what 1 % is, a hundredth of the rated value of the motor")
+        draft.put("scale", f"0.01 {ROLES[role][0]}", why)
     elif dimension(unit) in ("count", "count/s"):
         draft.put("unit", unit, why)
         if "counts_per_turn" in stated:
@@ -178,7 +167,7 @@ def draft_of(
         draft.put("definition", "(r omega - v)/v", why)
     if role == "wheel_angle" and column.about.wraps_at:
         draft.put("wraps_at", column.about.wraps_at, "it starts again there")
-    if role in ("wheel_angle", "wheel_speed", "motor_current"):
+    if role in GEARED and (role != "torque" or {"motor", "mot"} & {*words_of(column.name)}):
         _put_gear_ratio(draft, role, column, stated.get("gear_ratio"))
     if role == "motor_current":
         if said := stated.get("torque_constant"):

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from soilml.errors import InputError
-from soilml.log_import.channels.runs import alike_structs, key_words, matched_files, run_names
+from soilml.log_import.channels.runs import alike_structs, files_by_run, key_words, run_names
 from soilml.log_import.guesses.behaviour import time_unit
 from soilml.log_import.guesses.columns import WHEEL_WORDS, candidates_of, name_scores, words_of
 from soilml.log_import.mapping.log_map import FileKind
@@ -164,7 +164,7 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
     """Kinds of files with different columns that have one run in common; empty for one kind.
 
     The words that the names of all files of a kind share, and not those of all kinds, are its
-    pattern.
+    pattern; where there are none, their words without a number at the end.
     """
     groups: dict[tuple[object, ...], list[int]] = {}
     for i, log in enumerate(logs):
@@ -174,6 +174,14 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
         return ()
     names = run_names([log[0].file for log in logs])
     words = [key_words(name, set()) for name in names]
+    plain = [[word.rstrip("0123456789") or word for word in own] for own in words]
+    return _kinds_of(logs, groups, words) or _kinds_of(logs, groups, plain)
+
+
+def _kinds_of(
+    logs: Sequence[Log], groups: dict[tuple[object, ...], list[int]], words: list[list[str]]
+) -> tuple[FileKind, ...]:
+    """The kinds by the words of their names; empty where these do not tell them."""
     shared = [set.intersection(*({*words[i]} for i in members)) for members in groups.values()]
     of_all = set.intersection(*shared)
     kinds = []
@@ -187,10 +195,11 @@ def guess_file_kinds(logs: Sequence[Log]) -> tuple[FileKind, ...]:
         name = "_".join(own).replace(".", "_")
         kinds.append(FileKind(name, "*".join(["", *map(glob.escape, own), ""])))
     try:
-        runs = matched_files(logs, kinds)
+        runs = files_by_run(logs, kinds)
     except InputError:
         return ()
-    return tuple(kinds) if len(runs) < len(logs) else ()
+    whole = [len({id(kind) for _, kind in own}) == len(kinds) for own in runs.values()]
+    return tuple(kinds) if any(whole) else ()
 
 
 def clocks_differ(clocks: Sequence[tuple[float, float]]) -> bool:

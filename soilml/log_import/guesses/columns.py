@@ -27,7 +27,11 @@ WHEEL_WORDS = (
 )
 _PLACES = ("left", "right", "front", "rear", "middle", "mid", "centre", "center", "back")
 #: Words of topics and columns that say nothing of the quantity.
-_FILLERS = ("state", "states", "data", "status", "sensor", "feedback", "measured", "actual", "raw")
+_FILLERS = ("state", "states", "data", "status", "sensor", "feedback", "measured", "actual", "raw",
+            "mean", "avg", "average")  # fmt: skip
+#: Words that change nothing beside those of a quantity.
+_BESIDE = ("rig", "bench", "the", "des", "del", "filtered", "filt", "dynamic", "transducer", "axis",
+           "reaction", "fuerza", "forza", "field", "twist", "wrench", "msg", "taux")  # fmt: skip
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 _WORD = re.compile(r"[^\W\d_]+|\d+")
 #: What a role's unit may be, beside that of `ROLES`.
@@ -50,7 +54,7 @@ _UNIT_SUFFICES = {
 #: Least load, N, and largest range of a sinkage, mm, of columns without a unit.
 _LEAST_LOAD, _MOST_SINKAGE = 1.0, 900.0
 _FEWEST_PLACES = 10  # Fewest different values of a travel
-_CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
+CLEAR = 4.0  # Score from which a name says the role whatever the topic is called
 _WORD_SCORE, _FULL = 4.0, 4  # Least weight of a full word of a role, and its letters
 #: Words whose number is that of a bus, a port or an input, and of no wheel.
 _BUSES = {"can", "bus", "port", "node", "adc", "ch", "channel", "ai", "uart", "com", "usb", "dev"}
@@ -61,6 +65,12 @@ COUNTERS = {"seq", "sequence", "count", "counter", "sample", "samples", "index",
 _HEADS = ("geschwindigkeit", "drehzahl", "spannung", "pressung", "verschiebung", "durchmesser",
           "radius", "einsinkung", "tiefe", "breite", "länge", "laenge", "fläche", "flaeche",
           "druck", "kraft", "last", "moment", "strom", "winkel", "weg")  # fmt: skip
+#: Words of columns with the size of the wheel of each row, and their signs alone.
+_SIZES = re.compile(
+    r"radius|radio|rayon|raggio|dia|diam|di[aáà]m[eèé]tr[eo]|diameter|durchmesser|width|breite|"
+    r"largeur|ancho|larghezza|grouser|lug|cleat|stollen"
+)
+_SIGNS_OF_SIZES = re.compile(r"[rdb][ _]?w?", re.IGNORECASE)
 _SIDE = re.compile(r"(?:(?<=[a-z_. ])[LR]|[_. ]?(?:[lr]|left|right)(?![a-z])|\d)$")
 _UNCLEAR = 0.5  # What puts a speed of a side, without another word, before other guesses
 _MOST_TEXTS = 12  # Most columns of text that are listed
@@ -69,6 +79,12 @@ _MOST_TEXTS = 12  # Most columns of text that are listed
 def words_of(name: str) -> list[str]:
     """The words of a column's name in small letters: `WheelSpeed_FL` -> wheel, speed, fl."""
     return [word.lower() for word in _WORD.findall(_CAMEL.sub(" ", name))]
+
+
+def is_size(name: str) -> bool:
+    """Whether a name is that of a radius, a diameter or a width, or of grousers."""
+    words = parts_of(words_of(name))
+    return bool(_SIGNS_OF_SIZES.fullmatch(name) or any(map(_SIZES.fullmatch, words)))
 
 
 def parts_of(words: Sequence[str]) -> list[str]:
@@ -108,11 +124,26 @@ def name_scores(name: str) -> dict[str, float]:
     return scores
 
 
+@cache
+def _known_words() -> frozenset[str]:
+    """The words of all roles, and those that may stand beside them."""
+    patterns = (pattern.pattern for own in _patterns().values() for _, pattern in own)
+    words = (word for text in patterns for word in _WORD.findall(re.sub(r"\\.", " ", text)))
+    return frozenset({*words, *WHEEL_WORDS, *_FILLERS, *_BESIDE})
+
+
 def says_role(role: str, name: str) -> bool:
-    """Whether a name has a full word of a role, and not only a letter, an axis or a short sign."""
+    """Whether a name has a full word of a role, and no word that may make it another quantity.
+
+    A letter, an axis or a short sign is none; of `water depth` nobody knows the first word.
+    """
+    words = words_of(name)
     if name_scores(name).get(role, 0.0) < _WORD_SCORE:
         return False
-    words = words_of(name)
+    known = _known_words()
+    if any(word.isascii() and len(word) > 2 and word.isalpha() and word not in known
+           and not known & {*parts_of([word])} for word in words):  # fmt: skip
+        return False
     text = " ".join(word for word in words if word not in (*_PLACES, *_FILLERS))
     texts = (" ".join(words), text, " ".join(parts_of(words)))
     found = (
@@ -196,12 +227,12 @@ def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -
     topic = f"{recording.name} {name}" if recording.name else name
     scores = name_scores(topic)
     own_scores = name_scores(name)
-    clear = max(own_scores.values(), default=0.0) >= _CLEAR
+    clear = max(own_scores.values(), default=0.0) >= CLEAR
     for role in {*scores, *own_scores}:
         own_score, score = own_scores.get(role, 0.0), scores.get(role, 0.0)
         if clear and not own_score:
-            scores[role] = score - _CLEAR  # fx of /force_torque is a force
-        elif own_score >= _CLEAR or role not in scores:
+            scores[role] = score - CLEAR  # fx of /force_torque is a force
+        elif own_score >= CLEAR or role not in scores:
             scores[role] = max(own_score, score)
     topic_named = recording.name.startswith("/") or ambiguous
     address = f"{recording.name}:{name}" if topic_named and recording.name else name
@@ -211,7 +242,12 @@ def _candidate(recording: Recording, name: str, ambiguous: bool, steady: bool) -
 
 
 def _unit_by_name(name: str) -> str:
-    """The unit that ends a name; "" where it contradicts the rest, as newton does in `v_N`."""
+    """The unit that ends a name; "" where it contradicts the rest, as newton does in `v_N`.
+
+    What an analogue-digital converter gives are counts.
+    """
+    if "adc" in words_of(name):
+        return "count"
     unit = unit_in_name(name)
     if not unit or len(unit) > 1:
         return unit
@@ -239,7 +275,7 @@ def _score(column: Candidate, role: str, score: float, values: Floats) -> float:
     if kind is not None:
         if kind not in wanted and not (kind == "1" and role == "slip"):
             return 0.0
-        if kind == "1" and role == "motor_current" and score < _CLEAR:
+        if kind == "1" and role == "motor_current" and score < CLEAR:
             return 0.0  # i in per cent is a slip
         if kind == "1" and role != "slip" and spelling(column.unit) != "percent":
             return 0.0

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from soilml.arrays import Floats
 from soilml.errors import SoilmlError
 from soilml.io.declared_settings import take_declared
 from soilml.io.toml_settings import Settings
@@ -48,18 +49,26 @@ def inputs_of(drafts: dict[str, Draft], run: Run) -> Inputs | None:
         return None
 
 
+def driving_means(inputs: Inputs, seconds: float = 1.0) -> dict[str, Floats]:
+    """Means (blocks,) of the channels over some seconds of driving, of a short log over less."""
+    kept = np.flatnonzero(moving(inputs))
+    width = max(1, min(round(seconds / inputs.step), kept.size // 60))
+    blocks = kept[: kept.size // width * width].reshape(-1, width)
+    means = {role: own[blocks].mean(axis=1) for role, own in inputs.values.items()}
+    return {role: own for role, own in means.items() if np.isfinite(own).any()}
+
+
+def travel_over_rotation(means: dict[str, Floats]) -> Floats:
+    """Travel (m/s) over rotation (rad/s, or rim speed), without sign (blocks,); empty for none."""
+    rotation = means.get("rim_speed", means.get("wheel_speed"))
+    if rotation is None or "ground_speed" not in means:
+        return np.zeros(0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.asarray(np.abs(means["ground_speed"] / rotation))
+
+
 def fastest_ratio(inputs: Inputs) -> float:
-    """Largest ratio of travel (m/s) to rotation (rad/s, or rim speed), of means over a second."""
-    rotation = inputs.values.get("rim_speed", inputs.values.get("wheel_speed"))
-    ground = inputs.values.get("ground_speed")
-    if rotation is None or ground is None:
-        return float("nan")
-    driven = moving(inputs) & np.isfinite(rotation) & np.isfinite(ground)
-    width = max(1, round(2.0 / inputs.step))
-    kept = np.flatnonzero(driven)
-    count = kept.size // width
-    if count < 2:
-        return float("nan")
-    blocks = kept[: count * width].reshape(count, width)
-    ratios = np.abs(ground[blocks].mean(axis=1)) / np.abs(rotation[blocks].mean(axis=1))
-    return float(np.percentile(ratios, 95))
+    """Largest ratio of travel to rotation, of means over two seconds; NaN where there are few."""
+    ratio = travel_over_rotation(driving_means(inputs, 2.0))
+    ratio = ratio[np.isfinite(ratio)]
+    return float(np.percentile(ratio, 95)) if ratio.size > 1 else float("nan")

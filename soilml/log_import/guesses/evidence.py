@@ -13,8 +13,10 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.log_import.channels.inputs import Inputs, moving
-from soilml.log_import.guesses.columns import Candidate, says_role
-from soilml.log_import.guesses.draft import Draft
+from soilml.log_import.checks.row_hints import FAR_FROM_WEIGHT
+from soilml.log_import.checks.speed_hints import slip_without_cause
+from soilml.log_import.guesses.columns import Candidate, says_role, wheel_word
+from soilml.log_import.guesses.draft import Draft, driving_means, travel_over_rotation
 from soilml.log_import.mapping.channel_map import UNITS
 from soilml.log_import.mapping.written_map import Marked
 
@@ -29,6 +31,7 @@ _USUAL_LEVER = (0.004, 0.25)  # The same in m, where no radius is known
 _RADII, _SLIPS = (0.02, 0.6), (-0.3, 0.97)
 _TOGETHER, _FEWEST = 0.8, 6  # Correlation that confirms, and fewest means that tell it
 _OF_MASS = (0.5, 2.0)  # Load over its share of the stated mass
+_SAME_SIZE = 0.95  # Ratio of the sizes of two columns that may hold the same
 #: Largest fraction that a column of slip may hold, and the least one of per cent: (r omega - v)/v
 #: lies between.
 MOST_FRACTION, LEAST_PERCENT = 1.0, 5.0
@@ -44,6 +47,7 @@ class GuessEvidence:
     unit: The stated unit; "" where it was guessed.
     word: Whether a full word of the role is in the name.
     physics, against: What other channels say for it and against it.
+    rival: A column of other values whose name says as much; "" for none.
     second: The column that would be the next one; "" for none.
     """
 
@@ -53,12 +57,14 @@ class GuessEvidence:
     word: bool
     physics: str = ""
     against: str = ""
+    rival: str = ""
     second: str = ""
 
     @property
     def silent(self) -> bool:
         """Whether the channel needs no mark: the one rule."""
-        return not self.against and bool((self.unit and self.word) or self.physics)
+        proved = bool((self.unit and self.word) or self.physics)
+        return proved and not (self.against or self.rival)
 
     @property
     def mark(self) -> str:
@@ -67,6 +73,8 @@ class GuessEvidence:
             *(["its name alone does not say so"] if not self.word else []),
             *(["no unit is stated"] if not self.unit else []),
         ]  # fmt: skip
+        if not why:
+            return f"CHANGE: {self.rival!r} fits as well"
         other = f"; else perhaps {self.second!r}" if self.second else ""
         return f"CHANGE: {', and '.join(why)}{other}"
 
@@ -82,7 +90,8 @@ def weigh(
     """The evidence for each channel of a wheel that is a column.
 
     inputs: Samples as the drafts read them; None where they cannot be read.
-    constants: Stated `radius` (m), and `weight` (N) on each wheel, as far as they are known.
+    constants: Stated `radius` (m), and `weight` (N) on each wheel with the `least_weight` that it
+        may be where nothing says how many carry it, as far as they are known.
     seconds: The next columns by role.
     shown: What the behaviour of several alike columns has shown, by role.
     """
@@ -95,18 +104,31 @@ def weigh(
         if draft.comments.get("unit") == BY_NAME:
             stated = str(draft.keys["unit"])
         word = says_role(role, own.name) or says_role(role, own.address)
-        found[role] = GuessEvidence(role, own.address, stated, word, second=_second(
-            role, own, seconds.get(role, ()), columns, drafts.values()))  # fmt: skip
+        others = seconds.get(role, ())
+        found[role] = GuessEvidence(
+            role, own.address, stated, word, rival=_rival(role, own, others),
+            second=_second(role, own, others, columns, drafts.values()),
+        )  # fmt: skip
         if role in shown and not isinstance(shown[role], Marked) and stated:
             found[role].physics = shown[role]
     if inputs is not None:
-        for role, why in _impossible(inputs, constants.get("radius", 0.0)).items():
+        for role, why in _impossible(inputs, constants).items():
             if role in found:
                 found[role].against = why
         for role, why in _confirmed(found, drafts, inputs, constants, columns):
             if role in found and not found[role].physics:
                 found[role].physics = why
     return list(found.values())
+
+
+def _rival(role: str, own: Candidate, others: Sequence[Candidate]) -> str:
+    """A column of other values whose name fits a role as well; "" for none, as of other wheels."""
+    for other in others:
+        same = other.kind == own.kind and other.scores.get(role, 0.0) >= own.scores[role]
+        sizes = [c.about.size for c in (own, other)]
+        if same and not wheel_word(other.address) and min(sizes) < _SAME_SIZE * max(sizes):
+            return other.address
+    return ""
 
 
 def _second(
@@ -142,15 +164,6 @@ def as_table(evidence: Iterable[GuessEvidence]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _means(inputs: Inputs) -> dict[str, Floats]:
-    """Means (blocks,) of the channels over about a second of driving."""
-    kept = np.flatnonzero(moving(inputs))
-    width = max(1, min(round(1.0 / inputs.step), kept.size // 60))
-    blocks = kept[: kept.size // width * width].reshape(-1, width)
-    means = {role: own[blocks].mean(axis=1) for role, own in inputs.values.items()}
-    return {role: own for role, own in means.items() if np.isfinite(own).any()}
-
-
 def _confirmed(
     found: Mapping[str, GuessEvidence],
     drafts: Mapping[str, Draft],
@@ -159,16 +172,14 @@ def _confirmed(
     columns: Sequence[Candidate],
 ) -> Iterable[tuple[str, str]]:
     """Roles that another channel confirms, and how."""
-    means, radius = _means(inputs), constants.get("radius", 0.0)
+    means, radius = driving_means(inputs), constants.get("radius", 0.0)
     rotation = [r for r in ("rim_speed", "wheel_speed", "wheel_angle") if r in found]
     travel = [r for r in ("ground_speed", "position") if r in found]
-    rim = means.get("rim_speed", means.get("wheel_speed"))
-    if rotation and travel and rim is not None and "ground_speed" in means:
+    ratio = travel_over_rotation(means)
+    if rotation and travel and ratio.size:
         turning = rotation[0]
         gear = float(drafts[turning].keys.get("gear_ratio", 1.0))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = np.abs(means["ground_speed"] / rim) * gear
-        ratio = ratio[np.isfinite(ratio)]
+        ratio = gear * ratio[np.isfinite(ratio)]
         radius_here = 1.0 if turning == "rim_speed" else radius
         if ratio.size and _travels_by_itself(ratio):
             low, high = (float(x) for x in np.percentile(ratio, [5, 95]))
@@ -232,16 +243,30 @@ def _together(means: Mapping[str, Floats]) -> dict[tuple[str, str], float]:
     return found
 
 
-def _impossible(inputs: Inputs, radius: float) -> dict[str, str]:
+def _impossible(inputs: Inputs, constants: Mapping[str, float]) -> dict[str, str]:
     """Why the values of a role are those of no wheel, by role."""
-    driven = moving(inputs)
+    driven, radius = moving(inputs), constants.get("radius", 0.0)
     sizes = {
         role: float(np.nanpercentile(np.abs(inputs.values[role][driven]), 75))
         for role in ("load", "torque", "drawbar_pull", "sinkage")
         if role in inputs.values and np.isfinite(inputs.values[role][driven]).any()
     }
     found: dict[str, str] = {}
+    means = driving_means(inputs)
+    ratio = travel_over_rotation(means)
+    if ratio.size and "torque" in means:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            effort = means["torque"] / means.get("load", 1.0)
+        if slip_without_cause(ratio, effort):
+            why = "it follows the rotation however much the wheel works: computed from it?"
+            found |= dict.fromkeys(("ground_speed", "position"), why)
     load = sizes.get("load", inputs.constants.get("load", 0.0))
+    if "load" in sizes and "weight" in constants and not (
+        constants["least_weight"] < FAR_FROM_WEIGHT * load
+        and load < FAR_FROM_WEIGHT * constants["weight"]
+    ):  # fmt: skip
+        share = load / constants["weight"]
+        found["load"] = f"it is {share:.2g} times what the stated mass gives for each wheel"
     if load > 0.0 and "torque" in sizes:
         low, high = _LEVER if radius > 0.0 else _ANY_LEVER
         lever = sizes["torque"] / load / (radius if radius > 0.0 else 1.0)

@@ -14,13 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
+from soilml.log_import.channels.resampling import on_grid
 from soilml.log_import.channels.runs import Run
 from soilml.log_import.guesses.columns import Candidate, words_of
 from soilml.log_import.guesses.vertical_axis import axis_in, families, with_sinkage_along
 from soilml.log_import.mapping.written_map import Marked
 from soilml.log_import.units import factor
 
-_FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "effort", "力"}
+_FORCES = {"f", "fx", "fy", "fz", "force", "forces", "kraft", "fuerza", "forza", "力"}
 _MOMENTS = {"m", "mx", "my", "mz", "t", "tx", "ty", "tz", "moment", "torque", "drehmoment", "tau"}
 _MOMENTS |= {"momento", "couple", "coppia"}
 #: Words of cells that carry a wheel together, whose forces are added.
@@ -52,26 +53,16 @@ class Means:
 
     def __init__(self, run: Run, candidates: Sequence[Candidate], first: str) -> None:
         self._run, (times, _) = run, run.find(first)
-        self._times = times
-        self._width = max(1, times.size // _BLOCKS)
-        self.count = times.size // self._width
+        self.count = min(_BLOCKS, times.size)
+        self._grid = np.linspace(times[0], times[-1], self.count)
         self._scales = {c.address: _in_newton(c) for c in candidates}
         self.driving = self._motion(candidates)
 
     def of(self, address: str) -> Floats | None:
         """Means (blocks,) of a column, forces in N and moments in N m; None for one without."""
-        times, values = self._run.find(address)
-        good = np.isfinite(values)
-        if not good.any():
-            return None
-        if times.size != self._times.size:
-            values = np.interp(self._times, times[good], values[good])
-        values = self._scales.get(address, 1.0) * values
-        blocks = values[: self.count * self._width].reshape(self.count, self._width)
-        known = np.isfinite(blocks)
-        total = np.where(known, blocks, 0.0).sum(axis=1)
-        means = total / np.maximum(known.sum(axis=1), 1)
-        return np.where(known.any(axis=1), means, float(np.nanmedian(values)))
+        means = self._scales.get(address, 1.0) * on_grid(self._grid, *self._run.find(address))
+        known = np.isfinite(means)
+        return np.where(known, means, np.median(means[known])) if known.any() else None
 
     def level(self, address: str) -> float:
         """Median while driving; NaN where there is none."""
@@ -116,8 +107,7 @@ def _is_alike(candidate: Candidate, moments: bool) -> bool:
 def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
     """Give the load, the pull and the torque of alike columns the roles that they behave as.
 
-    What the first wheel's sensor shows holds for those of the others; a place along the axis of
-    the load is the sinkage.
+    A place along the axis of the load is the sinkage.
     """
     of_forces = families(c for c in candidates if _is_alike(c, False))
     of_moments = families(c for c in candidates if _is_alike(c, True))
@@ -156,13 +146,8 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
     known = [c.address for c in moments]
     if len(known) == 1 and given.get("torque") == known[0] and pair[2] < _TOGETHER_FROM:
         given.pop("torque"), reasons.pop("torque")
-    axes = [(role, axis_in(own[0], given[role])) for role, own in
-            (("load", of_forces), ("drawbar_pull", of_forces), ("torque", of_moments))
-            if role in given and own]  # fmt: skip
-    found = _rescored(candidates, forces, moments, {r: [a] for r, a in given.items()})
-    for own in (*of_forces[1:], *of_moments[1:]):
-        found = _as_first(found, own, dict(axes), own in of_moments)
-    vertical = dict(axes).get("load", "")
+    found = _rescored(candidates, forces, moments, given)
+    vertical = axis_in(of_forces[0], given["load"]) if "load" in given else ""
     if vertical and not isinstance(reasons["load"], Marked):
         found, sinkage = with_sinkage_along(found, vertical)
         if sinkage:
@@ -170,16 +155,6 @@ def by_behaviour(candidates: Sequence[Candidate], run: Run) -> Behaved:
                 f"CHANGE: a place along {vertical}, the axis of the load: is it the wheel's height?"
             )
     return Behaved(found, reasons)
-
-
-def _as_first(
-    candidates: list[Candidate], family: dict[str, Candidate], axes: dict[str, str], moments: bool
-) -> list[Candidate]:
-    """Give the columns of a further sensor the roles that the first one's axes have."""
-    roles = ("torque",) if moments else ("load", "drawbar_pull")
-    given = {r: [family[a].address] for r, a in axes.items() if r in roles and a in family}
-    members = [*family.values()]
-    return _rescored(candidates, [] if moments else members, members if moments else [], given)
 
 
 def _named(
@@ -255,12 +230,10 @@ def _pair(
 
 def _beside(own: Floats, weight: Floats | None) -> Floats:
     """What of a column (n,) does not follow from the load (n,)."""
-    if weight is None or float(np.std(weight)) == 0.0:
-        return np.asarray(own - own.mean())
-    share = weight - weight.mean()
     rest = np.asarray(own - own.mean())
-    if float(np.std(weight)) < 0.05 * abs(float(weight.mean())):
+    if weight is None or float(np.std(weight)) <= 0.05 * abs(float(weight.mean())):
         return rest  # nothing of note: the load did not change
+    share = weight - weight.mean()
     return np.asarray(rest - share * float(share @ rest) / float(share @ share))
 
 
@@ -268,22 +241,19 @@ def _rescored(
     candidates: Sequence[Candidate],
     forces: Sequence[Candidate],
     moments: Sequence[Candidate],
-    given: dict[str, list[str]],
+    given: dict[str, str],
 ) -> list[Candidate]:
-    """Candidates whose roles are those of their behaviour, within the groups that it decides."""
-    decided = [
-        ({"load", "drawbar_pull"} & given.keys(), forces),
-        ({"torque"} & given.keys(), moments),
-    ]
-    taken = {c.address: roles for roles, own in decided for c in own if roles}
+    """Candidates whose roles are those of their behaviour, within the groups that it decides.
+
+    An axis that is none of the roles of its group is no other of them either.
+    """
+    roles = {address: role for role, address in given.items()}
+    decided = {c.address for c in forces if {"load", "drawbar_pull"} & given.keys()}
+    decided |= {c.address for c in moments if "torque" in given}
     found = []
     for c in candidates:
-        scores = dict(c.scores)
-        for role in taken.get(c.address, ()):
-            scores.pop(role, None)
-        scores |= {role: _BY_BEHAVIOUR for role, own in given.items() if c.address in own}
-        if c.address in taken and not any(c.address in own for own in given.values()):
-            # an axis that is none of them is no other of them either
-            scores = {role: s for role, s in scores.items() if role not in _ROLES}
+        scores = {r: s for r, s in c.scores.items() if c.address not in decided or r not in _ROLES}
+        if c.address in roles:
+            scores[roles[c.address]] = _BY_BEHAVIOUR
         found.append(replace(c, scores=scores))
     return found

@@ -29,6 +29,7 @@ from soilml.log_import.guesses.columns import (
     candidates_of,
     describe,
     describe_texts,
+    is_size,
     liveliest,
     name_scores,
     words_of,
@@ -38,26 +39,23 @@ from soilml.log_import.guesses.draft import Draft, fastest_ratio, inputs_of, key
 from soilml.log_import.guesses.evidence import as_table, mark, weigh
 from soilml.log_import.guesses.forces import by_behaviour
 from soilml.log_import.guesses.roles import assign, axle_of
-from soilml.log_import.guesses.wheel_radius import PLAUSIBLE, radius_of_slip
+from soilml.log_import.guesses.wheel_radius import COMPUTED, PLAUSIBLE, radius_of_slip
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.log_map import FileKind, LogMap, RunsMap, TimeMap
 from soilml.log_import.mapping.written_map import (
     Marked,
     WrittenMap,
     WrittenTable,
-    key_line,
     toml_value,
 )
 from soilml.log_import.recording import Recording
 from soilml.log_import.units import factor
 
 _USUAL, _SHARE = 2.0, 0.15  # Shortest window for long runs, s, and its share of short ones
+_MOST_WHEELS = 8  # Wheels that may share a mass, where nothing says how many do
 _MOST_LISTED, _LOOKED = 40, 8  # Most columns that are listed, and runs that are looked at
 #: Words of columns of plate and shear tests.
 _OF_PLATES = {"plate", "pressure", "penetration", "annulus", "shear", "platte", "druck"}
-_OF_GEAR = re.compile(
-    r"(?i)(?<![a-z])((?:width|wheel|b|w|lug|grouser|h)[_-]?\d+(?:mm)?)(?![a-z0-9])"
-)
 #: Calibration errors that all rows share, where nothing states one.
 _BIASES = {"torque": "2 %", "load": "1 %"}
 
@@ -88,7 +86,9 @@ class MapGuess:
         columns = candidates_of(self.run.recordings, self.steady > 0)
         self.columns = [c for c in columns if c.name not in clocks]
         self.errors = [c for c in self.columns if is_error(c)] if self.steady else []
-        behaved = by_behaviour([c for c in self.columns if c not in self.errors], self.run)
+        sizes = [c for c in self.columns if is_size(c.name) and c.kind in (None, "m")]
+        self.usable = [c for c in self.columns if c not in self.errors and c not in sizes]
+        behaved = by_behaviour(self.usable, self.run)
         self.reasons = behaved.reasons
         self.found = assign(behaved.candidates)
         self.run_names = [run.name for run in self.runs]
@@ -170,7 +170,7 @@ class MapGuess:
                     draft.after = [f"# or: {', '.join(others)}"]
                 if role in _BIASES:
                     draft.put("bias", _BIASES[role], "calibration error that all rows share")
-        absent = AbsentChannels(self.found, self.columns, self.stated, self.run_names)
+        absent = AbsentChannels(self.found, self.usable, self.stated, self.run_names)
         tables = [*self._files(), *self._time_tables(), *self._wheel_tables(first)]
         if "load" not in self.found.roles():
             tables.append(absent.load(len(self.labels)))
@@ -202,7 +202,7 @@ class MapGuess:
         constants, explained = self._constants(), []
         for name, group in drafts.items():
             evidence = weigh(group, inputs_of(group, self.run), constants, self.found.others,
-                             self.columns, self.reasons)  # fmt: skip
+                             self.usable, self.reasons)  # fmt: skip
             for one in evidence:
                 if not group[one.role].is_marked:  # one mark suffices
                     one.against = one.against or doubts.get(one.role, "")
@@ -219,6 +219,8 @@ class MapGuess:
             count = int(stated.get("wheels", (str(max(1, len(self.found.wheels))), ""))[0])
             mass, _, unit = stated["mass"][0].partition(" ")
             found["weight"] = 9.80665 * float(mass) * factor(unit or "kg", "kg", "mass") / count
+            known = "wheels" in stated or len(self.found.wheels) > 1
+            found["least_weight"] = found["weight"] / (1 if known else _MOST_WHEELS)
         return found
 
     def _head(self) -> list[str]:
@@ -291,8 +293,6 @@ class MapGuess:
                 table.put(key, f"{value} +- 1 %", "by the names")
                 tables.append(table)
             return tables
-        matches = [_OF_GEAR.search(name) for name in self.run_names]
-        names = dict.fromkeys(match[1] for match in matches if match)
         for key in ("radius", "diameter"):
             if key in stated and not wheel.keys:
                 value, line = stated[key]
@@ -302,12 +302,6 @@ class MapGuess:
                 wheel.put(key, f"{value if ' ' in value else f'{value} m'} +- 1 %", why)
         if not wheel.keys:
             self._put_implied_radius(wheel, drafts)
-        if len(names) > 1 and all(matches):
-            why = (
-                f"the names say {', '.join(list(names)[:4])}; where these are wheels: [gears.NAME]"
-            )
-            line = key_line("gear_from", _OF_GEAR.pattern, f"{why} of the model file")
-            wheel.after.append(f"# {line}")
         return [wheel]
 
     def _put_implied_radius(self, wheel: WrittenTable, drafts: dict[str, Draft]) -> None:
@@ -322,10 +316,12 @@ class MapGuess:
         slips = [*self.found.others.get("slip", [])]
         slips += [self.found.shared["slip"]] if "slip" in self.found.shared else []
         if inputs is not None and slips:
-            radius = gear * radius_of_slip(inputs, slips[0], self.run)
-            if PLAUSIBLE[0] < radius < PLAUSIBLE[1]:
+            radius, scatter = radius_of_slip(inputs, slips[0], self.run)
+            if PLAUSIBLE[0] < gear * radius < PLAUSIBLE[1]:
                 why = f"v / (omega (1 - slip)) with the slip of the column {slips[0].address!r}"
-                wheel.put("radius", f"{radius:.3g} m +- 1 %", why)
+                if scatter > COMPUTED:
+                    why = Marked(f"CHANGE: {why}, which was perhaps set and not measured")
+                wheel.put("radius", f"{gear * radius:.3g} m +- 1 %", why)
                 return
         ratio = gear * fastest_ratio(inputs) if inputs is not None and needed else math.nan
         hint = ""

@@ -138,8 +138,6 @@ def assign(candidates: Sequence[Candidate]) -> Assignment:
         for role in present:
             if role != best:
                 found.others.setdefault(role, []).insert(0, found.shared.pop(role))
-    if not {"rim_speed", "wheel_speed", "wheel_angle", "slip"} & found.shared.keys():
-        _take_unclear_slip(found, candidates)
     if axes and found.shared.get("position") is place:
         found.parts["position"] = axes
     _take_wheels(found)
@@ -171,16 +169,6 @@ def _leave_constant_speeds(found: Assignment) -> None:
     if any(found.shared[role].about.constant for role in speeds):
         for role in {*speeds, "position", "wheel_angle"} & found.shared.keys():
             found.others.setdefault(role, []).insert(0, found.shared.pop(role))
-
-
-def _take_unclear_slip(found: Assignment, candidates: Sequence[Candidate]) -> None:
-    """A column `i` beside a torque is the slip where no rotation was measured, and no current."""
-    used = {c.address for c in found.shared.values()}
-    left = [c for c in candidates if c.scores.get("slip", 0.0) > 0.0 and c.address not in used]
-    if left:
-        found.shared["slip"] = best = max(left, key=lambda c: c.scores["slip"])
-        for role, others in found.others.items():
-            found.others[role] = [c for c in others if c.address != best.address]
 
 
 def _take_wheels(found: Assignment) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from soilml.log_import.channels.inputs import Inputs, moving, resting
 from soilml.log_import.guesses.columns import words_of
-from soilml.log_import.guesses.draft import Draft
+from soilml.log_import.guesses.draft import Draft, driving_means
 from soilml.log_import.mapping.written_map import Marked
 
 _OFFSET = 0.01  # Share of the reading while driving from which a reading at rest is an offset
@@ -68,21 +68,15 @@ def sign_of_slip(drafts: dict[str, Draft], inputs: Inputs) -> None:
 
 def sign_of_pull(drafts: dict[str, Draft], inputs: Inputs) -> None:
     """Turn a pull that falls where the torque, or the current of the motor, rises."""
-    known = drafts.keys() & inputs.values.keys()
+    known = driving_means(inputs)
     role = "torque" if "torque" in known else "motor_current"
-    if not {role, "drawbar_pull"} <= known:
+    if not {role, "drawbar_pull"} <= known.keys() & drafts.keys():
         return
-    torque, pull = inputs.values[role], inputs.values["drawbar_pull"]
-    kept = np.flatnonzero(moving(inputs) & np.isfinite(torque) & np.isfinite(pull))
-    width = max(1, round(1.0 / inputs.step))
-    count = kept.size // width
-    if count < 6:
-        return
-    blocks = kept[: count * width].reshape(count, width)
-    means = np.stack([torque[blocks].mean(axis=1), pull[blocks].mean(axis=1)])
-    if np.ptp(means, axis=1).min() > 0.0:
+    means = np.stack([known[role], known["drawbar_pull"]])
+    means = means[:, np.isfinite(means).all(axis=0)]
+    if means.shape[1] >= 6 and np.ptp(means, axis=1).min() > 0.0:
         sign = -1.0 if drafts[role].keys.get("reverse") else 1.0
-        if sign * float(np.corrcoef(means)[0, 1]) < -0.8:
+        if sign * float(np.corrcoef(*means)[0, 1]) < -0.8:
             why = "it falls in the log where the torque rises"
             drafts["drawbar_pull"].put("reverse", True, why)
 

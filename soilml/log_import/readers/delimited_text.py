@@ -98,15 +98,8 @@ def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Reco
     found = read_by_arrow(path, start, layout, texts, usual, progress)
     if found is None:
         return None
-    notes = []
-    if layout.decimal_comma:
-        notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
-    if found.every > 1:
-        said = f"it is long: one sample in {found.every} is read, evenly over the whole"
-        notes.append(Remark("thinned", said))
-    if found.bad:
-        said = f"{found.bad} lines have a wrong number of cells and are left out"
-        notes.append(Remark("lines-left-out", said))
+    said = f"it is long: one sample in {found.every} is read, evenly over the whole"
+    notes = [Remark("thinned", said)] if found.every > 1 else []
     columns, kept = {}, {}
     for name in layout.names:
         seconds = time_of_day(found.texts[name]) if name in found.texts else found.columns[name]
@@ -114,8 +107,26 @@ def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Reco
             columns[name] = seconds
         else:
             kept[name] = found.texts[name]
+    return _recorded(path, layout, columns, kept, notes, found.bad)
+
+
+def _recorded(
+    path: Path,
+    layout: TextLayout,
+    columns: dict[str, Floats],
+    texts: dict[str, list[str]],
+    notes: Sequence[Remark],
+    bad: int,
+) -> Recording:
+    """The recording of a text log, with what its layout says; `bad` lines are left out."""
+    said = list(notes)
+    if layout.decimal_comma:
+        said.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
+    if bad:
+        text = f"{bad} lines have a wrong number of cells and are left out"
+        said.append(Remark("lines-left-out", text))
     units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
-    return Recording("", path, columns, kept, units, about=layout.about, notes=tuple(notes))
+    return Recording("", path, columns, texts, units, about=layout.about, notes=tuple(said))
 
 
 def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> list[Recording]:
@@ -137,20 +148,13 @@ def recordings_of(path: Path, lines: Sequence[str], found: Sequence[Remark]) -> 
     LOG_VALUES.check(path, len(lines) * len(layout.names))
     samples, blocks = find_blocks(lines[layout.first :], layout)
     rows, bad = _rows(samples, layout)
-    if layout.decimal_comma:
-        notes.append(Remark("decimal-comma", "numbers have decimal commas", severity="note"))
-    if bad:
-        said = f"{bad} lines have a wrong number of cells and are left out"
-        notes.append(Remark("lines-left-out", said))
     if blocks:
         said = f"the header stands {len(set(blocks))} times: a run below each ({BLOCK!r})"
         notes.append(Remark("blocks", said, (BLOCK,), "note"))
     columns, texts = _columns([row for row, _ in rows], layout)
     if blocks:
         texts[BLOCK] = [blocks[i] for _, i in rows]
-    units = {name: unit for name, unit in zip(layout.names, layout.units, strict=True) if unit}
-    whole = Recording("", path, columns, texts, units, about=layout.about, notes=tuple(notes))
-    return signals_of(whole)
+    return signals_of(_recorded(path, layout, columns, texts, notes, bad))
 
 
 def _rows(lines: list[str], layout: TextLayout) -> tuple[list[tuple[list[str], int]], int]:

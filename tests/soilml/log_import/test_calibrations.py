@@ -37,7 +37,7 @@ def check(rows, stages):
 
 
 def test_millivolts_and_a_carriage_speed_of_the_head(tmp_path):
-    """The calibrations, the radius and the speed of the carriage are all stated; no edit at all."""
+    """Radius and speed of the carriage are stated; what 1 mV and 1 V are is asked for."""
     rng = np.random.default_rng(60)
     logs, stages = [], []
     for k, load in enumerate((45, 70)):
@@ -50,8 +50,10 @@ def test_millivolts_and_a_carriage_speed_of_the_head(tmp_path):
         logs.append(tmp_path / f"test{k}.csv")
         logs[-1].write_text("\n".join(lines))
         stages += d.stages
-    rows, text = imported(tmp_path, logs)
-    assert 'value = "20 mm/s +- 1 %"' in text and 'scale = "0.425 N m"' in text
+    edits = [('scale = "1 N m"  # CHANGE: what 1 mV is', 'scale = "0.425 N m"  # '),
+             ('scale = "1 N"  # CHANGE: what 1 V is', 'scale = "12.5 N"  # ')]  # fmt: skip
+    rows, text = imported(tmp_path, logs, edits)
+    assert 'value = "20 mm/s +- 1 %"' in text
     check(rows, stages)
 
 

@@ -97,6 +97,79 @@ def test_a_clear_log_has_no_mark_and_its_evidence_is_printed(tmp_path, capsys):
     assert main(["import", str(log), "--explain"]) == 2
 
 
+@pytest.mark.parametrize(
+    ("name", "make", "role", "why"),
+    [
+        ("water depth (cm)", lambda rng, d: rng.normal(30, 0.2, d.t.size), "sinkage", "its name"),
+        ("torque B [Nm]", lambda rng, d: 1.3 * d.torque, "torque", "'torque B' fits as well"),
+        ("motor torque [Nm]", lambda rng, d: 1.3 * d.torque, "torque", None),
+    ],
+)
+def test_a_name_must_be_understood_and_be_the_only_one(name, make, role, why, tmp_path):
+    log, _ = log_of(tmp_path, **{name: make})
+    text = init(tmp_path, [log])
+    assert (role in silent(text)) == (why is None)
+    assert why is None or why in text
+    assert name not in silent(text).values()
+
+
+@pytest.mark.parametrize(("radius", "noise"), [(1.0, 0.0), (1.07, 0.0), (1.0, 0.003)])
+def test_odometry_of_the_wheel_is_marked_whatever_its_radius(radius, noise, tmp_path, capsys):
+    rng = np.random.default_rng(6)
+    d = drive(rng, (0.02, 0.06, 0.12, 0.3), [60] * 4, rate=20)
+    speed = radius * RADIUS * d.omega * (1.0 + noise * rng.standard_normal(d.t.size))
+    log = write(tmp_path / "log.csv", {
+        "time [s]": d.t, "omega [rad/s]": d.omega, "rover speed [m/s]": speed,
+        "torque [Nm]": d.torque, "Fz [N]": d.load}, digits=6)  # fmt: skip
+    text = init(tmp_path, [log])
+    assert "it follows the rotation however much the wheel works" in text
+    text = text.replace("# radius = ", f'radius = "{RADIUS} m"  # ')
+    refused = imported(tmp_path, [log], text)
+    said = capsys.readouterr().err
+    assert refused == 2 if radius == 1.0 else "was the travel computed from the rotation" in said
+    assert "divided by 100 twice" not in said
+
+
+def test_counts_of_a_converter_ask_for_the_calibration(tmp_path):
+    log, _ = log_of(tmp_path)
+    log.write_text(log.read_text().replace("torque [Nm]", "torque_adc"))
+    text = init(tmp_path, [log])
+    assert 'scale = "1 N m"  # CHANGE: what 1 count is' in text and "torque" not in silent(text)
+
+
+def test_a_line_for_each_reading_of_a_bus(tmp_path):
+    """Time, signal, value and unit, as exports of CAN have them."""
+    d = drive(np.random.default_rng(8), (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    signals = {"WheelSpeed": ("rad/s", d.omega), "VehicleSpeed": ("km/h", 3.6 * d.v),
+               "WheelTorque": ("Nm", d.torque), "WheelLoad": ("N", d.load)}  # fmt: skip
+    lines = [f"{t:.3f},{name},{values[i]:.5f},{unit}" for i, t in enumerate(d.t)
+             for name, (unit, values) in signals.items()]  # fmt: skip
+    (tmp_path / "can.csv").write_text("\n".join(["Timestamp,Signal,Value,Unit", *lines]))
+    text = init(tmp_path, [tmp_path / "can.csv"])
+    assert silent(text) == {"wheel_speed": "WheelSpeed", "ground_speed": "VehicleSpeed",
+                            "torque": "WheelTorque", "load": "WheelLoad"}  # fmt: skip
+
+
+def test_a_load_far_from_the_stated_mass_is_marked(tmp_path):
+    log, _ = log_of(tmp_path)
+    log.write_text("# rover mass: 12 kg, 6 wheels\n" + log.read_text())
+    assert "times what the stated mass gives for each wheel" in init(tmp_path, [log])
+
+
+def test_windows_of_a_sensor_that_clips_are_without_it(tmp_path, capsys):
+    log, _ = log_of(tmp_path)
+    lines = log.read_text().splitlines()
+    rows = np.array([line.split(",") for line in lines[1:]], dtype=float)
+    rows[:, 3] = np.minimum(rows[:, 3], limit := float(np.quantile(rows[:, 3], 0.8)))
+    log.write_text("\n".join([lines[0], *(",".join(f"{x:.5f}" for x in row) for row in rows)]))
+    text = init(tmp_path, [log]).replace("# radius = ", f'radius = "{RADIUS} m"  # ')
+    assert imported(tmp_path, [log], text) == 0
+    assert f"[torque] reads {limit:.4g} in" in capsys.readouterr().err
+    rows = np.genfromtxt(tmp_path / "runs.csv", delimiter=",", names=True, encoding=None)
+    assert np.isnan(rows["torque_Nm"][rows["slip"] > 0.45]).all()
+    assert np.isfinite(rows["torque_Nm"][rows["slip"] < 0.2]).all()
+
+
 def test_the_mark_names_the_next_column(tmp_path):
     log, _ = log_of(tmp_path, M=lambda rng, d: noisy(rng, 0.5 * d.torque, 0.1))
     log.write_text(log.read_text().replace("torque [Nm]", "T"))
@@ -178,6 +251,51 @@ def test_rows_of_several_wheels_keep_their_sizes_and_are_refused(tmp_path, capsy
     (tmp_path / "model.toml").write_text(MODEL)
     assert main(["identify", str(tmp_path / "model.toml"), str(tmp_path / "runs.csv")]) == 2
     assert "wheel_radius_m" in capsys.readouterr().err
+
+
+def test_kinds_of_files_with_the_number_of_the_run(tmp_path, capsys):
+    logs = []
+    for k, slip in enumerate((0.1, 0.3), 1):
+        d = drive(np.random.default_rng(k), (slip,), [60], rate=20)
+        logs += [
+            write(tmp_path / f"wheel{k}.csv", {"time": d.t, "wheel_speed [rad/s]": d.omega}),
+            write(tmp_path / f"cart{k}.csv", {"time": d.t, "carriage_speed [m/s]": d.v}),
+            write(tmp_path / f"ft{k}.csv", {"time": d.t, "wheel_torque [Nm]": d.torque,
+                                            "wheel_load [N]": d.load}),
+        ]  # fmt: skip
+    text = init(tmp_path, logs).replace("# radius = ", f'radius = "{RADIUS} m"  # ')
+    assert imported(tmp_path, logs, text) == 0
+    rows = (tmp_path / "runs.csv").read_text().splitlines()[1:]
+    assert {line.split(",")[0] for line in rows} == {"1", "2"}
+    assert main(["import", "--init", *map(str, logs[:-1])]) == 2
+    assert "run 2: no file of the kind 'ft'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["Raddurchmesser (mm)", "D [mm]", "largeur (mm)", "r_w [m]"])
+def test_sizes_of_wheels_by_other_names_are_said(name, tmp_path, capsys):
+    log = write(tmp_path / "t.csv", {
+        name: [200, 200, 300, 300], "pass": [1, 2, 1, 2], "load [N]": [60] * 4,
+        "slip [-]": [0.1, 0.3, 0.1, 0.3], "torque [Nm]": [1.3, 2, 1.6, 2.4]})  # fmt: skip
+    text = init(tmp_path, [log])
+    assert imported(tmp_path, [log], text) == 0 and "[sinkage]" not in text
+    assert f"the column {name.split(' [')[0].split(' (')[0]!r} says" in capsys.readouterr().err
+    rows = np.genfromtxt(tmp_path / "runs.csv", delimiter=",", names=True, encoding=None)
+    assert rows["pass"].tolist() == [1, 2, 1, 2]
+
+
+@pytest.mark.parametrize("was_set", [True, False])
+def test_a_radius_by_a_slip_that_was_set_is_marked(was_set, tmp_path):
+    rng = np.random.default_rng(9)
+    d = drive(rng, (0.1, 0.3, 0.5), [60] * 3, rate=20)
+    stage = np.clip(((d.t - 4) // 12).astype(int), 0, 2)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slip = np.nan_to_num(1.0 - d.v / (RADIUS * d.omega))
+    slip = np.choose(stage, [0.07, 0.26, 0.46]) if was_set else slip
+    log = write(tmp_path / "log.csv", {
+        "time [s]": d.t, "omega [rad/s]": d.omega, "v [m/s]": d.v, "slip [-]": slip,
+        "torque [Nm]": d.torque, "Fz [N]": d.load}, digits=6)  # fmt: skip
+    text = init(tmp_path, [log])
+    assert "+- 1 %" in text and ("perhaps set and not measured" in text) == was_set
 
 
 def test_files_of_one_run_in_a_folder_each(tmp_path):

@@ -59,7 +59,7 @@ def test_a_right_map_gets_no_hint(log):
         # what the log has in SI units is taken for another unit: the wrong number arrives
         (changed("torque", unit="kN m"), "mN m and was read as N m"),
         (changed("load", unit="N", reverse=True), "reverse = true in [load]"),
-        (changed("wheel_speed", unit="turns/s"), "or its unit is wrong"),
+        (changed("wheel_speed", unit="turns/s"), "is in rad/s, and was read as turns/s"),
         (changed("wheel", radius=2 * RADIUS), "was the radius of 0.3 m measured as diameter?"),
         (changed("ground_speed", reverse=True), "reverse = true in [ground_speed]"),
         (changed("torque", reverse=True), "reverse = true in [torque]"),

@@ -34,8 +34,21 @@ def written(tmp_path, text, encoding="utf-8"):
          ["1,30,60,10,55,20", "1,30,60,20,80,20", "2,30,60,10,90,40"],
          {"inner_radius_m": 0.03, "outer_radius_m": 0.06, "angle_rad": np.pi / 18,
           "torque_Nm": 0.55, "load_N": 20.0}),
+        ("Essai;Contrainte normale (kPa);D\u00e9placement horizontal (mm);"
+         "Contrainte de cisaillement (kPa)", ["A;2;1;0,5", "A;2;2;0,8", "B;4;1;0,9"],
+         {"normal_stress_Pa": 2e3, "shear_displacement_m": 0.001, "shear_stress_Pa": 500.0}),
+        ("Di\u00e1metro placa (cm),Hundimiento (cm),Presi\u00f3n (kPa)",
+         ["10,1,12", "10,3,20", "15,1,11"],
+         {"plate_radius_m": 0.05, "sinkage_m": 0.01, "pressure_Pa": 12e3}),
+        ("sigma_n_kPa,dh_mm,tau_kPa", ["2,1,0.5", "2,3,0.8", "4,1,0.9"],
+         {"normal_stress_Pa": 2e3, "shear_displacement_m": 0.001, "shear_stress_Pa": 500.0}),
+        ("plate radius [mm],plate z [m],Fz [kg]", ["50,-0.01,1", "50,-0.03,2", "75,-0.01,1"],
+         {"plate_radius_m": 0.05, "sinkage_m": 0.01, "load_N": 9.80665}),
+        ("Normal load (N),Shear force (N),Horiz Disp (mm),Area (cm2)",
+         ["7.2,1.8,1,36", "7.2,2.8,3,36", "14.4,3.2,1,36"],
+         {"normal_stress_Pa": 2e3, "shear_displacement_m": 0.001, "shear_stress_Pa": 500.0}),
     ],
-    ids=["plates", "german", "imperial", "ring"],
+    ids=["plates", "german", "imperial", "ring", "french", "spanish", "short", "z up", "forces"],
 )  # fmt: skip
 def test_names_and_units(header, rows, expected, tmp_path):
     found = read_soil_tests(written(tmp_path, "\n".join([header, *rows]), "utf-16"))
@@ -51,6 +64,17 @@ def test_what_is_no_table_of_tests_is_not_taken(tmp_path):
     ours = ["test,plate_radius_m,sinkage_m,pressure_Pa", "1,2,3,4", "1,2,3,4", "1,2,3,4"]
     assert read_soil_tests(written(tmp_path, "\n".join(ours))) is None
     assert read_soil_tests(written(tmp_path, "nothing")) is None
+
+
+@pytest.mark.parametrize(
+    ("header", "needed"),
+    [("plate z [m],Fz [N]", "the size of the plate is missing"),
+     ("dh [mm],shear force [N],normal load [N]", "forces of a shear box need its area")],
+)  # fmt: skip
+def test_what_is_missing_is_named(header, needed, tmp_path):
+    rows = [",".join(["1"] * (header.count(",") + 1)), ",".join(["2"] * (header.count(",") + 1))]
+    with pytest.raises(InputError, match=needed):
+        read_soil_tests(written(tmp_path, "\n".join([header, *rows, *rows])))
 
 
 def test_a_column_without_unit_is_asked_for_it(tmp_path):
