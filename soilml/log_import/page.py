@@ -18,18 +18,6 @@ if TYPE_CHECKING:
 #: Most runs of which the page has a picture; the others are in the tables.
 MOST_RUNS = 24
 _SHOWN = ("run", "time_s", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
-_CONSTANTS = {
-    "gain": "calibration, relative",
-    "offset": "calibration, offset",
-    "gear_ratio": "gear ratio",
-    "efficiency": "efficiency of the gearbox",
-    "torque_constant": "torque constant of the motor",
-    "idle_current": "idle current",
-    "mass": "mass",
-    "wheelbase": "wheelbase",
-    "behind_front": "place of the centre of mass",
-    "height": "height of the centre of mass",
-}
 _UNITS = {"slip": "1", "load": "N", "torque": "N m", "drawbar_pull": "N", "sinkage": "m"}
 
 
@@ -103,11 +91,8 @@ def _tables(found: ImportedLog) -> Iterator[ReportTable]:
 
 
 def _constant(name: str) -> str:
-    owner, _, own = name.rpartition(".")
-    if name == "radius":
-        return "radius of the wheel"
-    text = _CONSTANTS.get(own, name)
-    return f"{text} of [{owner}]" if owner and owner != "vehicle" else text
+    owner, _, own = name.replace("_", " ").rpartition(".")
+    return f"{own} of [{owner.replace(' ', '_')}]" if owner else own
 
 
 def _pictures(found: ImportedLog) -> Iterator[Picture]:

@@ -19,7 +19,6 @@ from soilml.log_import.checks.row_hints import RowsToCheck
 from soilml.log_import.checks.sensors import (
     dead_sensors,
     drop_clipped,
-    lifted_at_the_end,
     untared_load,
     untared_sensors,
 )
@@ -147,8 +146,7 @@ class WheelRows:
                 found.append(Remark("dead-sensor", text, (role, run.name)))
         found += untared_sensors(self.wheel, self.inputs)
         found += untared_load(self.wheel, self.inputs)
-        found += differing_units(self.wheel, self.runs[0])
-        return found + lifted_at_the_end(self.wheel, [run.name for run in self.runs], self.inputs)
+        return found + differing_units(self.wheel, self.runs[0])
 
     def shared_errors(self) -> tuple[dict[str, Noise], list[SharedError]]:
         """The errors that the rows share by the constants of the map; see `shared_errors`."""

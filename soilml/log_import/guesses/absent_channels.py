@@ -11,9 +11,17 @@ from soilml.log_import.guesses.roles import Assignment
 from soilml.log_import.mapping.channel_map import ROLES
 from soilml.log_import.mapping.written_map import Marked, WrittenTable, key_line, toml_value
 
-_GLOBE = {"lat", "latitude", "lon", "lng", "long", "longitude"}  # Words of a place in degrees
-#: Words of a torque, also in the name of the force that measures it on a lever.
-_OF_TORQUE = {"torque", "moment", "drehmoment", "couple", "par", "coppia"}
+#: Roles that are needed: what may stand for each, and what a map then says.
+_NEEDED = {
+    "wheel_speed": ({"wheel_angle", "rim_speed", "slip"},
+                    ": no column is the rotation of the wheel",
+                    ["# [wheel_angle]", "# [wheel_speed]"]),
+    "torque": ({"motor_current"}, " for a soil: no column is a torque",
+               ["# [torque]", "# [motor_current]"]),
+    "ground_speed": ({"position", "slip"}, ": no column is the travel",
+                     ["# [ground_speed]",
+                      '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed']),
+}  # fmt: skip
 #: Uncertainty and unit of what logs state.
 _STATED = {"load": ("1 %", "N"), "ground_speed": ("1 %", "m/s"), "slip": ("0.01", "1")}
 
@@ -91,58 +99,27 @@ class AbsentChannels:
     def table(self, role: str) -> list[WrittenTable]:
         """What stands for a role other than the load: what is needed, or the runner-up."""
         roles, others = self.found.roles(), self.found.others.get(role, [])
-        travel = {"position", "slip"} & roles
         said: WrittenTable | None = None
         if role == "slip" and not {"position", "ground_speed"} & roles:
             said = self._set_slip()
-        elif role == "ground_speed" and not travel:
+        elif role == "ground_speed" and not {"position", "slip"} & roles:
             said = self._said(role)
         if said is not None:
             return [said]
         lines: list[str] = []
-        if role == "wheel_speed" and not others:
-            if not {"wheel_angle", "rim_speed", "slip"} & roles:
-                lines = self._needed_rotation()
-        elif role == "torque" and not (others or "motor_current" in roles):
-            lines = self._needed_torque()
-        elif role == "ground_speed" and not (travel or others):
-            lines = self._needed_travel()
+        if role in _NEEDED and not others:
+            instead, what, options = _NEEDED[role]
+            needed = Marked(f"# NEEDED{what}. One of these:")
+            lines = [] if instead & roles else [needed, *options]
+            if lines and role == "wheel_speed":
+                commanded = [c.address for c in self.columns if "slip" in words_of(c.name)]
+                lines += [f"# [slip]  # column = {toml_value(name)}" for name in commanded]
         elif role in ("drawbar_pull", "sinkage") and not others:
             lines = self._perhaps(role)
         if others and not lines:
             column = toml_value(others[0].address)
             lines = [f"# [{role}]  # {ROLES[role][1]}", f"# column = {column}"]
         return [WrittenTable(before=lines)] if lines else []
-
-    def _needed_rotation(self) -> list[str]:
-        commanded = [c.address for c in self.columns if "slip" in words_of(c.name)]
-        return [
-            Marked("# NEEDED: no column is the rotation of the wheel. One of these:"),
-            "# [wheel_angle]",
-            "# [wheel_speed]",
-            *(f"# [slip]  # column = {toml_value(name)}" for name in commanded),
-        ]
-
-    def _needed_torque(self) -> list[str]:
-        forces = [c for c in self.columns if c.kind == "N" and _OF_TORQUE & {*words_of(c.name)}]
-        needed = Marked("# NEEDED for a soil: no column is a torque. One of these:")
-        lines = [needed, "# [torque]"]
-        for c in forces:
-            lines.append(f"# column = {toml_value(c.address)}")
-            lines.append('# scale = "0.2 N m +- 1 %"  # 1 N on a lever arm of 0.2 m')
-        return [*lines, "# [motor_current]"]
-
-    def _needed_travel(self) -> list[str]:
-        degrees = [c.address for c in self.columns if _GLOBE & {*words_of(c.name)}]
-        return [
-            *(
-                f"# {name}: degrees on the globe are no place; add columns in m, north and east"
-                for name in degrees
-            ),
-            Marked("# NEEDED: no column is the travel. One of these:"),
-            "# [ground_speed]",
-            '# value = "0.02 m/s +- 1 %"   # a carriage of constant speed',
-        ]
 
     def _perhaps(self, role: str) -> list[str]:
         """Columns of the unit of a role that nothing uses and that vary: one may be the role."""

@@ -138,9 +138,7 @@ def far_sinkage(drafts: dict[str, Draft], inputs: Inputs, radius: float = 0.0) -
 
 
 def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
-    """Where the log starts with the wheel above the ground: tare a load there that reads an offset,
-    and a sinkage not before the wheel has landed.
-    """
+    """Where the log starts with the wheel above the ground: tare a load there with an offset."""
     rest = resting(inputs)
     if rest is None or "load" not in inputs.values or "load" not in drafts:
         return
@@ -161,12 +159,3 @@ def lifted(drafts: dict[str, Draft], inputs: Inputs) -> None:
                 "driving: right if the wheel was above the ground"
             ),
         )  # fmt: skip
-    on_ground = np.abs(values - first) > 0.9 * abs(driving - first)
-    if drafts.get("sinkage", Draft()).keys.get("tare") == "rest" and on_ground.any():
-        down = start + int(np.argmax(on_ground)) * inputs.step
-        until = start + (values.size - 1) * inputs.step
-        if until - down > 0.4:
-            drafts["sinkage"].put(
-                "tare", [round((down + until) / 2, 2), round(until, 2)],
-                "from, until, s: the wheel stands on the ground and does not turn yet",
-            )  # fmt: skip
