@@ -53,16 +53,12 @@ def test_a_card_lists_the_scales_of_the_errors_of_its_model(name):
     assert "\n".join(scales.for_card()) in (ROOT / "exported" / f"{name}.md").read_text()
 
 
-#: Files whose regressors of rows were trained by the former spec: `make models` trains them again.
-FORMER_SPEC = ("wheel", "wheel_mlp", "kls1_wheel")
-
-
 @pytest.mark.parametrize("name", FROM_DATA)
 def test_comes_from_the_recipe_and_spec_in_the_tree(name):
     recipe, spec = FROM_DATA[name]
     metadata = Estimator.load(ROOT / "exported" / f"{name}.onnx").metadata
     assert metadata["recipe_sha256"] == read_recipe(recipe).sha256
-    assert (metadata["spec"] == read_spec(spec).text) is (name not in FORMER_SPEC)
+    assert metadata["spec"] == read_spec(spec).text
     assert float(metadata["parity"]) < 1e-4
     card = (ROOT / "exported" / f"{name}.md").read_text()
     assert metadata["data_sha256"] in card
