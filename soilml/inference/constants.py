@@ -65,6 +65,8 @@ NEAR = 16.0
 NEAR_SET = 4.0
 #: Decrease of -2 ln p by a linearised step that counts without a fit; what promises more is fitted.
 TRUSTED = 4.0
+#: The same that is worth another fit of what was fitted.
+WORTH_A_FIT = 0.5
 #: Fits of one round, of an explanation in turn with its hyperparameters, and rounds.
 FITS_PER_ROUND, FITS_IN_TURN, ROUNDS = 8, 6, 7
 #: Single effects that are fitted in the first round in any case.

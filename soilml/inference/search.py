@@ -155,7 +155,7 @@ class Search:
         if isinstance(fit, InputError):
             return
         model = linear_model(self.terms, fit, soil.outliers)
-        at = model.best(at)
+        at = model.best(at).at
         half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
         alone = replace(soil, fit=fit, linear=model)
         found = additions(self, alone, [at, replace(at, log=half)])
@@ -277,8 +277,8 @@ class Search:
                 target = node.promising.at
                 moved = _distance(self.terms, job.at, target) > constants.MOVED
                 moved = moved or bool((node.outliers != job.outliers).any())
-                promised = node.promising.promised > constants.TRUSTED
-                if node.hoped < lowest + margin and (moved or promised or turn == 0):
+                promised = node.promising.promised > constants.WORTH_A_FIT
+                if node.hoped < lowest + margin and (moved or promised):
                     start, near = fit.start_values(), fit.linearisation
                     again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
             jobs = again
