@@ -22,9 +22,6 @@ OTHER_LAW_PRIOR = 0.5
 OUTSIDE_PRIORS = 0.05
 #: Prior probability that a smooth discrepancy is present.
 DISCREPANCY_PRIOR = 0.5
-#: The same for the soil: a model is never quite right, and rows hardly show what another soil does
-#: too. `gap`, which decides between both, gives them equal odds.
-SOIL_DISCREPANCY_PRIOR = 0.9
 #: Range over which the logarithm of the size of an effect of soil or gear is uniform, in reference
 #: sizes; the density falls with two further powers beyond it.
 SMALLEST_SIZE, LARGEST_SIZE, TAIL_POWER = 0.01, 5.0, 2.0
@@ -94,11 +91,6 @@ LARGE_DISCREPANCY = 3.0
 
 #: Probability of a component below which it is not drawn from.
 LEAST_DRAWN = 0.003
-#: Factor on the distances of soils from their mean in `identify`, beside errors that all rows
-#: share: models are now and then several times the typical ones off. Of 22 sets of `wrong_worlds`
-#: (seeds 5001 to 6004), 90 % intervals of torque alone covered 75 % without it and 96 % with it,
-#: those of three channels 83 and 86 %; both had better scores.
-SOIL_FACTOR = 1.2
 #: Probability of the model as in its file below which `identify` says that it does not fit.
 UNLIKELY_MODEL = 0.01
 #: Discrepancy, root mean square in the noise of a reading, that is no gap: with noise it makes

@@ -293,8 +293,7 @@ class Posterior:
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
         """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
-        prior = constants.SOIL_DISCREPANCY_PRIOR
-        return Posterior(self.search.beside(fixed, inner, prior, constants.LEAST_DRAWN))
+        return Posterior(self.search.beside(fixed, inner, constants.LEAST_DRAWN))
 
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
         """Marginals of the soil parameters that are free within the case's priors, by path.

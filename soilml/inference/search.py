@@ -66,7 +66,6 @@ class Search:
     predicted: dict[Hypothesis, Prediction] = field(default_factory=dict)
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
-    discrepancy_prior: float = constants.DISCREPANCY_PRIOR
     _tried: set[Hypothesis] = field(default_factory=set)
 
     def run(self) -> Search:
@@ -172,19 +171,18 @@ class Search:
                 break
         self._settle(jobs, float("inf"), constants.NEAR_HIDDEN)
 
-    def beside(self, fixed: Floats, inner: Sequence[Floats], prior: float, least: float) -> Search:
+    def beside(self, fixed: Floats, inner: Sequence[Floats], least: float) -> Search:
         """The hypotheses above a probability, fitted beside further Gaussian terms.
 
         fixed (m, k): Columns of unit variance.
         inner: Columns (m, q) of discrepancies, each of which has an amplitude of its own.
-        prior: Prior probability that a discrepancy is present.
         least: Probability below which a hypothesis is left out.
         """
         known, first = self.terms, self.terms.channels
         terms = gaussian_terms(
             known.readings, self.problem.case, known.scatter_change, fixed, inner
         )
-        found = Search(self.problem, discrepancy_prior=prior)
+        found = Search(self.problem)
         found.terms = terms
 
         def at(own: Hyperparameters) -> Hyperparameters:
@@ -238,10 +236,8 @@ class Search:
         beside, without = (
             linear.evidence(linear.best(replace(at, present=present))) for present in (True, False)
         )
-        prior = self.discrepancy_prior
-        node = Explanation(
-            hypothesis, fit, linear, beside, without, 0.0, outliers, discrepancy_prior=prior
-        )
+        prior = constants.DISCREPANCY_PRIOR
+        node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
         log = np.logaddexp(
             np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
         )
