@@ -39,14 +39,10 @@ def infer(
     Raises `InputError` where the model cannot be fitted. Where it cannot carry the loads of some
     rows, `Posterior.refused` is the fit that shows which.
     """
-    from threadpoolctl import threadpool_limits
-
     key = problem.checksum()
     if key in _known:
         return _known[key]
-    with threadpool_limits(1 if len(problem.readings) <= ONE_THREAD else None):
-        found = Posterior(Search(problem, progress).run())
-    _known[key] = found
+    found = _known[key] = Posterior(Search(problem, progress).run())
     while len(_known) > KEPT:
         _known.pop(next(iter(_known)))
     return found
@@ -56,8 +52,6 @@ def infer(
 #: `pull` of the same rows compute one.
 KEPT = 3
 _known: dict[str, Posterior] = {}
-#: Readings up to which matrices are so small that several threads only wait for each other.
-ONE_THREAD = 1000
 
 
 @dataclass(frozen=True, eq=False)
