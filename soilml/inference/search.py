@@ -229,12 +229,22 @@ class Search:
         return constants.START_SIZE if coordinate.upper > 0.0 else -constants.START_SIZE
 
     def node(
-        self, hypothesis: Hypothesis, fit: Solution, at: Hyperparameters, outliers: Booleans
+        self,
+        hypothesis: Hypothesis,
+        fit: Solution,
+        at: Hyperparameters,
+        outliers: Booleans,
+        known: Explanation | None = None,
     ) -> Explanation:
-        """A fit with the hyperparameters of its largest evidence, with and without discrepancy."""
+        """A fit with the hyperparameters of its largest evidence, with and without discrepancy.
+
+        known: An earlier fit, near whose hyperparameters they are looked for, and not near `at`.
+        """
         linear = linear_model(self.terms, fit, outliers)
+        starts = (known.beside.at, known.without.at) if known else (at, at)
         beside, without = (
-            linear.evidence(linear.best(replace(at, present=present))) for present in (True, False)
+            linear.evidence(linear.best(replace(start, present=present)))
+            for start, present in zip(starts, (True, False), strict=True)
         )
         prior = constants.DISCREPANCY_PRIOR
         node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
@@ -259,14 +269,14 @@ class Search:
                 if isinstance(fit, InputError) or not np.isfinite(fit.prediction).all():
                     continue
                 try:
-                    node = self.node(job.hypothesis, fit, job.at, job.outliers)
+                    known = found.get(job.hypothesis)
+                    node = self.node(job.hypothesis, fit, job.at, job.outliers, known)
                     if node.value < lowest + margin:
                         outliers = self._outliers(node)
                         if (outliers != job.outliers).any():
-                            node = self.node(job.hypothesis, fit, node.at, outliers)
+                            node = self.node(job.hypothesis, fit, node.at, outliers, node)
                 except np.linalg.LinAlgError:
                     continue
-                known = found.get(job.hypothesis)
                 if known is None or node.value < known.value:
                     found[job.hypothesis] = node
                 lowest = min(lowest, node.value)
