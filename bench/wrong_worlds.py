@@ -73,6 +73,7 @@ WORLDS = (
 LAW_WORLDS = (
     World("flat rim", rim=4e-5),
     World("shear curve with a peak", mechanism=("shear-softening/peak-and-decay", 0.3)),
+    World("shear stress that falls to half", mechanism=("shear-softening", 1.4)),
     World("curved strength envelope", mechanism=("curved-envelope/logarithmic", 0.08)),
     World("stress-shift", mechanism=("stress-shift", 0.2)),
     World("sidewall-shear", mechanism=("sidewall-shear", 1.0)),

@@ -32,6 +32,7 @@ Result = TypeVar("Result")
 
 #: Whether workers have all that this process has; otherwise functions must be picklable.
 FORKS = sys.platform == "linux"
+ONE_THREAD = 1000  # Readings up to which linear algebra has one thread
 AHEAD = 3  # Tasks that are submitted ahead of the result that is waited for, for each worker
 GRACE = 2.0  # Seconds without a result after which dead workers are looked for, and are given up
 #: Environment variables that limit threads of linear algebra in processes that are spawned.
@@ -198,9 +199,17 @@ def _prepare(process: int) -> None:
 
 def _one_thread() -> Any:
     """One thread of linear algebra from here on; a context that ends that."""
+    return threads_for(0)
+
+
+def threads_for(readings: int) -> Any:
+    """Threads of linear algebra for a fit of so many readings, until the context ends.
+
+    Matrices of few are so small that several threads only wait for each other.
+    """
     from threadpoolctl import threadpool_limits
 
-    return threadpool_limits(1)
+    return threadpool_limits(1 if readings <= ONE_THREAD else None)
 
 
 @cache

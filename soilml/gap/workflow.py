@@ -79,12 +79,13 @@ from soilml.gap.verdict.remainder import (
     remaining_discrepancy,
 )
 from soilml.inference import constants
-from soilml.inference.posterior import ONE_THREAD, Posterior, infer
+from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
 from soilml.io.read_table import Rows, as_table
 from soilml.io.table import Table
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.operating_point import FROM_ORDER
+from soilml.processes import threads_for
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark
 from soilml.row_status import Status
@@ -199,10 +200,8 @@ def gap(
         remarks = (*checks.notes, *checks.naming_obstacles)
         return _bad_data_report(case, checks.errors, remarks, seed)
 
-    from threadpoolctl import threadpool_limits
-
     problem = InferenceProblem.of(case, readings, soil, effects, calibration)
-    with threadpool_limits(1 if len(readings) <= ONE_THREAD else None):
+    with threads_for(len(readings)):
         posterior = infer(problem, progress or (lambda _: None))
         if error := _unusable(posterior, split.analysed.place):
             return _bad_data_report(case, (error,), checks.notes, seed)

@@ -116,8 +116,6 @@ def averaged_samples(
     found = found.beside(fixed, inner)
     parts = [_fractions(own, free) for own in found.draws(0)]
     u, weights = np.concatenate([u for u, _ in parts]), _normalised([w for _, w in parts])
-    mean = weights @ u
-    u = np.clip(mean + constants.SOIL_FACTOR * (u - mean), 0.0, 1.0)
     sample = ImportanceSample(u, weights, 0.0)
     return AveragedSamples(sample, misfit, 1.0, _explanations(found))
 

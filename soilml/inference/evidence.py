@@ -52,15 +52,18 @@ Booleans = NDArray[np.bool_]
 LEAST_INFORMATION, LEAST_DEGREES = 0.15, 0.5
 #: Residual, in standard deviations, of a reading without equilibrium.
 NO_EQUILIBRIUM = 1e3
-#: Iterations of the search for hyperparameters.
-ITERATIONS = 25
+#: Iterations of the search for hyperparameters, the decrease of -2 ln p that ends it if no more is
+#: promised, the longest step of a logarithm, and how often a step is shortened.
+ITERATIONS, ENOUGH, LONGEST_STEP, SHORTENED = 25, 0.01, 1.5, 5
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """A linear model at some hyperparameters."""
 
+    at: Hyperparameters
     value: float  # -2 ln of the evidence with x integrated, bounds ignored
+    gradient: Floats  # of it in the logarithms of the hyperparameters
     curvature: Floats  # of half of it in the logarithms of the hyperparameters
     covariance: Floats  # (p, p) of the coordinates, as if none were at a bound
     step: Floats  # (p,) to the optimum under these hyperparameters
@@ -150,20 +153,7 @@ class LinearisedFit:
         return terms.without_scatter[used], found, left
 
     def evaluate(self, at: Hyperparameters) -> Evaluation:
-        """The model at some hyperparameters."""
-        _, _, found = self._evaluated(at, in_full=True)
-        assert found is not None
-        return found
-
-    def value_and_gradient(self, at: Hyperparameters) -> tuple[float, Floats]:
-        """The value of `evaluate` and its gradient in the logarithms of the hyperparameters."""
-        value, gradient, _ = self._evaluated(at, in_full=False)
-        return value, gradient
-
-    def _evaluated(
-        self, at: Hyperparameters, *, in_full: bool
-    ) -> tuple[float, Floats, Evaluation | None]:
-        """Value and gradient, and the rest where asked for.
+        """The model at some hyperparameters.
 
         In one Cholesky factor, coordinates at a bound stand after the others: the solution of the
         first ones leaves them where they are, and the determinant has all.
@@ -225,8 +215,6 @@ class LinearisedFit:
         degrees, squares = weight * products.summed(runs, others).T
         gradient[first:] += 2.0 * (counts - degrees - squares)
         curvature[first:] += 2.0 * np.maximum(counts - degrees, LEAST_DEGREES)
-        if not in_full:
-            return value, gradient, None
         shrunk = (np.eye(k) - inverse[:k, :k]) ** 2
         for g in np.flatnonzero(~own[:first]):
             of = terms.group[used] == g
@@ -240,36 +228,59 @@ class LinearisedFit:
         step[order] = beta[k:]
         push[order[free - k :]] = b[free:] - factor[free:, :free] @ half
         covariance = inverse[k:, k:][np.ix_(back, back)]
-        return value, gradient, Evaluation(value, curvature, covariance, step, push, beta[:k], used)
+        return Evaluation(at, value, gradient, curvature, covariance, step, push, beta[:k], used)
 
-    def best(self, start: Hyperparameters, iterations: int = ITERATIONS) -> Hyperparameters:
-        """The hyperparameters of the largest evidence, as far as `start` allows a discrepancy."""
-        from scipy.optimize import minimize
+    def best(self, start: Hyperparameters, iterations: int = ITERATIONS) -> Evaluation:
+        """The model at the largest evidence, as far as `start` allows a discrepancy.
 
-        bounds, fixed = self.terms.bounds(), self.terms.of_kind(DISCREPANCY) & (not start.present)
+        By BFGS within bounds (Nocedal and Wright, Numerical Optimization, 2006, section 6.1), from
+        the inverse of the expected information.
+        """
+        low, high = np.asarray(self.terms.bounds()).T
+        fixed = self.terms.of_kind(DISCREPANCY) & (not start.present)
+        found = self.evaluate(replace(start, log=np.clip(start.log, low, high)))
+        inverse = np.diag(0.5 / np.maximum(found.curvature, LEAST_DEGREES))
+        for _ in range(iterations):
+            log, slope = found.at.log, found.gradient
+            pressed = np.where(slope > 0.0, log <= low, log >= high)
+            slope = np.where(fixed | pressed, 0.0, slope)
+            step = np.where(slope == 0.0, 0.0, -inverse @ slope)
+            promised = -float(slope @ step)
+            if promised < ENOUGH:
+                break
+            step *= min(1.0, LONGEST_STEP / float(np.abs(step).max()))
+            new = self._lower(found, step, low, high)
+            if new is None:
+                break
+            moved, bent = new.at.log - log, np.where(slope == 0.0, 0.0, new.gradient - slope)
+            if (curved := float(moved @ bent)) > 0.0:
+                left = np.eye(len(log)) - np.outer(moved, bent) / curved
+                inverse = left @ inverse @ left.T + np.outer(moved, moved) / curved
+            found = new
+        return found
 
-        def objective(log: Floats) -> tuple[float, Floats]:
+    def _lower(
+        self, found: Evaluation, step: Floats, low: Floats, high: Floats
+    ) -> Evaluation | None:
+        """The model after a step within bounds, shortened until the evidence is larger."""
+        for _ in range(SHORTENED):
+            log = np.clip(found.at.log + step, low, high)
             try:
-                value, gradient = self.value_and_gradient(replace(start, log=log))
+                new = self.evaluate(replace(found.at, log=log))
             except np.linalg.LinAlgError:
-                return 1e9, np.zeros_like(log)
-            return value, np.where(fixed, 0.0, gradient)
+                new = None
+            if new is not None and new.value < found.value:
+                return new
+            step = 0.25 * step
+        return None
 
-        first = np.clip(start.log, *np.asarray(bounds).T)
-        options = {"maxiter": iterations, "ftol": 1e-5, "maxcor": 8}
-        found = minimize(
-            objective, first, jac=True, method="L-BFGS-B", bounds=bounds, options=options
-        )
-        return replace(start, log=found.x)
-
-    def evidence(self, at: Hyperparameters) -> Evidence:
+    def evidence(self, found: Evaluation) -> Evidence:
         """Evidence with coordinates and hyperparameters integrated out."""
-        found = self.evaluate(at)
-        value = found.value + of_priors(self, found) + self.beside(at, found.curvature)
+        value = found.value + of_priors(self, found) + self.beside(found.at, found.curvature)
         free = ~self.held
         curvature = np.linalg.inv(found.covariance)[np.ix_(free, free)]
         promised = float(found.step[free] @ curvature @ found.step[free])
-        return Evidence(at, value, promised)
+        return Evidence(found.at, value, promised)
 
     def beside(self, at: Hyperparameters, curvature: Floats) -> float:
         """What hyperparameters, outliers and autocorrelation add to -2 ln p of `evaluate`."""

@@ -35,7 +35,6 @@ class Explanation:
     value: float
     outliers: Booleans
     extended: bool = False
-    discrepancy_prior: float = constants.DISCREPANCY_PRIOR
 
     @property
     def best(self) -> Evidence:
@@ -55,7 +54,8 @@ class Explanation:
     @property
     def share_without(self) -> float:
         """Probability that there is no discrepancy, given the hypothesis."""
-        logs = np.log([1.0 - self.discrepancy_prior, self.discrepancy_prior])
+        prior = constants.DISCREPANCY_PRIOR
+        logs = np.log([1.0 - prior, prior])
         logs = logs - 0.5 * np.asarray([self.without.trusted, self.beside.trusted])
         return float(np.exp(logs[0] - np.logaddexp(*logs)))
 

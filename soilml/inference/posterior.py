@@ -39,14 +39,10 @@ def infer(
     Raises `InputError` where the model cannot be fitted. Where it cannot carry the loads of some
     rows, `Posterior.refused` is the fit that shows which.
     """
-    from threadpoolctl import threadpool_limits
-
     key = problem.checksum()
     if key in _known:
         return _known[key]
-    with threadpool_limits(1 if len(problem.readings) <= ONE_THREAD else None):
-        found = Posterior(Search(problem, progress).run())
-    _known[key] = found
+    found = _known[key] = Posterior(Search(problem, progress).run())
     while len(_known) > KEPT:
         _known.pop(next(iter(_known)))
     return found
@@ -56,8 +52,6 @@ def infer(
 #: `pull` of the same rows compute one.
 KEPT = 3
 _known: dict[str, Posterior] = {}
-#: Readings up to which matrices are so small that several threads only wait for each other.
-ONE_THREAD = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,8 +287,7 @@ class Posterior:
 
     def beside(self, fixed: Floats, inner: Sequence[Floats] = ()) -> Posterior:
         """The same hypotheses beside further Gaussian terms; see `Search.beside`."""
-        prior = constants.SOIL_DISCREPANCY_PRIOR
-        return Posterior(self.search.beside(fixed, inner, prior, constants.LEAST_DRAWN))
+        return Posterior(self.search.beside(fixed, inner, constants.LEAST_DRAWN))
 
     def soil_marginals(self, seed: int, factor: float = 1.0) -> dict[str, Marginal]:
         """Marginals of the soil parameters that are free within the case's priors, by path.

@@ -66,7 +66,6 @@ class Search:
     predicted: dict[Hypothesis, Prediction] = field(default_factory=dict)
     untestable: dict[str, Remark] = field(default_factory=dict)
     signatures: dict[tuple[str, ...], list[Signature]] = field(default_factory=dict)
-    discrepancy_prior: float = constants.DISCREPANCY_PRIOR
     _tried: set[Hypothesis] = field(default_factory=set)
 
     def run(self) -> Search:
@@ -155,7 +154,7 @@ class Search:
         if isinstance(fit, InputError):
             return
         model = linear_model(self.terms, fit, soil.outliers)
-        at = model.best(at)
+        at = model.best(at).at
         half = np.where(np.arange(len(at.log)) >= self.terms.groups, 0.5 * at.log, at.log)
         alone = replace(soil, fit=fit, linear=model)
         found = additions(self, alone, [at, replace(at, log=half)])
@@ -172,19 +171,18 @@ class Search:
                 break
         self._settle(jobs, float("inf"), constants.NEAR_HIDDEN)
 
-    def beside(self, fixed: Floats, inner: Sequence[Floats], prior: float, least: float) -> Search:
+    def beside(self, fixed: Floats, inner: Sequence[Floats], least: float) -> Search:
         """The hypotheses above a probability, fitted beside further Gaussian terms.
 
         fixed (m, k): Columns of unit variance.
         inner: Columns (m, q) of discrepancies, each of which has an amplitude of its own.
-        prior: Prior probability that a discrepancy is present.
         least: Probability below which a hypothesis is left out.
         """
         known, first = self.terms, self.terms.channels
         terms = gaussian_terms(
             known.readings, self.problem.case, known.scatter_change, fixed, inner
         )
-        found = Search(self.problem, discrepancy_prior=prior)
+        found = Search(self.problem)
         found.terms = terms
 
         def at(own: Hyperparameters) -> Hyperparameters:
@@ -231,17 +229,25 @@ class Search:
         return constants.START_SIZE if coordinate.upper > 0.0 else -constants.START_SIZE
 
     def node(
-        self, hypothesis: Hypothesis, fit: Solution, at: Hyperparameters, outliers: Booleans
+        self,
+        hypothesis: Hypothesis,
+        fit: Solution,
+        at: Hyperparameters,
+        outliers: Booleans,
+        known: Explanation | None = None,
     ) -> Explanation:
-        """A fit with the hyperparameters of its largest evidence, with and without discrepancy."""
+        """A fit with the hyperparameters of its largest evidence, with and without discrepancy.
+
+        known: An earlier fit, near whose hyperparameters they are looked for, and not near `at`.
+        """
         linear = linear_model(self.terms, fit, outliers)
+        starts = (known.beside.at, known.without.at) if known else (at, at)
         beside, without = (
-            linear.evidence(linear.best(replace(at, present=present))) for present in (True, False)
+            linear.evidence(linear.best(replace(start, present=present)))
+            for start, present in zip(starts, (True, False), strict=True)
         )
-        prior = self.discrepancy_prior
-        node = Explanation(
-            hypothesis, fit, linear, beside, without, 0.0, outliers, discrepancy_prior=prior
-        )
+        prior = constants.DISCREPANCY_PRIOR
+        node = Explanation(hypothesis, fit, linear, beside, without, 0.0, outliers)
         log = np.logaddexp(
             np.log(prior) - 0.5 * beside.trusted, np.log(1.0 - prior) - 0.5 * without.trusted
         )
@@ -263,22 +269,22 @@ class Search:
                 if isinstance(fit, InputError) or not np.isfinite(fit.prediction).all():
                     continue
                 try:
-                    node = self.node(job.hypothesis, fit, job.at, job.outliers)
+                    known = found.get(job.hypothesis)
+                    node = self.node(job.hypothesis, fit, job.at, job.outliers, known)
                     if node.value < lowest + margin:
                         outliers = self._outliers(node)
                         if (outliers != job.outliers).any():
-                            node = self.node(job.hypothesis, fit, node.at, outliers)
+                            node = self.node(job.hypothesis, fit, node.at, outliers, node)
                 except np.linalg.LinAlgError:
                     continue
-                known = found.get(job.hypothesis)
                 if known is None or node.value < known.value:
                     found[job.hypothesis] = node
                 lowest = min(lowest, node.value)
                 target = node.promising.at
                 moved = _distance(self.terms, job.at, target) > constants.MOVED
                 moved = moved or bool((node.outliers != job.outliers).any())
-                promised = node.promising.promised > constants.TRUSTED
-                if node.hoped < lowest + margin and (moved or promised or turn == 0):
+                promised = node.promising.promised > constants.WORTH_A_FIT
+                if node.hoped < lowest + margin and (moved or promised):
                     start, near = fit.start_values(), fit.linearisation
                     again.append(StartedFit(job.hypothesis, start, target, node.outliers, near))
             jobs = again

@@ -28,6 +28,7 @@ from soilml.numerics.resampling import systematic_resampling
 from soilml.numerics.smooth_functions import SmoothFunctions
 from soilml.numerics.smooth_process import process_columns, slip_load_points
 from soilml.physics.effects import EFFECTS
+from soilml.processes import threads_for
 from soilml.quantities import column
 from soilml.remarks import Remark
 from soilml.report.numbers import format_probability
@@ -122,13 +123,14 @@ def posterior_draws_of(
     total, groups = sum(weight for weight, _, _ in each), []
     for weight, own, effects in each:
         problem = InferenceProblem.of(own, readings, _of_case(own, free), effects)
-        try:
-            posterior = infer(problem)
-        except InputError as error:
-            raise FitError(str(error)) from error
-        if posterior.refused is not None:
-            continue
-        drawn = posterior.draws(seed, max(FEWEST, int(np.ceil(count * weight / total))))
+        with threads_for(len(readings)):
+            try:
+                posterior = infer(problem)
+            except InputError as error:
+                raise FitError(str(error)) from error
+            if posterior.refused is not None:
+                continue
+            drawn = posterior.draws(seed, max(FEWEST, int(np.ceil(count * weight / total))))
         groups += [(posterior, part, weight / total * part.weight) for part in drawn]
     if not groups:
         raise FitError("no explanation of the model carries the loads of all rows")

@@ -80,7 +80,7 @@ def test_the_value_is_that_of_the_normal_density_of_the_readings(case, present):
 def test_the_gradient_is_that_of_differences(case, present):
     found, at = model(*case)
     at = replace(at, present=present, log=at.log + 0.1 * np.arange(len(at.log)))
-    _, gradient = found.value_and_gradient(at)
+    gradient = found.evaluate(at).gradient
     step = 1e-4
     for i in range(len(at.log)):
         ends = [at.log + sign * step * (np.arange(len(at.log)) == i) for sign in (-1, 1)]
@@ -120,7 +120,7 @@ def test_whitening_makes_the_covariance_of_the_readings_one(case, present):
 def test_the_gradient_vanishes_at_the_optimum(case):
     """At the optimum of every hyperparameter that is not at a bound it vanishes."""
     found, at = model(*case)
-    best = found.best(at, iterations=200)
+    best = found.best(at, iterations=200).at
     bounds = np.asarray(found.terms.bounds())
     step = 1e-4
     for i, log in enumerate(best.log):
@@ -157,6 +157,6 @@ def test_a_long_step_counts_only_once_it_was_fitted():
     far = replace(
         found, residual=found.residual + 40.0 * found.jacobian[:, 1], _products={}, _taken={}
     )
-    own = far.evidence(at)
+    own = far.evidence(far.evaluate(at))
     assert own.promised > 100.0
     assert own.trusted == pytest.approx(own.value + own.promised - 4.0)
