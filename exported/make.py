@@ -1,7 +1,8 @@
 """Train the released models again: `make models`, or `python exported/make.py NAME ...`.
 
 The same tree on the same machine and library versions gives the same bytes. With `--graphs`, only
-the graphs of set posteriors are written anew, around the response of the wheel that each file has.
+the graphs of set posteriors are written anew, around the response of the wheel that each file has,
+and their accuracy is measured again.
 """
 
 from __future__ import annotations
@@ -44,11 +45,13 @@ WITH_SETS = ("wheel", "wheel_small", "kls1_wheel", "any_wheel", "any_wheel_small
 
 def write_graphs(names: Sequence[str]) -> None:
     """Write the set posteriors of all files, or of those named, around the response they have."""
+    from soilml.cli.progress import stage_progress
     from training.export.stored_response import write_anew
 
     for name in names or WITH_SETS:
         print(f"{name}.onnx", flush=True)
-        write_anew(HERE / f"{name}.onnx")
+        with stage_progress() as progress:
+            write_anew(HERE / f"{name}.onnx", progress)
 
 
 def run(names: Sequence[str]) -> None:

@@ -1,13 +1,13 @@
 """Model files written anew around the response surface that they have, without training it again.
 
 For files whose response stays as it is while the rest of the graph of a set posterior changes:
-`python exported/make.py --graphs NAME ...`.
+`python exported/make.py --graphs NAME ...` also measures limits and accuracy again, for the card.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,13 +31,24 @@ from training.set_posterior.misfit_test import MisfitLimits
 from training.set_posterior.monomials import Terms
 from training.set_posterior.residual_system import BOX_TOLERANCE
 from training.set_posterior.response_surface import Response, family_terms
-from training.set_posterior.validation import metadata_of, probe_of_sets
+from training.set_posterior.validation import (
+    Progress,
+    calibrate_misfit_limits,
+    figures_of,
+    metadata_of,
+    probe_of_sets,
+    table_of,
+    validate_posterior,
+)
 
 CHANNELS = len(RESPONSE_CHANNELS)
 
 
-def write_anew(path: Path) -> None:
+def write_anew(path: Path, progress: Progress | None = None) -> None:
     """Write the set posterior of a model file anew; estimates of single rows stay as they are.
+
+    progress: With it, the limits of the misfit and the accuracy on simulated sets are measured
+        again, and replace those in the file and in its card.
 
     Raises `ModelFileError` for a file without a set posterior, or one of another structure.
     """
@@ -47,6 +58,38 @@ def write_anew(path: Path) -> None:
     metadata = {entry.key: entry.value for entry in model.metadata_props}
     if "set" not in metadata:
         raise ModelFileError(f"{path} has no set posterior")
+    posterior = _stored_posterior(model, metadata, path)
+    changed: dict[str, str] = {}
+    if progress is not None:
+        own = posterior.family, posterior.response, progress, posterior.small
+        posterior = replace(posterior, limits=calibrate_misfit_limits(*own).limits)
+        figures = validate_posterior(posterior, progress)
+        changed["metrics_of_posterior"] = json.dumps(figures_of(figures))
+        names = [entry["name"] for entry in json.loads(metadata["outputs"])]
+        card = path.with_suffix(".md")
+        tables = table_of(figures, names)[:-1], posterior.scales.for_card()
+        text = _with_tables(card.read_text(encoding="utf-8"), tables)
+        card.write_text(text, encoding="utf-8")
+    alone = json.loads(metadata["set"])["alone"]
+    graph = Graph("" if alone else "sets_")
+    posterior.add_to(graph, "" if alone else "sets_")
+    if alone:
+        for name, value in posterior.defaults().items():
+            graph.default(name, value)
+        found = graph.model(posterior.inputs, posterior.outputs)
+    else:
+        found = _beside_single_rows(model, graph, posterior)
+    probe = [one for one in json.loads(metadata["probe"]) if "given" not in one]
+    changed |= {
+        "soilml_interface": INTERFACE,
+        "set": json.dumps(metadata_of(posterior, sets_only=alone)),
+        "probe": json.dumps([*probe, *probe_of_sets(posterior)]),
+    }
+    write_model(found, metadata | changed, path)
+
+
+def _stored_posterior(model: Any, metadata: Mapping[str, str], path: Path) -> SetPosteriorGraph:
+    """The set posterior of a file, with the response that it has."""
     sets = json.loads(metadata["set"])
     family = _family(metadata, sets, path)
     branch = model.graph if sets["alone"] else _branch(model, "then_branch")
@@ -55,24 +98,20 @@ def write_anew(path: Path) -> None:
     response = read_response(branch, family, sets["error"], terms)
     response = replace(response, carried=float(sets.get("carried", 1.0)))
     small = bool(sets.get("small", False))
-    posterior = SetPosteriorGraph(
+    return SetPosteriorGraph(
         family, response, limits, sets["noise"], small, _scales(metadata), _sensor_errors(metadata)
     )
-    graph = Graph("" if sets["alone"] else "sets_")
-    posterior.add_to(graph, "" if sets["alone"] else "sets_")
-    if sets["alone"]:
-        for name, value in posterior.defaults().items():
-            graph.default(name, value)
-        found = graph.model(posterior.inputs, posterior.outputs)
-    else:
-        found = _beside_single_rows(model, graph, posterior)
-    probe = [one for one in json.loads(metadata["probe"]) if "given" not in one]
-    changed = {
-        "soilml_interface": INTERFACE,
-        "set": json.dumps(metadata_of(posterior, sets_only=sets["alone"])),
-        "probe": json.dumps([*probe, *probe_of_sets(posterior)]),
-    }
-    write_model(found, metadata | changed, path)
+
+
+def _with_tables(card: str, tables: Sequence[Sequence[str]]) -> str:
+    """A card with the Markdown tables that have the heads of these, replaced by them."""
+    lines = card.split("\n")
+    for table in tables:
+        rows = [line for line in table if line.startswith("|")]
+        first = lines.index(rows[0])
+        end = next(i for i in range(first, len(lines)) if not lines[i].startswith("|"))
+        lines[first:end] = rows
+    return "\n".join(lines)
 
 
 def _family(metadata: Mapping[str, str], sets: Mapping[str, Any], path: Path) -> WheelFamily:
