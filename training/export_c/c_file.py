@@ -35,6 +35,11 @@ BYTES = {"double": 8, "float": 4, "int": 4, "bool": 1}
 ROWS_PER_CALL = 32
 TEMPLATES = Path(__file__).parent / "templates"
 KERNELS = TEMPLATES / "kernels"
+#: Functions of the C library in the kernels, by element type.
+_MATH = {
+    "EXP": {"float": "expf", "double": "exp"},
+    "LEAST_POWER": {"float": "-87.0f", "double": "-708.0"},
+}
 #: Entries of the metadata that tell one file from another, and what they were trained from.
 IDENTITY = ("graph_sha256", "metadata_sha256", "data_sha256", "recipe_sha256", "spec_sha256")
 #: Outputs that are one number for a row or set; others have one for each estimated quantity, or for
@@ -195,4 +200,7 @@ def kernel_texts(shared: SharedParts) -> list[str]:
 
 def kernel_text(name: str, kind: str) -> str:
     """The text of a kernel for one element type."""
-    return (KERNELS / f"{name}.c").read_text().replace("REAL", kind)
+    text = (KERNELS / f"{name}.c").read_text()
+    for mark, functions in _MATH.items():
+        text = text.replace(mark, functions.get(kind, mark))
+    return text.replace("REAL", kind)

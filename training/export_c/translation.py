@@ -95,7 +95,7 @@ def _translated(program: Program, node: Any, inputs: list[Tensor | None]) -> lis
     from onnx import helper, numpy_helper
 
     constant = all(t is None or t.value is not None for t in inputs)
-    if node.op_type == "Constant" or (constant and not node.domain):
+    if node.op_type == "Constant" or (node.op_type in OPERATORS and constant and not node.domain):
         return _computed_now(node, inputs)
     if node.op_type not in OPERATORS:
         raise ModelFileError(f"operator {node.op_type} is not known to export-c")
