@@ -112,7 +112,7 @@ class Estimate(Result):
     >>> estimate = Estimator.load("exported/wheel.onnx")(slip=0.3, torque=2.1, load=60.0)
     >>> mean, std = estimate["friction_angle"]
     >>> f"{mean:.2f} +- {std:.2f} rad"
-    '0.51 +- 0.05 rad'
+    '0.50 +- 0.05 rad'
     """
 
     names: tuple[str, ...]
@@ -286,7 +286,7 @@ class Estimate(Result):
         >>> wide = estimator.run(slip=[0.1, 0.3], torque=[1.6, 2.7], load=[60.0, 60.0])
         >>> narrow = wide.within(cohesion=(200.0, 800.0))
         >>> print(f"{wide['cohesion'][1]:.0f} Pa, {narrow['cohesion'][1]:.0f} Pa")
-        665 Pa, 189 Pa
+        704 Pa, 181 Pa
         """
         lower, upper = box_ends(self.names, self.units, (self.prior.lower, self.prior.upper), box)
         prior = PriorSummary(0.5 * (lower + upper), (upper - lower) / math.sqrt(12.0), lower, upper)

@@ -219,7 +219,7 @@ class Estimator:
         ... )
         >>> mean, std = estimate["friction_angle"]
         >>> f"{mean:.2f} +- {std:.2f} rad"
-        '0.50 +- 0.06 rad'
+        '0.51 +- 0.07 rad'
         """
         if frame is not None:
             return self.run(**readings_of_frame(frame, self.inputs, self._optional)).to_frame()
