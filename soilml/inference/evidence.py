@@ -44,6 +44,7 @@ from soilml.inference.priors import (
     prior_of_hyperparameters,
 )
 from soilml.inference.scatter_elimination import Eliminated, Products
+from soilml.numerics.bounded_descent import Point, bounded_minimum
 from soilml.numerics.prior import UNIFORM_PRECISION
 
 Booleans = NDArray[np.bool_]
@@ -52,9 +53,9 @@ Booleans = NDArray[np.bool_]
 LEAST_INFORMATION, LEAST_DEGREES = 0.15, 0.5
 #: Residual, in standard deviations, of a reading without equilibrium.
 NO_EQUILIBRIUM = 1e3
-#: Iterations of the search for hyperparameters, the decrease of -2 ln p that ends it if no more is
-#: promised, the longest step of a logarithm, and how often a step is shortened.
-ITERATIONS, ENOUGH, LONGEST_STEP, SHORTENED = 25, 0.01, 1.5, 5
+#: Iterations of the search for hyperparameters, and the decrease of -2 ln p that ends it if no more
+#: is promised.
+ITERATIONS, ENOUGH = 25, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,48 +232,17 @@ class LinearisedFit:
         return Evaluation(at, value, gradient, curvature, covariance, step, push, beta[:k], used)
 
     def best(self, start: Hyperparameters, iterations: int = ITERATIONS) -> Evaluation:
-        """The model at the largest evidence, as far as `start` allows a discrepancy.
-
-        By BFGS within bounds (Nocedal and Wright, Numerical Optimization, 2006, section 6.1), from
-        the inverse of the expected information.
-        """
+        """The model at the largest evidence, as far as `start` allows a discrepancy."""
         low, high = np.asarray(self.terms.bounds()).T
         fixed = self.terms.of_kind(DISCREPANCY) & (not start.present)
-        found = self.evaluate(replace(start, log=np.clip(start.log, low, high)))
-        inverse = np.diag(0.5 / np.maximum(found.curvature, LEAST_DEGREES))
-        for _ in range(iterations):
-            log, slope = found.at.log, found.gradient
-            pressed = np.where(slope > 0.0, log <= low, log >= high)
-            slope = np.where(fixed | pressed, 0.0, slope)
-            step = np.where(slope == 0.0, 0.0, -inverse @ slope)
-            promised = -float(slope @ step)
-            if promised < ENOUGH:
-                break
-            step *= min(1.0, LONGEST_STEP / float(np.abs(step).max()))
-            new = self._lower(found, step, low, high)
-            if new is None:
-                break
-            moved, bent = new.at.log - log, np.where(slope == 0.0, 0.0, new.gradient - slope)
-            if (curved := float(moved @ bent)) > 0.0:
-                left = np.eye(len(log)) - np.outer(moved, bent) / curved
-                inverse = left @ inverse @ left.T + np.outer(moved, moved) / curved
-            found = new
-        return found
 
-    def _lower(
-        self, found: Evaluation, step: Floats, low: Floats, high: Floats
-    ) -> Evaluation | None:
-        """The model after a step within bounds, shortened until the evidence is larger."""
-        for _ in range(SHORTENED):
-            log = np.clip(found.at.log + step, low, high)
-            try:
-                new = self.evaluate(replace(found.at, log=log))
-            except np.linalg.LinAlgError:
-                new = None
-            if new is not None and new.value < found.value:
-                return new
-            step = 0.25 * step
-        return None
+        def at(log: Floats) -> Point[Evaluation]:
+            found = self.evaluate(replace(start, log=log))
+            return Point(log, found.value, np.where(fixed, 0.0, found.gradient), found)
+
+        first = at(np.clip(start.log, low, high))
+        inverse = np.diag(0.5 / np.maximum(first.found.curvature, LEAST_DEGREES))
+        return bounded_minimum(at, first, inverse, (low, high), ENOUGH, iterations).found
 
     def evidence(self, found: Evaluation) -> Evidence:
         """Evidence with coordinates and hyperparameters integrated out."""
