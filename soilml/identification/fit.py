@@ -20,7 +20,7 @@ from soilml.identification.soil_explanation import SoilExplanation as SoilExplan
 from soilml.parameters import unit_text
 from soilml.physics.soils.soil_tests import deviations
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, WEAKLY_IDENTIFIED_ABOVE, Z_90
-from soilml.remarks import Remark
+from soilml.remarks import Remark, about
 from soilml.report.numbers import share_left, significant
 from soilml.results import EstimatedValue, Interval, Result
 
@@ -154,11 +154,14 @@ class Fit(Result):
             size = f" ({significant(float(np.sqrt(self.misfit)), 2)} times the noise; p < 0.001)"
             known = against[0] == AGAINST_EXACT[0]
             return f"The model does not fit these rows{size if known else ''}: run `soilml gap`."
-        left = self.remaining_fraction
-        open_ = [name for name in self.names if left.get(name, 0.0) > NOT_IDENTIFIED_ABOVE]
+        fits = "" if np.isnan(self.misfit) else "The model fits these rows; "
+        few = [remark.text for remark in self.warnings if remark.code == "few-readings"]
+        if few:
+            return f"{fits}{few[0]}."
+        unknown = about(self.warnings, "not-identified")
+        open_ = [name for name in self.names if name in unknown]
         if len(open_) == len(self.names):
             return f"No parameter of the soil is determined by {count}: measure other slips."
-        fits = "" if np.isnan(self.misfit) else "The model fits these rows; "
         text = f"{fits}{count} determine{'s' if self.rows_used == 1 else ''} "
         text += "the soil" if not open_ else f"the soil, but not {', '.join(open_)}"
         return f"{text[0].upper()}{text[1:]}."

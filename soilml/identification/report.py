@@ -46,6 +46,8 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
         pictures.append(corner_picture(fit.names, fit.units, fit.draws))
     left = fit.remaining_fraction
     known = len(fit.names) - len(about(fit.warnings, "not-identified"))
+    if any(remark.code == "few-readings" for remark in fit.warnings):
+        known = 0
     status = "identified" if known == len(fit.names) else "partly identified"
     status = "not identified" if not known else status
     return Report(

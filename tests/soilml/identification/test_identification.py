@@ -41,6 +41,13 @@ def test_recovers_the_truth_from_rows_without_noise(case):
     assert fit.rows_used == 18
 
 
+@pytest.mark.parametrize("method", ["averaged", "posterior", "nonlinear"])
+def test_one_reading_does_not_determine_three_parameters(case, method):
+    fit = identify(case, measured(case, TRUTH, SLIPS[:1], LOADS[:1]), method=method)
+    assert fit.verdict.endswith("1 reading for 3 parameters: the prior determines the rest.")
+    assert fit.report().status == "not identified"
+
+
 @pytest.mark.slow
 def test_nine_of_ten_truths_lie_in_the_interval_and_the_std_says_how_far(case):
     rng = np.random.default_rng(1)
