@@ -41,6 +41,7 @@ FADING_LENGTH = 1.0
 FEWEST = 60
 #: Probability that the model lacks an effect from which a remark is made.
 NOTABLE = 0.5
+MOST_SAID = 3  # Explanations that a remark lists
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +49,16 @@ class PosteriorDraws:
     """Equally weighted draws of one or several posteriors.
 
     case: The case with the effects of all draws, whose values are in `soil`.
+    known: Effects that the case had before.
+    several: Whether it had several explanations.
     soil: Values (n, p).
     parts: Posterior and draws of each group, with the numbers (k,) of the drawn ones, and of the
         equally weighted draws (k,) that they are.
     """
 
     case: Case
+    known: frozenset[str]
+    several: bool
     soil: SoilDraws
     parts: tuple[tuple[Posterior, Draws, NDArray[np.int64], NDArray[np.int64]], ...]
 
@@ -91,20 +96,27 @@ class PosteriorDraws:
 
     def remarks(self) -> list[Remark]:
         """Which effects the draws have beside those of the case, and how often."""
-        shares: dict[tuple[str, ...], float] = {}
-        for posterior, part, _, place in self.parts:
-            known = effect_names(posterior.problem.case)
-            names = tuple(n for n in part.node.hypothesis.effects if n not in known)
+        known, shares = self.known, dict[tuple[str, ...], float]()
+        for _, part, _, place in self.parts:
+            effects = effect_names(part.node.fit.case)
+            names = tuple(n for n in effects if n not in known)
             shares[names] = shares.get(names, 0.0) + len(place) / len(self.soil.values)
-        first = max((n for n in shares if n), key=lambda n: shares[n], default=())
+        likely = sorted((n for n in shares if n), key=lambda n: -shares[n])
         if 1.0 - shares.get((), 0.0) < NOTABLE:
             return []
+        said = [f"{' + '.join(n)} ({format_probability(shares[n])})" for n in likely[:MOST_SAID]]
+        if self.several:
+            text = (
+                f"the cause of the gap is suspected, not certain: {', '.join(said)}; the bands "
+                "include each explanation as likely as it is"
+            )
+            return [Remark("suspected", text, likely[0])]
         text = (
-            f"the model may lack an effect (first suspect: {' + '.join(first)}, probability "
-            f"{format_probability(shares[first])}); the bands include each as likely as it is: run "
-            "soilml gap"
+            f"the model may lack an effect (first suspect: {' + '.join(likely[0])}, probability "
+            f"{format_probability(shares[likely[0]])}); the bands include each as likely as it is: "
+            "run soilml gap"
         )
-        return [Remark("against-model", text, first)]
+        return [Remark("against-model", text, likely[0])]
 
 
 def posterior_draws_of(
@@ -172,7 +184,8 @@ def _equally_weighted(
         for i, c in enumerate(fit.coordinates):
             values[place, paths.index(c.path)] = own[:, i]
         parts.append((posterior, part, taken, place))
-    return PosteriorDraws(whole, SoilDraws(tuple(paths), values), tuple(parts))
+    before = frozenset(effect_names(case)), bool(case.explanations)
+    return PosteriorDraws(whole, *before, SoilDraws(tuple(paths), values), tuple(parts))
 
 
 def _widened(part: Draws, of_node: Sequence[Draws]) -> Draws:

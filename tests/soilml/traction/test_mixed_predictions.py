@@ -47,6 +47,8 @@ def test_each_explanation_has_the_share_of_its_weight_in_the_draws(drawn):
     n1 = drawn.draws.values[:, drawn.draws.names.index("slip-sinkage.n1")]
     assert np.mean(n1 > 0.0) == pytest.approx(2.0 / 3.0, abs=0.01)
     assert np.median(n1[n1 > 0.0]) == pytest.approx(0.3, abs=0.05)
+    said = next(w.text for w in drawn.warnings if w.code == "suspected")
+    assert "suspected, not certain: slip-sinkage (0.67), drawbar-offset (0.33)" in said
 
 
 def test_the_error_fades_to_zero_mean_and_a_usual_size_in_every_direction(drawn):
