@@ -23,8 +23,10 @@ NOTABLE_PEAK, NOTABLE_RISE = 1.1, 0.9
 #: Ratio of the end of a shear curve to the fitted one from which it is said to rise still.
 NOTABLE_END = 1.05
 NOTABLE_VARIATION = 0.05  # Variation of the normal stress within a test that is remarked on
-#: Ratio of shear strength to normal stress, and pressure (Pa), that suggest a wrong unit.
+#: Ratio of shear strength to normal stress, and pressure (Pa), that suggest a wrong unit; and what
+#: no soil of the catalogue comes near: cohesion (Pa) and shear modulus (m).
 ODD_RATIO, ODD_PRESSURE = 6.0, 500.0
+ODD_COHESION, ODD_MODULUS = 3e5, 0.2
 LISTED = 4  # Names that a remark lists
 
 
@@ -152,6 +154,20 @@ def shear_remarks(fit: ShearFit) -> Iterator[Remark]:
             "below-zero",
             "the failure line meets the axis below zero: cohesion is set to zero",
             ("cohesion",),
+        )
+    elif fit.cohesion.value > ODD_COHESION:
+        yield Remark(
+            "doubtful-unit",
+            f"the cohesion is {_kpa(fit.cohesion.value)} kPa, more than that of any soil: check "
+            "the unit of the stresses",
+            ("shear_stress_Pa", "normal_stress_Pa"),
+        )
+    if fit.shear_modulus is not None and fit.shear_modulus.value > ODD_MODULUS:
+        yield Remark(
+            "doubtful-unit",
+            f"K is {1e3 * fit.shear_modulus.value:.3g} mm, more than that of any soil: check the "
+            "unit of the shear displacement",
+            ("shear_displacement_m",),
         )
     yield from _repeats(
         np.asarray([test.normal_stress for test in fit.tests]),

@@ -253,6 +253,15 @@ def test_odd_units_are_remarked_on():
     assert about(bevameter(Table(kilopascals)).remarks, "doubtful-unit") == {"pressure_Pa"}
     low = shear().columns | {"normal_stress_Pa": shear()["normal_stress_Pa"] * 1e-3}
     assert "doubtful-unit" in codes(bevameter(shear=Table(low)))
+    for factors, about_them in (
+        ({"shear_displacement_m": 1e2}, {"shear_displacement_m"}),
+        (
+            {"shear_stress_Pa": 1e3, "normal_stress_Pa": 1e3},
+            {"shear_stress_Pa", "normal_stress_Pa"},
+        ),
+    ):
+        wrong = shear().columns | {name: f * shear()[name] for name, f in factors.items()}
+        assert about(bevameter(shear=Table(wrong)).remarks, "doubtful-unit") == about_them
 
 
 MISTAKES = {
