@@ -146,6 +146,12 @@ class Fit(Result):
         return not any(remark.code in AGAINST_EXACT for remark in self.warnings)
 
     @property
+    def undetermined(self) -> list[str]:
+        """Parameters that the rows leave open: all where there are fewer readings than those."""
+        unknown = about(self.warnings, "not-identified") | about(self.warnings, "few-readings")
+        return [name for name in self.names if name in unknown]
+
+    @property
     def verdict(self) -> str:
         """Whether model and rows agree, and what to do where they do not, in one sentence."""
         against = [remark.code for remark in self.warnings if remark.code in AGAINST_EXACT]
@@ -158,8 +164,7 @@ class Fit(Result):
         few = [remark.text for remark in self.warnings if remark.code == "few-readings"]
         if few:
             return f"{fits}{few[0]}."
-        unknown = about(self.warnings, "not-identified")
-        open_ = [name for name in self.names if name in unknown]
+        open_ = self.undetermined
         if len(open_) == len(self.names):
             return f"No parameter of the soil is determined by {count}: measure other slips."
         text = f"{fits}{count} determine{'s' if self.rows_used == 1 else ''} "
@@ -259,7 +264,7 @@ def with_warnings(
     if readings.reading_count < len(free):
         count = "1 reading" if readings.reading_count == 1 else f"{readings.reading_count} readings"
         text = f"{count} for {len(free)} parameters: the prior determines the rest"
-        remarks.append(Remark("few-readings", text))
+        remarks.append(Remark("few-readings", text, fit.names))
     remarks += _trade_offs(fit)
     if excess_residuals:
         remarks.append(excess_residuals_remark(float(np.sqrt(fit.misfit)), case, excess_residuals))

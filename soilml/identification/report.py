@@ -10,7 +10,6 @@ import numpy as np
 
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
-from soilml.remarks import about
 from soilml.report.corner_figure import corner_picture
 from soilml.report.numbers import channel_name, format_quantity
 from soilml.report.parameter_figure import ParameterIntervals
@@ -45,9 +44,7 @@ def fit_report(fit: Fit, next_rows: Sequence[str] = (), title: str = "Soil") -> 
     if fit.draws is not None:
         pictures.append(corner_picture(fit.names, fit.units, fit.draws))
     left = fit.remaining_fraction
-    known = len(fit.names) - len(about(fit.warnings, "not-identified"))
-    if any(remark.code == "few-readings" for remark in fit.warnings):
-        known = 0
+    known = len(fit.names) - len(fit.undetermined)
     status = "identified" if known == len(fit.names) else "partly identified"
     status = "not identified" if not known else status
     return Report(

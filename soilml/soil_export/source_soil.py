@@ -167,7 +167,8 @@ def _of_fit(fit: Mapping[str, Any], path: str) -> SourceSoil:
         if entry.get("remaining_fraction", 0.0) > NOT_IDENTIFIED_ABOVE:
             wide.append(name)
     _check_bounds(values, path)
-    warned = about(_remarks(fit.get("warnings", [])), "not-identified")
+    said = _remarks(fit.get("warnings", []))
+    warned = about(said, "not-identified") | about(said, "few-readings")
     wide += [name for name in intervals if name in warned and name not in wide]
     remarks = []
     if wide:
