@@ -20,7 +20,7 @@ from soilml.fitting.predictions import forces, linearise
 from soilml.fitting.readings import Readings, stack_readings
 from soilml.fitting.row_order import with_order_columns
 from soilml.gap import gap
-from soilml.gap.report.results import GapReport
+from soilml.gap.results import GapReport
 from soilml.inference.constants import SCATTER_UNITS
 from soilml.inference.gaussian_terms import scatter_columns
 from soilml.io.csv_file import read_csv
