@@ -7,8 +7,8 @@ from advice import LOADS, measured
 from runner import ROOT, Bench, Row, Sample, rms, table
 
 from soilml import Case, Estimator, read_case
-from soilml.experiment_design.advice_after_results import advice_of_file
 from soilml.experiment_design.design import SLIPS
+from soilml.experiment_design.next_rows import advice_of_file
 from soilml.fitting.coordinates import select_free
 from soilml.identification.model_error_inputs import with_exact_model
 

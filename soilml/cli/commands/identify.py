@@ -117,7 +117,7 @@ def run(args: argparse.Namespace) -> int:
     if args.fresh is not None and not args.mean:
         raise InputError("--fresh predicts rows by the mean of groups: add --mean")
     need("scipy", "identify")
-    from soilml.experiment_design.advice_after_results import advice_after_fit
+    from soilml.experiment_design.next_rows import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.report import fit_report, group_report, soil_entries
