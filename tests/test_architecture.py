@@ -25,7 +25,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/log_import/readers/text_by_arrow.py": {"pyarrow"},
     "soilml/io/spreadsheet.py": {"python_calamine"},
     "soilml/io/table.py": {"pyarrow"},
-    "soilml/fitting/scipy_descents.py": {"scipy"},
     "soilml/experiment_design/simulator_runs.py": {"scipy"},
     "soilml/numerics/gaussian_emulator.py": {"scipy"},
     "soilml/gap/workflow.py": {"threadpoolctl"},
