@@ -12,6 +12,7 @@ from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects
 from soilml.fitting.coordinates import Coordinate, values_at
+from soilml.fitting.error_columns import shared_columns
 from soilml.fitting.global_optimum import raise_uncarried
 from soilml.fitting.misfit import Misfit, fit_under_declared_noise, misfit_limit
 from soilml.fitting.readings import Readings
@@ -27,7 +28,6 @@ from soilml.inference import constants
 from soilml.inference.draws import Draws
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
-from soilml.inference.shared_columns import shared_columns
 from soilml.numerics.importance_sampling import ImportanceSample
 from soilml.physics.effects import EFFECTS
 from soilml.physics.effects.base import Effect
