@@ -64,8 +64,7 @@ pages: $(VENV)/.ready ## write the blocks of pages that commands print; `tools/p
 models: $(VENV)/.ready ## train the released models again, into exported/
 	@$(BIN)/python exported/make.py
 
-limit: $(VENV)/.ready ## compute the Bayes limit of the benchmark and of the reference sets, ten minutes on two cores
-	@$(BIN)/soilml compare --limit training/benchmark/benchmark_limit.parquet
+limit: $(VENV)/.ready ## compute the exact posteriors of the reference sets, seven minutes on two cores
 	@$(BIN)/python bench/reference_sets.py
 
 kls1: $(VENV)/.ready ## evaluate the KLS-1 tests: make kls1 SOILML_DATA=/path/to/data
