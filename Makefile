@@ -104,7 +104,7 @@ mutation: $(VENV)/.ready ## change the source at random places and see whether a
 	@$(BIN)/python tools/mutation.py --mutants $(or $(MUTANTS),12)
 
 # what the tests need beside the libraries that users install, and the tests that tell versions apart
-TEST_LIBRARIES := '.[ground,logs,map,cluster,serve,torch]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
+TEST_LIBRARIES := '.[ground,logs,map,serve,torch]' array-api-strict filelock hypothesis pytest pytest-xdist sympy
 TEST_VERSIONS := -m pytest -q -n auto -p no:cacheprovider \
 	  -m "not slow and not network and not long and not browser" tests/soilml tests/training tests/datagen
 
