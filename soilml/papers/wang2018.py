@@ -11,7 +11,6 @@ from importlib import resources
 import numpy as np
 
 from soilml.physics.soils import soil
-from soilml.systems.tracked_robot.group_identification import implied_points
 from soilml.systems.tracked_robot.robot import BEYOND_PEAK, GROUSERS, WANG2018
 
 LEVEL = np.linspace(0.5, 0.9, 9)  # Slips over which the drawbar pull is averaged as its plateau
@@ -38,6 +37,11 @@ def group_mean(name: str) -> float:
     ]
     mean = sum(groups) / len(groups)
     return math.radians(mean) if name == "friction_angle" else mean
+
+
+def implied_points(r2: float, f: float) -> float:
+    """Number of points implied by r2 and F of a line: F (1 - r2) / r2 + 2."""
+    return f * (1.0 - r2) / r2 + 2.0
 
 
 def variance_ratio() -> float:
