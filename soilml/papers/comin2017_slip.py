@@ -24,13 +24,8 @@ from soilml.physics.model import Model
 from soilml.physics.operating_point import Operating
 from soilml.physics.pull_efficiency import pull_efficiency
 from soilml.physics.soils import Soil, soil
-from soilml.systems.wheel_legs import (
-    GROUNDS,
-    TORQUE_SLIP,
-    VIBRATION_SLIP,
-    SpringLeg,
-    vibration_amplitude,
-)
+from soilml.systems.wheel_legs.resistive_force import GROUNDS
+from soilml.systems.wheel_legs.stances import SpringLeg, vibration_amplitude
 from soilml.systems.wheel_legs.stride_relations import (
     GRAVITY,
     LINEAR,
@@ -38,6 +33,8 @@ from soilml.systems.wheel_legs.stride_relations import (
     SIMPLIFIED,
     SINKAGE,
     STIFFNESS,
+    TORQUE_SLIP,
+    VIBRATION_SLIP,
 )
 from soilml.systems.wheel_legs.strides import HEAVY_AT, HEAVY_WHEEL
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from soilml.cli import main
-from soilml.systems.wheel_legs import TORQUE_SLIP, VIBRATION_SLIP, soil_of_sinkage
+from soilml.systems.wheel_legs.stride_relations import TORQUE_SLIP, VIBRATION_SLIP, soil_of_sinkage
 
 HEAD = "run,slip,torque_Nm,vibration_m_s2,sinkage_m\n"
 

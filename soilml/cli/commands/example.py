@@ -310,8 +310,15 @@ def _wheel_leg() -> tuple[str]:
     import numpy as np
 
     from soilml.io.text_tables import csv_text
-    from soilml.systems.wheel_legs import TORQUE_SLIP, VIBRATION_SLIP
-    from soilml.systems.wheel_legs.stride_relations import LINEAR, S_I, S_Z, SIMPLIFIED, SINKAGE
+    from soilml.systems.wheel_legs.stride_relations import (
+        LINEAR,
+        S_I,
+        S_Z,
+        SIMPLIFIED,
+        SINKAGE,
+        TORQUE_SLIP,
+        VIBRATION_SLIP,
+    )
 
     rng, columns = np.random.default_rng(4), dict[str, list[Any]]()
     relations = (TORQUE_SLIP["simplified"], VIBRATION_SLIP["linear"])

@@ -144,7 +144,7 @@ def _known_soil(text: str) -> tuple[float, float]:
     import math
 
     from soilml.cli.option_values import parse_numbers
-    from soilml.systems.wheel_legs import GROUNDS
+    from soilml.systems.wheel_legs.resistive_force import GROUNDS
 
     if text.upper() in GROUNDS:
         ground = GROUNDS[text.upper()]
