@@ -13,7 +13,8 @@ from scipy.stats import linregress
 from soilml import Case, Model, simulate, soil
 from soilml.config.measurement_noise import Noise
 from soilml.numerics.prior import Prior
-from soilml.papers.wang2018 import LEVEL, implied_points, plateau, printed
+from soilml.papers.published import printed
+from soilml.papers.wang2018 import LEVEL, implied_points, plateau
 from soilml.systems.tracked_robot.group_identification import (
     PARAMETERS,
     GroupFits,
@@ -131,7 +132,7 @@ def regression_of_fresh_rows(case: Case, groups: GroupFits, fresh: object) -> No
     predicted, count = mean_prediction(case, groups, fresh), len(fresh)
     line = linregress(predicted, fresh["drawbar_pull_N"])
     r2 = line.rvalue**2
-    book = printed()
+    book = printed("wang2018")
     n = implied_points(book["regression_r2"], book["regression_f"])
     print("\nMeasured against predicted, fresh rows      r2       F   slope  points")
     print(
