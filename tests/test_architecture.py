@@ -31,7 +31,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/gap/workflow.py": {"threadpoolctl"},
     "soilml/inference/posterior.py": {"threadpoolctl"},
     "soilml/log_import/windows/stances.py": {"scipy"},
-    "soilml/systems/rim_stress/deconvolution.py": {"scipy"},
+    "soilml/systems/rim_stress/stress.py": {"scipy"},
     "soilml/systems/tracked_robot/signals.py": {"scipy"},
     "soilml/experiment_design/presentation.py": {"matplotlib"},
     "soilml/gap/evidence/repeats.py": {"scipy"},
