@@ -22,7 +22,6 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/cli/progress.py": {"rich"},
     "soilml/io/csv_by_arrow.py": {"pyarrow"},
     "soilml/io/parquet.py": {"pyarrow"},
-    "soilml/log_import/readers/text_by_arrow.py": {"pyarrow"},
     "soilml/io/spreadsheet.py": {"python_calamine"},
     "soilml/io/table.py": {"pyarrow"},
     "soilml/fitting/scipy_descents.py": {"scipy"},
