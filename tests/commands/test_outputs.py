@@ -54,7 +54,11 @@ def test_no_command_writes_over_what_it_reads(folder, capsys, small_model, small
         ["identify", "model.toml", "runs.csv", "--out", "model.toml"], capsys, "must end in .json"
     )
     refused(["generate", "recipe.toml", "recipe.toml"], capsys, "must end in .parquet")
-    refused(["compare", "model.toml", data, model, "--out", "m.csv"], capsys, "m.csv is a file; needed is a folder")
+    refused(
+        ["compare", "model.toml", data, model, "--out", "m.csv"],
+        capsys,
+        "m.csv is a file; needed is a folder",
+    )
     assert {p: p.read_bytes() for p in folder.iterdir()} == before
 
 
