@@ -115,7 +115,7 @@ def _column(file: Path, name: str, cells: Any) -> Column:
     if name in TEXT:
         coded = cells.dictionary_encode()
         shown = [text or "" for text in coded.dictionary.to_pylist()]
-        _need(not any('"' in text for text in shown))
+        _need(not any('"' in cell for cell in shown))
         texts = [cell_as_text(text.strip()) for text in shown]
         column: Column = text_column(texts, lambda _: str(file))[coded.indices.to_numpy()]
         return column
