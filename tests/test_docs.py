@@ -25,7 +25,6 @@ RUN = (
     "docs/how-to/train.md",
     "docs/papers/comin2017.md",
     "docs/papers/nagatani2009.md",
-    "docs/reference/tables.md",
     "exported/README.md",
 )
 
