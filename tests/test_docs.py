@@ -23,8 +23,6 @@ RUN = (
     "docs/how-to/pull.md",
     "docs/how-to/drive.md",
     "docs/how-to/train.md",
-    "docs/papers/comin2017.md",
-    "docs/papers/nagatani2009.md",
     "exported/README.md",
 )
 
