@@ -21,7 +21,6 @@ RUN = (
     "docs/how-to/import.md",
     "docs/how-to/judge-a-model.md",
     "docs/how-to/pull.md",
-    "docs/how-to/drive.md",
     "docs/how-to/train.md",
     "exported/README.md",
 )
