@@ -35,7 +35,6 @@ COMMANDS = {
 OPTIONS: Mapping[str, Mapping[str, str]] = {
     "adapt": {"--soil": "--truth"},
     "bevameter": {"--json": "--out"},
-    "compare": {"--against": "--bayes-limit"},
     "drive slip": {"--json": "--out"},
     "estimate": {"--case": "--model"},
     "export c": {"--rows": "--step-rows"},

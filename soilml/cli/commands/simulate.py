@@ -30,8 +30,7 @@ The mean of a [remainder] of MODEL.toml is added; --std gives its uncertainty.
 and the share of the thrust that is left as pull (Comin and Saaj 2017, eq. 32),
 with its class: non-trafficable, unsafe from 35 %, safe from 50 %, trafficable
 from 65 %. --balance adds how a track stands: shares of the load, trim, sinkage of
-the rear wheel, tension, centre of pressure. By default its trim is that of
-MODEL.toml; with --hitch and --behind it follows from the moments of the pull.
+the rear wheel, tension, centre of pressure.
 Without --out the table is printed, aligned on a terminal and as CSV into a
 pipe.
 """
@@ -84,18 +83,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--balance", action="store_true", help="add how a track stands: shares of the load, trim"
     )
-    parser.add_argument(
-        "--hitch",
-        type=NumberFrom(-10.0, 10.0, "m"),
-        metavar="M",
-        help="with --balance: height of the pull above the belt",
-    )
-    parser.add_argument(
-        "--behind",
-        type=NumberFrom(-10.0, 10.0, "m"),
-        metavar="M",
-        help="with --balance: centre of mass behind the middle of the track",
-    )
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
     add_output(parser, "--picture", "FILE.png", "draw the columns against slip")
 
@@ -116,10 +103,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
     from soilml.row_status import Status
-    from soilml.systems.tracked_robot.robot import UNBALANCED, balanced_rows, settled_rows
+    from soilml.systems.tracked_robot.robot import balanced_rows
 
-    if not args.balance and (args.hitch is not None or args.behind is not None):
-        raise InputError("--hitch and --behind balance the moments of a track: add --balance")
     if args.label is not None and (fault := fault_of_text(args.label)):
         raise InputError(f"--run: {fault}")
     slips, loads = parse_numbers("--slip", args.slip), parse_numbers("--load", args.load)
@@ -140,15 +125,9 @@ def run(args: argparse.Namespace) -> int:
         tell(f"! --slip-angle is in degrees now: {args.slip_angle:g} degrees")
     known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
-    options["with_efficiency"], settling = args.efficiency, None
+    options["with_efficiency"] = args.efficiency
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:
-        if args.hitch is not None or args.behind is not None:
-            behind, hitch = args.behind or 0.0, args.hitch or 0.0
-            rows, settling = settled_rows(case, slip, load, behind=behind, hitch=hitch, **options)
-            if np.isnan(settling).all():
-                raise InputError(f"{UNBALANCED}; change --hitch or --behind")
-        else:
-            rows = simulate(case, slip, load, on_rows=done, **options)
+        rows = simulate(case, slip, load, on_rows=done, **options)
     failed = int(np.count_nonzero(~rows.answered))
     if failed == slip.size:
         force = case.model(case.soil, Operating(slip=slip[:1], load=load[:1], **known))
@@ -160,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
             f"no row has an equilibrium; {worst.reason}{limit}: change --load or the soil"
         )
     if args.balance:
-        rows = balanced_rows(case, rows, settling)
+        rows = balanced_rows(case, rows)
     write_columns(rows.columns, args.out, args.picture, _picture(rows, loads.size))
     for line in ignored_discrepancy(case, "simulate", "the rows have no error of the model"):
         print(line, file=sys.stderr)

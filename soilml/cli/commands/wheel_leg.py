@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.option_values import NumberFrom
 from soilml.cli.options import InputFile, add_by_option, add_ignore_extra_option, add_output
 from soilml.errors import InputError
 
@@ -80,16 +79,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
     )
-    parser.add_argument(
-        "--torque-std", type=NumberFrom(0.0, 1e6, "N m"), default=0.0, metavar="NM", help="std, N m"
-    )
-    parser.add_argument(
-        "--vibration-std",
-        type=NumberFrom(0.0, 1e4, "m/s^2"),
-        default=0.0,
-        metavar="M_S2",
-        help="std, m/s^2",
-    )
     add_by_option(parser)
     add_ignore_extra_option(parser)
     add_output(parser, "--out", "FILE.csv", "write the table to this file")
@@ -110,7 +99,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
     """The options that soil and slip share."""
-    names = ("torque_model", "vibration_model", "torque_std", "vibration_std")
+    names = ("torque_model", "vibration_model")
     return {name: getattr(args, name) for name in names}
 
 
@@ -144,7 +133,7 @@ def _known_soil(text: str) -> tuple[float, float]:
     import math
 
     from soilml.cli.option_values import parse_numbers
-    from soilml.systems.wheel_legs import GROUNDS
+    from soilml.systems.wheel_legs.resistive_force import GROUNDS
 
     if text.upper() in GROUNDS:
         ground = GROUNDS[text.upper()]
