@@ -41,7 +41,9 @@ INPUTS, OUTPUTS = table("Inputs", "input"), table("Outputs", "output")
 
 
 def of_kind(rows, kind):
-    return {next(iter(row.values())): row for row in rows if kind in row["kinds"].split(", ")}
+    """Rows by each name in their first cell, of those that files of a kind have."""
+    names = [(re.findall(r"\w+", next(iter(row.values()))), row) for row in rows]
+    return {name: row for all_, row in names for name in all_ if kind in row["kinds"].split(", ")}
 
 
 @pytest.fixture(scope="module")
