@@ -130,7 +130,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.advice_after_results import trained_case
+    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.bounds import ESTIMATES
@@ -239,7 +239,7 @@ def _row_estimates(
     """Columns with a line for every row, blank where no model has all its readings, and remarks."""
     import numpy as np
 
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.multi_sensor import fuse_estimates
     from soilml.quantities import column
@@ -305,7 +305,7 @@ def _group_estimates(
     import numpy as np
 
     from soilml.cli.progress import row_progress
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL

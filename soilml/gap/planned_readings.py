@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,12 @@ from soilml.row_status import Status
 
 #: Covariates of a plain run, where nothing else is known: a slow wheel on virgin soil, straight on,
 #: after the campaign, with a load cell that does not lag.
-USUAL_COVARIATES = {"speed": 0.05, "pass_number": 1.0, "slip_angle": 0.0, **AFTER_CAMPAIGN}
+USUAL_COVARIATES: dict[str, Any] = {
+    "speed": 0.05,
+    "pass_number": 1.0,
+    "slip_angle": 0.0,
+    **AFTER_CAMPAIGN,
+}
 
 
 def planned_readings(case: Case, design: Table) -> Readings:
@@ -34,23 +40,18 @@ def planned_readings(case: Case, design: Table) -> Readings:
     if np.any(force.status != 0):
         row = int(np.flatnonzero(force.status)[0])
         raise InputError(f"{design.place(row)}: {Status(int(force.status[row])).reason}")
-    names, readings, stds = [], [], []
-    for name in CHANNELS:
-        expected = np.asarray(getattr(force, name))
-        filled = Table({**design.columns, column(name): expected}, design.source, design.line)
-        std = positive_std(case, filled, column(name))
-        if np.isfinite(std).all():
-            names.append(name)
-            readings.append(expected)
-            stds.append(std)
+    expected = {column(name): np.asarray(getattr(force, name)) for name in CHANNELS}
+    filled = replace(design, columns={**design.columns, **expected})
+    stds = {name: positive_std(case, filled, column(name)) for name in CHANNELS}
+    names = [name for name, std in stds.items() if np.isfinite(std).all()]
     if not names:
         raise InputError("no channel has declared noise: give [noise] in the model file")
     runs, number = np.unique(design["run"], return_inverse=True)
     return Readings.of_every_row(
         at,
         names,
-        measured=np.concatenate(readings),
-        std=np.concatenate(stds),
+        measured=np.concatenate([expected[column(n)] for n in names]),
+        std=np.concatenate([stds[n] for n in names]),
         noise=[case.noise.get(column(n)) for n in names],
         run=number.astype(np.int64),
         runs=[str(r) for r in runs],
@@ -69,14 +70,10 @@ def readings_like(
 ) -> Readings:
     """Measured values (m,) of rows, in the channels and with the noise of `like`."""
     stds = []
-    for i, (name, own) in enumerate(
-        zip(like.channels, np.split(measured, len(like.channels)), strict=True)
-    ):
-        noise = like.noise[i] or case.noise.get(column(name))
-        present = like.std[like.channel == i]
-        typical = float(np.median(present)) if present.size else np.nan
-        std = np.full(own.shape, typical) if noise is None else noise.std(own)
-        stds.append(np.maximum(std, 1e-12))
+    for i, own in enumerate(np.split(measured, len(like.channels))):
+        noise = like.noise[i] or case.noise.get(column(like.channels[i]))
+        typical = np.full(own.shape, np.median(like.std[like.channel == i]))
+        stds.append(np.maximum(typical if noise is None else noise.std(own), 1e-12))
     return Readings.of_every_row(
         with_default_covariates(at, case),
         like.channels,
@@ -88,42 +85,29 @@ def readings_like(
 
 
 def joined_readings(first: Readings, second: Readings) -> Readings:
-    """The readings of two sets of rows together; covariates that one of them lacks are usual."""
-    sizes = len(first.run), len(second.run)
+    """Planned readings of two sets of rows; covariates that one of them lacks are usual."""
+    sizes, channels = (len(first.run), len(second.run)), len(first.channels)
+    usual = USUAL_COVARIATES | {"gear": UNNAMED_GEAR}
+    known = [k for k in usual if not getattr(first.at, k) is getattr(second.at, k) is None]
 
-    def rows(name: str) -> Floats:
-        values = [getattr(part.at, name) for part in (first, second)]
-        known = [USUAL_COVARIATES[name] if value is None else value for value in values]
-        return np.concatenate([np.broadcast_to(v, n) for v, n in zip(known, sizes, strict=True)])
+    def rows(name: str) -> NDArray[Any]:
+        given = (getattr(part.at, name) for part in (first, second))
+        values = [usual[name] if value is None else value for value in given]
+        return np.concatenate([np.broadcast_to(v, n) for v, n in zip(values, sizes, strict=True)])
 
-    given = {
-        k for k in USUAL_COVARIATES for part in (first, second) if getattr(part.at, k) is not None
-    }
-    at = Operating(slip=rows("slip"), load=rows("load"), **{name: rows(name) for name in given})
-    return replace(
-        first,
-        at=replace(at, gear=_joined_gears(first, second)),
+    def readings(name: str) -> Floats:
+        parts = (np.split(getattr(part, name), channels) for part in (first, second))
+        return np.concatenate([own for pair in zip(*parts, strict=True) for own in pair])
+
+    return Readings.of_every_row(
+        Operating(**{name: rows(name) for name in ("slip", "load", *known)}),
+        first.channels,
+        measured=readings("measured"),
+        std=readings("std"),
+        noise=first.noise,
         run=np.concatenate([first.run, second.run + len(first.runs)]),
         runs=(*first.runs, *second.runs),
-        order=np.concatenate([first.order, second.order]),
-        row=np.concatenate([first.row, second.row + sizes[0]]),
-        channel=np.concatenate([first.channel, second.channel]),
-        measured=np.concatenate([first.measured, second.measured]),
-        std=np.concatenate([first.std, second.std]),
-        from_case=np.concatenate([first.from_case, second.from_case]),
-        slip_std=np.concatenate([first.slip_std, second.slip_std]),
-        load_std=np.concatenate([first.load_std, second.load_std]),
-        sensor_std=None,
     )
-
-
-def _joined_gears(first: Readings, second: Readings) -> NDArray[np.str_] | None:
-    """The gears of two sets of rows together; None where both name none."""
-    if first.at.gear is None and second.at.gear is None:
-        return None
-    gears = (UNNAMED_GEAR if part.at.gear is None else part.at.gear for part in (first, second))
-    counts = (len(first.run), len(second.run))
-    return np.concatenate([np.broadcast_to(g, n) for g, n in zip(gears, counts, strict=True)])
 
 
 def carried_rows(case: Case, at: Operating) -> NDArray[np.bool_]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,17 +12,16 @@ from soilml.arrays import Floats
 from soilml.config.case import Case
 from soilml.errors import InputError, solvable
 from soilml.fitting.candidate_effects import candidate_effects
-from soilml.fitting.coordinates import Coordinate, free_soil_parameters
-from soilml.fitting.effect_signatures import Signature, effect_signatures
+from soilml.fitting.coordinates import free_soil_parameters
+from soilml.fitting.effect_signatures import effect_signatures
 from soilml.fitting.least_squares import SoilTestTerms
 from soilml.fitting.predictions import linearise
 from soilml.fitting.readings import Readings
 from soilml.fitting.usable_readings import answered_rows
-from soilml.gap.design.planned_readings import expected_readings, joined_readings, planned_readings
-from soilml.gap.design.run_kinds import check_costs
-from soilml.gap.design.run_options import RunOption, run_options
-from soilml.gap.evidence.similarity import SignatureSimilarity
-from soilml.gap.report.results import as_json_entry
+from soilml.gap.planned_readings import expected_readings, joined_readings, planned_readings
+from soilml.gap.results import as_json_entry
+from soilml.gap.run_options import LUG_EFFECTS, check_costs, run_options
+from soilml.gap.scores import SignatureSimilarity
 from soilml.io.read_table import Rows, as_table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
@@ -32,9 +31,15 @@ from soilml.results import Result
 if TYPE_CHECKING:
     from soilml.report.report import Report
 
-
-#: Largest difference, in sigma of a reading, of two signatures that count as equal.
-SAME_PREDICTION = 0.1
+#: Approximate 95 % quantile of the largest score of the catalogue in data without a gap.
+DETECTION_THRESHOLD = 3.0
+#: 80 % quantile of the standard normal distribution: the power at which an effect is detectable.
+POWER_QUANTILE = 0.8416
+#: Separation, in sigma, from which an effect can be named, and below which two effects are
+#: indistinguishable.
+NAMEABLE_SIGMA, SAME_CLASS_SIGMA = 3.0, 2.0
+LISTED_RIVALS = 3  # Rivals that are listed for each effect
+LEAST_LEFT = 1e-6  # Signal beside the soil, in sigma, up to which no size is detectable
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,7 @@ class Audit(Result):
 
     def report(self) -> Report:
         """Which effects could be named, and the runs that would add most."""
-        from soilml.gap.design.audit_report import audit_report
+        from soilml.gap.audit_report import audit_report
 
         return audit_report(self, NAMEABLE_SIGMA)
 
@@ -146,92 +151,55 @@ def audit(
     known_costs = check_costs(costs or {})
     design, _ = answered_rows(as_table(design))
     readings = planned_readings(case, design)
-    coordinates = free_soil_parameters(case, free)
-    nominal = np.asarray([c.prior.fraction(c.nominal) for c in coordinates])
-    jacobian = linearise(case, coordinates, nominal, readings).jacobian / readings.std[:, None]
-    of_tests = SoilTestTerms(case, coordinates).rates(nominal)
-    jacobian = np.vstack([jacobian, of_tests])
-    signatures, untestable = effect_signatures(case, readings, effects)
-    table = identifiability(signatures, readings.std, jacobian, effects)
-    before = {e.name for e in table if e.nameable}
-    added_runs = []
-    for option in run_options(readings, case, tuple(effects.values())):
+    soil = free_soil_parameters(case, free)
+    x = np.asarray([c.prior.fraction(c.nominal) for c in soil])
+    of_tests = SoilTestTerms(case, soil).rates(x)
+
+    def signals(*parts: tuple[Case, Readings]) -> tuple[dict[str, Floats], Floats]:
+        """Whitened signatures by name, and Jacobian of the soil, of the rows of some parts."""
+        found, jacobians = [], []
+        for number, (own, part) in enumerate(parts):
+            known = {n: e for n, e in effects.items() if not number or n not in LUG_EFFECTS}
+            columns = effect_signatures(own, part, known)[0]
+            found.append({s.name: s.column / part.std for s in columns})
+            jacobians.append(linearise(own, soil, x, part).jacobian / part.std[:, None])
+        none = [np.zeros(len(part)) for _, part in parts]
+        pooled = {}
+        for name in dict.fromkeys(name for own in found for name in own):
+            rows = [one.get(name, zero) for one, zero in zip(found, none, strict=True)]
+            pooled[name] = np.concatenate([*rows, np.zeros(len(of_tests))])
+        return pooled, np.vstack([*jacobians, of_tests])
+
+    def nameable(*parts: tuple[Case, Readings]) -> set[str]:
+        return {e.name for e in identifiability(*signals(*parts), effects) if e.nameable}
+
+    columns, jacobian = signals((case, readings))
+    table = identifiability(columns, jacobian, effects)
+    added_runs, before = [], {e.name for e in table if e.nameable}
+    for option in run_options(readings, case, list(effects)):
+        changed, known = option.changed(case), before
         try:
-            extended = _with_added_run(
-                case, readings, option, coordinates, nominal, effects=effects
-            )
+            new = expected_readings(option.at, readings, changed, option.kind)
+            if option.smooth:
+                extended = nameable((case, readings), (changed, new))
+            else:
+                extended = nameable((case, joined_readings(readings, new)))
+            if option.plain is not None:  # what a repeat gains is no gain of the covariate
+                repeat = expected_readings(option.plain, readings, case)
+                known = before | nameable((case, joined_readings(readings, repeat)))
         except (InputError, np.linalg.LinAlgError):
             continue
-        if not extended:
-            continue
-        gained = sorted(e.name for e in extended if e.nameable and e.name not in before)
+        gained = sorted(extended - known)
         cost = known_costs.get(option.kind, 1.0) if known_costs else None
-        nameable = len(before) + len(gained)
-        added_runs.append(AddedRun(option.kind, option.text, nameable, tuple(gained), cost))
+        count = len(before) + len(gained)
+        added_runs.append(AddedRun(option.kind, option.text, count, tuple(gained), cost))
     added_runs.sort(key=lambda run: -len(run.gained) / (run.cost or 1.0))
     return Audit(
         effects=tuple(sorted(table, key=lambda e: -e.separating_snr)),
-        classes=indistinguishable_classes(signatures, readings.std, jacobian),
-        untestable=untestable,
+        classes=indistinguishable_classes(columns, jacobian),
+        untestable=effect_signatures(case, readings, effects)[1],
         added_runs=tuple(added_runs),
     )
-
-
-def _with_added_run(
-    case: Case,
-    readings: Readings,
-    option: RunOption,
-    coordinates: Sequence[Coordinate],
-    x: Floats,
-    effects: Mapping[str, type[Effect]],
-) -> list[EffectIdentifiability]:
-    """The identifiability of effects by a design with one run added; none if it adds a repeat."""
-    new = expected_readings(option.at, readings, option.changed(case), option.kind)
-    parts = [(case, joined_readings(readings, new))]
-    if option.gear is not None:
-        parts = [(case, readings), (option.changed(case), new)]
-    by_part, stds, jacobians = [], [], []
-    for changed, part in parts:
-        removed = option.gear.removed if option.gear and part is new else ()
-        known = {name: e for name, e in effects.items() if name not in removed}
-        signatures, _ = effect_signatures(changed, part, known)
-        by_part.append({s.name: s for s in signatures})
-        stds.append(part.std)
-        found = linearise(changed, coordinates, x, part)
-        jacobians.append(found.jacobian / part.std[:, None])
-    if option.plain is not None:
-        plain = joined_readings(readings, expected_readings(option.plain, readings, case))
-        usual = {s.name: s.column for s in effect_signatures(case, plain, effects)[0]}
-        if _are_equal(usual, by_part[0], stds[0]):
-            return []
-    of_tests = SoilTestTerms(case, coordinates).rates(x)
-    pooled = []
-    for name in sorted(set().union(*by_part)):
-        columns = [
-            own[name].column if name in own else np.zeros(len(std))
-            for own, std in zip(by_part, stds, strict=True)
-        ]
-        signature = next(own[name] for own in by_part if name in own)
-        pooled.append(replace(signature, column=np.concatenate(columns)))
-    return identifiability(pooled, np.concatenate(stds), np.vstack([*jacobians, of_tests]), effects)
-
-
-def _are_equal(usual: Mapping[str, Floats], new: Mapping[str, Signature], std: Floats) -> bool:
-    """Whether all effects change the readings of two runs equally, to a tenth of a sigma."""
-    return usual.keys() == new.keys() and all(
-        bool(np.all(np.abs(usual[name] - s.column) <= SAME_PREDICTION * std))
-        for name, s in new.items()
-    )
-
-
-#: Approximate 95 % quantile of the largest score of the catalogue in data without a gap.
-DETECTION_THRESHOLD = 3.0
-#: 80 % quantile of the standard normal distribution: the power at which an effect is detectable.
-POWER_QUANTILE = 0.8416
-#: Separation, in sigma, from which an effect can be named, and below which two effects are
-#: indistinguishable.
-NAMEABLE_SIGMA, SAME_CLASS_SIGMA = 3.0, 2.0
-LISTED_RIVALS = 3  # Rivals that are listed for each effect
 
 
 class Rival(NamedTuple):
@@ -263,72 +231,55 @@ class EffectIdentifiability:
 
 
 def identifiability(
-    signatures: Sequence[Signature],
-    std: Floats,
-    jacobian: Floats,
-    effects: Mapping[str, type[Effect]],
+    columns: Mapping[str, Floats], jacobian: Floats, effects: Mapping[str, type[Effect]]
 ) -> list[EffectIdentifiability]:
-    """Norms, cosines and separations of signatures on readings with independent noise.
+    """Norms, cosines and separations of whitened signatures on readings with independent noise.
 
-    `jacobian`, (m + t, p), has the derivatives of the whitened readings by the soil, and behind
-    them those of tests of the soil, which no effect changes.
+    columns: Signatures (m + t,) by name.
+    jacobian (m + t, p): Derivatives of the whitened readings by the soil, and behind them those of
+        tests of the soil, which no effect changes.
     """
-    if not signatures:
+    if not columns:
         return []
-    columns = _whitened(signatures, std, len(jacobian))
-    similar = SignatureSimilarity.beside(jacobian, [s.name for s in signatures], columns)
-    signal, residual = np.linalg.norm(columns, axis=0), similar.norm
-    table = []
-    for i, s in enumerate(signatures):
+    similar, table = SignatureSimilarity.beside(jacobian, columns), []
+    for i, (name, column) in enumerate(columns.items()):
         nearest = np.argsort(-similar.cosine[i])[:LISTED_RIVALS]
-        about = effects[s.name].about
-        size = about.reference[about.size]
-        detectable = float("inf")
-        if residual[i] > 1e-6:
-            detectable = float((DETECTION_THRESHOLD + POWER_QUANTILE) / residual[i] * size)
+        about, left = effects[name].about, float(similar.norm[i])
+        size, signal = about.reference[about.size], float(np.linalg.norm(column))
+        detectable = (DETECTION_THRESHOLD + POWER_QUANTILE) / max(left, 1e-300) * size
         table.append(
             EffectIdentifiability(
-                name=s.name,
-                kind=s.kind,
+                name=name,
+                kind=about.kind,
                 size=size,
-                unit=declared(effects[s.name])[about.size].unit,
-                signal=float(signal[i]),
-                residual_signal=float(residual[i]),
-                absorbed=float(1.0 - (residual[i] / signal[i]) ** 2),
+                unit=declared(effects[name])[about.size].unit,
+                signal=signal,
+                residual_signal=left,
+                absorbed=1.0 - (left / signal) ** 2,
                 rivals=tuple(
                     Rival(similar.names[j], float(similar.cosine[i, j])) for j in nearest if j != i
                 ),
-                separating_snr=similar.separation(s.name, 1.0)[0],
-                detectable_size=detectable,
+                separating_snr=similar.separation(name, 1.0)[0],
+                detectable_size=detectable if left > LEAST_LEFT else float("inf"),
             )
         )
     return table
 
 
 def indistinguishable_classes(
-    signatures: Sequence[Signature], std: Floats, jacobian: Floats
+    columns: Mapping[str, Floats], jacobian: Floats
 ) -> tuple[tuple[str, ...], ...]:
     """Effects that this design cannot distinguish at their reference sizes."""
-    if not signatures:
+    from scipy.sparse.csgraph import connected_components
+
+    if not columns:
         return ()
-    columns = _whitened(signatures, std, len(jacobian))
-    similar = SignatureSimilarity.beside(jacobian, [s.name for s in signatures], columns)
-    norm, sine = similar.norm, np.sqrt(np.maximum(0.0, 1.0 - similar.cosine**2))
-    label = list(range(len(signatures)))
-    for i in range(len(signatures)):
-        for j in range(i):
-            weaker = min(norm[i], norm[j])
-            if weaker > SAME_CLASS_SIGMA and weaker * sine[i, j] < SAME_CLASS_SIGMA:
-                old, new = label[i], label[j]
-                label = [new if k == old else k for k in label]
+    similar = SignatureSimilarity.beside(jacobian, columns)
+    weaker = np.minimum.outer(similar.norm, similar.norm)
+    sine = np.sqrt(np.maximum(0.0, 1.0 - similar.cosine**2))
+    alike = (weaker > SAME_CLASS_SIGMA) & (weaker * sine < SAME_CLASS_SIGMA)
+    _, label = connected_components(alike, directed=False)
     groups = [
-        tuple(s.name for s, k in zip(signatures, label, strict=True) if k == g) for g in set(label)
+        tuple(n for n, k in zip(columns, label, strict=True) if k == g) for g in np.unique(label)
     ]
     return tuple(sorted(g for g in groups if len(g) > 1))
-
-
-def _whitened(signatures: Sequence[Signature], std: Floats, rows: int) -> Floats:
-    """Whitened signatures (rows, k), zero behind the readings."""
-    columns = np.zeros((rows, len(signatures)))
-    columns[: len(std)] = np.stack([s.column for s in signatures], axis=1) / std[:, None]
-    return columns

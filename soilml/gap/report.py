@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from soilml.gap.checks import MIN_RESIDUAL_READINGS, NAMING_RESIDUAL_READINGS
-from soilml.gap.report.listed_explanations import needed_sizes
-from soilml.gap.report.pictures import bars_picture, map_picture, remainder_picture
-from soilml.gap.report.results import STATUSES, GapReport
+from soilml.gap.pictures import bars_picture, map_picture, remainder_picture
+from soilml.gap.results import STATUSES, GapReport
+from soilml.gap.sentences import needed_sizes
 from soilml.io.text_tables import csv_text
 from soilml.remarks import texts
 from soilml.report.numbers import channel_name
@@ -18,16 +18,13 @@ from soilml.report.page import Provenance, json_text, page, report_entry
 from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 
-if TYPE_CHECKING:
-    pass
-
 #: What the reader should do, by status.
 _ADVICE = {
     "no-gap": "Use the model as it is, within the measured range of slip and load.",
     "undecided": "Find out why the measurements disagree: correct the noise in the model file or "
     "the runs, and analyse again.",
-    "suspected": "Make the first run under Next runs. model.toml contains the first suspect, "
-    "marked as such, where it predicts rows kept back better; else the soil alone.",
+    "suspected": "Make the first run under Next runs. model.toml mixes the explanations that hold "
+    "95 % together, each with its weight.",
     "partly-named": "model.toml contains the effect and, under [discrepancy], the size of what is "
     "left, which widens every interval computed from it. Make the first run under Next runs.",
     "named": "model.toml contains the effect. Make the first run under Next runs to confirm it.",
@@ -78,16 +75,13 @@ _NOTATION = (
 
 def gap_report(found: GapReport, title: str = "Gap between model and measurements") -> Report:
     """The report of a gap analysis: verdict, readings beside the model, where, how large, what."""
-    details: list[tuple[str, Sequence[str]]] = []
-    if found.status == "bad-data":
-        details.append(("What an analysis needs", _NEEDED))
-    if found.reasons:
-        details.append(("Why no cause is certain", texts(found.reasons)))
-    if found.not_claimed:
-        details.append(("Conclusions that this report does not support", texts(found.not_claimed)))
-    if found.untestable:
-        untested = [f"{name}: {why.text}" for name, why in found.untestable.items()]
-        details.append(("Effects that these runs cannot test", untested))
+    untested = [f"{name}: {why.text}" for name, why in found.untestable.items()]
+    details: list[tuple[str, Sequence[str]]] = [
+        ("What an analysis needs", _NEEDED if found.status == "bad-data" else ()),
+        ("Why no cause is certain", texts(found.reasons)),
+        ("Conclusions that this report does not support", texts(found.not_claimed)),
+        ("Effects that these runs cannot test", untested),
+    ]
     step = _ADVICE.get(found.status, "")
     if found.status in _ADVISES_NEXT_RUN and not found.next_runs:
         step = "Make runs at other slips and loads, and analyse all runs together."
@@ -100,7 +94,7 @@ def gap_report(found: GapReport, title: str = "Gap between model and measurement
         pictures=[*_pictures(found)],
         remarks=found.notes,
         next_steps=[step] if step else [],
-        details=details,
+        details=[entry for entry in details if entry[1]],
         status=found.status,
         tone=_TONES.get(found.status, "warn"),
         title=title,
@@ -124,29 +118,26 @@ def _parameters(found: GapReport) -> ReportTable | None:
     columns = found.frame_columns()
     if not columns["parameter"]:
         return None
-    more: dict[str, Any] = {}
-    if found.soil_before != found.soil_after:
-        more["soil alone"] = Column(
-            "soil alone",
-            columns["mean_before"],
-            columns["unit"],
-            columns["std_before"],
-            sizes=columns["mean"],
-        )
-    note = ""
-    if more:
-        note = f"The soil {shown_model(found)}; 'soil alone' is biased where an effect is missing."
-        if not found.effects and not found.best_unclaimed:
-            note = "The soil beside a smooth discrepancy of unknown cause, and alone."
-    return ReportTable.of_parameters("Soil and effects", columns, note, **more)
+    if found.soil_before == found.soil_after:
+        return ReportTable.of_parameters("Soil and effects", columns)
+    alone = Column(
+        "soil alone",
+        columns["mean_before"],
+        columns["unit"],
+        columns["std_before"],
+        sizes=columns["mean"],
+    )
+    note = f"The soil {shown_model(found)}; 'soil alone' is biased where an effect is missing."
+    if not found.effects and not found.best_unclaimed:
+        note = "The soil beside a smooth discrepancy of unknown cause, and alone."
+    return ReportTable.of_parameters("Soil and effects", columns, note, **{"soil alone": alone})
 
 
 def _tables(found: GapReport) -> Iterator[ReportTable]:
-    changed = any(part.shrinks for part in found.gap.values())
     if found.status in _WITH_SUSPECTS and found.suspects:
         yield _suspects(found)
     if found.gap:
-        yield _sizes(found, changed)
+        yield _sizes(found)
     if found.effects:
         yield ReportTable(
             "Added effects",
@@ -202,7 +193,6 @@ def _suspects(found: GapReport) -> ReportTable:
         Column(
             "ln(density kept back)",
             [np.nan if s.predictive_gain is None else s.predictive_gain for s in shown],
-            std=[s.predictive_gain_error or 0.0 for s in shown],
             digits=3,
         ),
     ]
@@ -212,26 +202,32 @@ def _suspects(found: GapReport) -> ReportTable:
     return ReportTable("Suspects", columns, note)
 
 
-def _sizes(found: GapReport, changed: bool) -> ReportTable:
+def _sizes(found: GapReport) -> ReportTable:
     """Mean squared residuals by part of the rows and channel, before and after."""
     rows = [
-        (PARTS.get(key, key.replace("_", " ")), name, before, after, part)
+        (
+            PARTS.get(key, key.replace("_", " ")),
+            name,
+            before,
+            after if part.shrinks else np.nan,
+            part,
+        )
         for key, part in found.gap.items()
         for name, (before, after) in (
             ("all readings", (part.before, part.after)),
             *((channel_name(n), pair) for n, pair in part.channels.items()),
         )
     ]
+    where, channel, before, after, parts = map(list, zip(*rows, strict=True))
     columns = [
-        Column("rows", [row[0] for row in rows]),
-        Column("channel", [row[1] for row in rows]),
-        Column("soil alone", [row[2] for row in rows], digits=3),
+        Column("rows", where),
+        Column("channel", channel),
+        Column("soil alone", before, digits=3),
     ]
-    if changed:
-        after = [row[3] if row[4].shrinks else np.nan for row in rows]
+    if not np.isnan(after).all():
         columns.append(Column("after", after, digits=3))
-    columns.append(Column("readings", [row[4].readings for row in rows]))
-    columns.append(Column("what", [row[4].description for row in rows]))
+    columns.append(Column("readings", [part.readings for part in parts]))
+    columns.append(Column("what", [part.description for part in parts]))
     note = "Mean squared residual in sigma; noise alone gives 1. Blank: not smaller after."
     return ReportTable("Size of the gap", columns, note)
 

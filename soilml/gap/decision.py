@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from soilml.fitting.least_squares import Solution
-from soilml.gap.evidence.held_out import PredictiveGain
-from soilml.gap.report.results import Suspect
-from soilml.gap.report.sentences import NOT_DECISIVE
+from soilml.gap.results import Suspect
+from soilml.gap.sentences import NOT_DECISIVE
 from soilml.inference import constants
 from soilml.inference.explanation import Explanation
 from soilml.inference.posterior import Names, Posterior
@@ -18,46 +17,30 @@ from soilml.quantities import column
 from soilml.remarks import Remark
 
 LISTED_SUSPECTS = 8  # Suspects that are listed
-#: Code of the reason that the soil alone explains the rows where its priors are opened.
-OUTSIDE_PRIORS = "soil-outside-priors"
-#: Why an explanation that the evidence supports is not claimed.
-IMPLAUSIBLE_FAULT = (
-    "{} would explain the gap, but would have to be implausibly large for a fault of a sensor or "
-    "of the rig: check that first"
-)
-IMPLAUSIBLE_SIZE = (
-    "{} would have to be far larger than it usually is, so that its law or the cause is another one"
-)
-NOT_PREDICTIVE = (
-    "{} fits the rows, but beside a smooth remainder, it predicts rows that were kept back no "
-    "better than the soil alone does"
-)
-OTHER_LAW = (
-    "the law of {} would have to differ much from that of the catalogue, so that the cause may be "
-    "one that the catalogue lacks"
-)
-UNCHECKED_FAULT = (
-    "{} explains the gap, but what looks like a fault of a sensor or of the rig may be a law that "
-    "the catalogue lacks: check it, and state the check with --checked"
-)
-NOT_CATALOGUED = "beside {}, at least four times the usual error of a model is left in the {}"
+#: Why an explanation that the evidence supports is not claimed, by codes.
+_DOUBTS = {
+    "implausible-fault": "{} would explain the gap, but would have to be implausibly large for a "
+    "fault of a sensor or of the rig: check that first",
+    "implausible-size": "{} would have to be far larger than it usually is, so that its law or the "
+    "cause is another one",
+    "not-predictive": "{} fits the rows, but beside a smooth remainder, it predicts rows that were "
+    "kept back no better than the soil alone does",
+    "other-law": "the law of {} would have to differ much from that of the catalogue, so that the "
+    "cause may be one that the catalogue lacks",
+    "unchecked-fault": "{} explains the gap, but what looks like a fault of a sensor or of the rig "
+    "may be a law that the catalogue lacks: check it, and state the check with --checked",
+}
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The status, the sets of effects it claims, and the one whose figures are shown.
-
-    claimed: The sets that are stated as causes.
-    listed: The sets that the data do not reject, the first suspect first.
-    shown: The hypothesis of the first one; None where nothing is named or suspected.
-    reason: Why an explanation that the evidence supports is not claimed.
-    """
+    """The status, the sets of effects it claims, and the one whose figures are shown."""
 
     status: str
-    claimed: tuple[Names, ...] = ()
-    listed: tuple[Names, ...] = ()
-    shown: Explanation | None = None
-    reason: Remark | None = None
+    claimed: tuple[Names, ...] = ()  # the sets that are stated as causes
+    listed: tuple[Names, ...] = ()  # those that the data do not reject, the first suspect first
+    shown: Explanation | None = None  # that of the first one; None where nothing is suspected
+    reason: Remark | None = None  # why what the evidence supports is not claimed
 
 
 def ranked_sets(posterior: Posterior) -> list[Names]:
@@ -84,18 +67,17 @@ def not_rejected(posterior: Posterior, ranked: Sequence[Names]) -> tuple[Names, 
         return ()
     sets, first = posterior.sets, ranked[0]
     least = constants.REJECTED * max(sets[names] for names in ranked)
-    kept = [n for n in ranked[1:] if sets[n] >= least and not set(first) < set(n)]
-    kept = [first, *kept]
+    kept = [first, *(n for n in ranked[1:] if sets[n] >= least and not set(first) < set(n))]
     return tuple(n for n in kept if not any(set(other) < set(n) for other in kept))
 
 
 def decide(
     posterior: Posterior,
-    gains: Mapping[Names, PredictiveGain],
+    gains: Mapping[Names, float],
     obstacles: Sequence[Remark],
     disagreements: Sequence[Remark],
 ) -> Decision:
-    """The status of a report; see `soilml.gap.report.results.STATUSES`.
+    """The status of a report; see `soilml.gap.results.STATUSES`.
 
     gains: Log density of rows kept back by the first sets, above that of the soil alone.
     obstacles: Why these runs cannot identify a cause.
@@ -118,19 +100,19 @@ def decide(
     suspected = Decision("suspected", (), listed, node)
     if obstacles:
         return suspected
-    if reason := _doubt(posterior, node, gains.get(best)):
+    if reason := _doubt(posterior, node, gains.get(best, np.inf)):
         return replace(suspected, reason=reason)
     if none > constants.UNCERTAIN:
         return replace(suspected, reason=NOT_DECISIVE)
-    if chance >= constants.NAMED_PROBABILITY and (unchecked := _unchecked_faults(posterior, best)):
-        text = UNCHECKED_FAULT.format(" + ".join(unchecked))
-        return replace(suspected, reason=Remark("unchecked-fault", text, unchecked))
     if chance >= constants.NAMED_PROBABILITY:
+        if unchecked := _unchecked_faults(posterior, best):
+            return replace(suspected, reason=_reason("unchecked-fault", unchecked))
+        status = "named"
         if node.share_without < 0.5:
-            return Decision("partly-named", (best,), listed[:1], node)
-        if node.hypothesis.free_law and law_matters(posterior, node):
-            return Decision("form-open", (best,), listed[:1], node)
-        return Decision("named", (best,), listed[:1], node)
+            status = "partly-named"
+        elif node.hypothesis.free_law and law_matters(posterior, node):
+            status = "form-open"
+        return Decision(status, (best,), listed[:1], node)
     together = sum(posterior.sets[names] for names in listed)
     if none <= constants.CHANCE and len(listed) > 1 and together >= constants.CLASS_PROBABILITY:
         return Decision("class", listed, listed, node)
@@ -143,23 +125,27 @@ def _is_other_soil(posterior: Posterior) -> bool:
     return alone is not None and alone.hypothesis.wide_priors and alone.share_without > 0.5
 
 
-def _doubt(posterior: Posterior, node: Explanation, gain: PredictiveGain | None) -> Remark | None:
+def _reason(code: str, names: Names) -> Remark:
+    return Remark(code, _DOUBTS[code].format(" + ".join(names)), names)
+
+
+def _doubt(posterior: Posterior, node: Explanation, gain: float) -> Remark | None:
     """Why an explanation is not claimed, whatever its probability is."""
     names = node.hypothesis.effects
-    text = " + ".join(names)
     if faults := implausible_faults(node.fit):
-        return Remark("implausible-fault", IMPLAUSIBLE_FAULT.format(" + ".join(faults)), faults)
+        return _reason("implausible-fault", faults)
     if implausible_sizes(node.fit):
-        return Remark("implausible-size", IMPLAUSIBLE_SIZE.format(text), names)
-    if gain is not None and not gain.is_better:
-        return Remark("not-predictive", NOT_PREDICTIVE.format(text), names)
+        return _reason("implausible-size", names)
+    if not gain > 0.0:
+        return _reason("not-predictive", names)
     amplitude = posterior.terms.amplitude(node.at)
     if amplitude.max(initial=0.0) >= constants.LARGE_REMAINDER:
         left = posterior.terms.readings.channels[int(np.argmax(amplitude))]
-        text = NOT_CATALOGUED.format(text, left.replace("_", " "))
+        text = f"beside {' + '.join(names)}, at least four times the usual error of a model is left"
+        text += f" in the {left.replace('_', ' ')}"
         return Remark("not-catalogued", text, (*names, column(left)))
     if posterior.by_other_law(node.hypothesis):
-        return Remark("other-law", OTHER_LAW.format(text), names)
+        return _reason("other-law", names)
     return None
 
 
@@ -194,7 +180,7 @@ def implausible_sizes(fit: Solution) -> dict[str, float]:
 
 
 def suspects(
-    posterior: Posterior, decision: Decision, gains: Mapping[Names, PredictiveGain]
+    posterior: Posterior, decision: Decision, gains: Mapping[Names, float]
 ) -> list[Suspect]:
     """Explanations with their odds against all others, the first one that is shown first."""
     ranked = ranked_sets(posterior)
@@ -203,17 +189,10 @@ def suspects(
     rest = [n for n in rest if not any(set(n) <= set(o) or set(o) < set(n) for o in first)]
     found = []
     for names in [*first, *rest[: LISTED_SUSPECTS - 1]]:
-        gain, node = gains.get(names), posterior.node_of(names)
-        found.append(
-            Suspect(
-                names,
-                posterior.log_odds(*names),
-                posterior.probability(*names),
-                None if gain is None else gain.value,
-                None if gain is None else gain.std_error,
-                times_usual={} if node is None else implausible_sizes(node.fit),
-            )
-        )
+        node, odds = posterior.node_of(names), posterior.log_odds(*names)
+        sizes = {} if node is None else implausible_sizes(node.fit)
+        chance = posterior.probability(*names)
+        found.append(Suspect(names, odds, chance, gains.get(names), sizes))
     return found
 
 
@@ -225,19 +204,18 @@ def reasons(
     Of the replicate rows that disagree, the worst are named beside the suspects, because no
     suspect explains their difference.
     """
-    match decision.status:
-        case "undecided":
-            return tuple(disagreements)
-        case "suspected":
-            why = (*obstacles, decision.reason) if decision.reason else tuple(obstacles)
-            if not disagreements:
-                return why
-            worst = disagreements[0]
-            text = f"replicate rows disagree: {worst}"
-            return (*(why or (NOT_DECISIVE,)), replace(worst, text=text))
-        case "not-testable":
-            return tuple(obstacles)
-    return (decision.reason,) if decision.reason else ()
+    if decision.status == "undecided":
+        return tuple(disagreements)
+    own = (decision.reason,) if decision.reason else ()
+    if decision.status == "not-testable":
+        return tuple(obstacles)
+    if decision.status != "suspected":
+        return own
+    why = (*obstacles, *own)
+    if not disagreements:
+        return why
+    worst = replace(disagreements[0], text=f"replicate rows disagree: {disagreements[0]}")
+    return (*(why or (NOT_DECISIVE,)), worst)
 
 
 def law_matters(posterior: Posterior, node: Explanation) -> bool:
@@ -254,10 +232,9 @@ def law_matters(posterior: Posterior, node: Explanation) -> bool:
     difference = node.fit.prediction - catalogue.fit.prediction
     for i in range(len(readings.channels)):
         in_channel = readings.channel == i
-        values = readings.measured[in_channel]
-        rms = float(np.sqrt(np.mean(difference[in_channel] ** 2)))
-        mean_error = float(np.sqrt(np.mean(posterior.std[in_channel] ** 2) / values.size))
-        span = max(float(values.max()), 0.0) - min(float(values.min()), 0.0)
+        rms = np.sqrt(np.mean(difference[in_channel] ** 2))
+        mean_error = np.sqrt(np.mean(posterior.std[in_channel] ** 2) / in_channel.sum())
+        span = np.ptp(np.append(readings.measured[in_channel], 0.0))
         if rms > max(mean_error, constants.NEGLIGIBLE_FRACTION * span):
             return True
     return False

@@ -23,7 +23,7 @@ from soilml.report.report import Picture
 
 if TYPE_CHECKING:
     from soilml.config.remainder import Remainder, RemainderPart
-    from soilml.gap.report.results import GapReduction, GapReport
+    from soilml.gap.results import GapReduction, GapReport
 
 _SIGNIFICANT = 0.05  # Family-wise p value below which a region is marked
 _MOST_SCORE = 30.0  # Score of the darkest colour, sigma

@@ -11,7 +11,7 @@ from soilml.report.report import Picture, Report
 from soilml.report.tables import Column, ReportTable
 
 if TYPE_CHECKING:
-    from soilml.gap.design.identifiability import Audit
+    from soilml.gap.identifiability import Audit
 
 _MOST_RUNS = 5  # Runs to add that are listed
 

@@ -10,8 +10,8 @@ import numpy as np
 from soilml.config.case import Case
 from soilml.errors import InputError
 from soilml.fitting.fitted_readings import FittedReadings
-from soilml.gap.report.remainder_cause import RemainderCause
-from soilml.gap.report.soil_test_agreement import SoilTestAgreement, soil_test_agreement
+from soilml.physics.soils.soil_tests import deviations
+from soilml.quantities import CHANNELS
 from soilml.remarks import Remark
 from soilml.report.numbers import format_residual
 from soilml.results import EstimatedValue, Result
@@ -37,12 +37,10 @@ class NamedEffect:
     name: str
     parameters: dict[str, EstimatedValue]
     alternatives: tuple[str, ...]  # effects of the other explanations that the data do not reject
-    #: sigma that distinguish the effect, at its size, from the soil and its nearest rival
-    separating_snr: float
+    separating_snr: float  # sigma between it, at its size, and the soil and its nearest rival
     nearest_rival: str
-    #: posterior probability that the effect is present, and the natural logarithm of its odds
-    probability: float
-    log_odds: float
+    probability: float  # that it is present
+    log_odds: float  # natural logarithm
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,6 @@ class Suspect:
     #: Logarithm of the density of rows kept back, above that of the soil alone, both beside a
     #: smooth remainder; None where no row was kept back for it
     predictive_gain: float | None = None
-    #: Its standard error, by which folds of them differ by chance; None where no part has two
-    predictive_gain_error: float | None = None
     #: Sizes of its effects that are implausibly large, in usual ones, by name
     times_usual: dict[str, float] = field(default_factory=dict)
 
@@ -71,6 +67,52 @@ class RemainingDiscrepancy:
     before_sigma: float
     after_sigma: float
     description: str  # where the discrepancy after is largest, in words
+
+
+#: Stages of a model in words, as the object of "looks like"; others are channels.
+_STAGES = {
+    "contact geometry": "a change of the contact geometry",
+    "normal stress": "a change of the normal stress",
+    "shear stress": "a change of the shear stress",
+    "slip or load": "a slip or load other than the stated one",
+}
+#: Variables whose names differ from those of a report.
+_VARIABLES = {"pass_number": "the pass", "slip_angle": "the slip angle", "progress": "time"}
+
+
+@dataclass(frozen=True)
+class RemainderCause:
+    """A description of the cause of a remainder, not a name."""
+
+    stage: str  # a key of `_STAGES`, or the one channel that has it: a force or a sensor
+    depends_on: str  # the quantity of which it is a smooth function; empty where unknown
+    channels: tuple[str, ...]  # whose readings it changes by more than half of their noise
+    #: That the remainder acts at this stage, all others, several causes together and unknown ones
+    #: included: at most 0.95
+    probability: float
+    #: Log density of rows kept back, above that of a smooth remainder in each channel; mean
+    predictive_gain: float
+    beside: tuple[str, ...] = ()  # effects beside which the remainder is left
+
+    def remark(self) -> Remark:
+        """The description in one or two sentences.
+
+        >>> found = RemainderCause("normal stress", "load", ("torque", "sinkage"), 0.96, 4.2)
+        >>> print(found.remark())
+        The remainder beside the soil alone looks like a change of the normal stress that depends on
+        load. Torque and sinkage share it.
+        """
+        alone, own = self.stage in CHANNELS, self.stage.replace("_", " ")
+        depends = shared = ""
+        if self.depends_on:
+            depends = f" that depends on {_VARIABLES.get(self.depends_on, self.depends_on)}"
+        what = f"an error of the {own} alone, of a force or of its sensor{',' if depends else ''}"
+        if not alone and len(self.channels) > 1:
+            *first, last = (channel.replace("_", " ") for channel in self.channels)
+            shared = f" {', '.join(first).capitalize()} and {last} share it."
+        beside = " + ".join(self.beside) or "the soil alone"
+        text = f"The remainder beside {beside} looks like {_STAGES.get(self.stage, what)}{depends}."
+        return Remark("remainder-cause", text + shared, (self.stage,), "note")
 
 
 @dataclass(frozen=True)
@@ -107,10 +149,9 @@ class GapReduction:
 
 @dataclass(frozen=True)
 class CandidateSummary:
-    """A candidate: predicted and achieved decrease of -2 ln p, and its verdict."""
+    """A fitted set of effects: the decrease of -2 ln p that it achieves, and its verdict."""
 
     effects: tuple[str, ...]
-    predicted_gain: float
     achieved_gain: float
     excess: float  # -2 ln p above that of the best candidate
     verdict: Remark
@@ -134,15 +175,12 @@ class NextRun:
 class NoiseAgreement:
     """Mean squared residuals of the soil alone, per degree of freedom, in variances of the noise.
 
-    Both are of the readings that were not excluded as outliers. `declared` is that under the
-    declared noise, as `identify` states it where none was excluded; `exceeds_noise` whether noise
-    alone would exceed it with a probability below 0.001. `granted` is that under noise, and scatter
-    of the soil from run to run by these standard deviations.
+    Of the readings that were not excluded as outliers.
     """
 
-    declared: float
-    exceeds_noise: bool
-    granted: float
+    declared: float  # under the declared noise, as `identify` states it where none was excluded
+    exceeds_noise: bool  # whether noise alone would exceed it with a probability below 0.001
+    granted: float  # under noise, and scatter of the soil from run to run as below
     friction_angle_std: float  # rad
     bearing_std: float  # relative
     with_discrepancy: bool = False  # Whether a declared discrepancy is part of the noise
@@ -155,18 +193,29 @@ class NoiseAgreement:
 
 @dataclass(frozen=True)
 class SoilTrend:
-    """A trend of the soil along the order of the runs, or of the rows of each run.
-
-    `z` is its score in standard deviations, positive where the soil becomes stronger, `p` its
-    family-wise p value among all scores of the soil alone, `change` that of the parameter from the
-    first run, or row, to the last: rad, or relative.
-    """
+    """A trend of the soil along the order of the runs, or of the rows of each run."""
 
     order: str  # runs or rows
     parameter: str
-    z: float
-    p: float
-    change: float
+    z: float  # score in standard deviations, positive where the soil becomes stronger
+    p: float  # family-wise p value among all scores of the soil alone
+    change: float  # of the parameter from the first run, or row, to the last: rad, or relative
+
+
+@dataclass(frozen=True)
+class SoilTestAgreement:
+    """A plate or shear test, and the same quantity by the soil before and after.
+
+    `sigma_before` and `sigma_after` are the distances in standard deviations of the logarithm.
+    """
+
+    label: str
+    unit: str
+    measured: float
+    before: float
+    after: float
+    sigma_before: float
+    sigma_after: float
 
 
 #: Status of a report, and its meaning.
@@ -203,13 +252,12 @@ class GapReport(Result):
         The effects that were added.
     cause_set : tuple of tuple of str
         The explanations that the data do not reject, as sets of effect names, the best first.
-    probabilities : dict of float
-        Posterior probability of each tested effect.
-    suspects : tuple of Suspect
-        Explanations with their odds wherever there is a gap: the likeliest first, or the likeliest
-        of usual size where that has a probability of at least 0.005.
-    conditions : tuple of Remark
-        Conditions under which these odds are valid.
+    probabilities, gap_probability, remainder_probability : dict of float, float, float
+        Posterior probabilities: of each tested effect, of a gap, of a smooth discrepancy beside
+        what is shown.
+    suspects, conditions : tuple of Suspect, tuple of Remark
+        Explanations with their odds, which are valid under `conditions`: the likeliest first, or
+        the likeliest of usual size where that has a probability of at least 0.005.
     discrepancy : dict of RemainingDiscrepancy
         Smooth discrepancy of each channel before and after, by column.
     remainder_cause : RemainderCause, optional
@@ -224,32 +272,22 @@ class GapReport(Result):
         Figures of the fitted rows (`train`) and of held-out runs and regions, before and after
         adding what is named or first among the suspects. Both are without the smooth remainder.
         A part whose figure did not shrink is left out, with a note.
-    gap_beside_remainder : dict of GapReduction
-        The same of held-out runs and regions, both beside a smooth remainder.
     soil_before, soil_after : dict of EstimatedValue
         Soil parameters without and with the added effects.
     mimic_radius : float
         Largest cosine between the signature of an added effect and that of another one.
-    next_runs : tuple of NextRun
-        Proposed runs and checks, the most discriminating first.
-    candidates : tuple of CandidateSummary
-        All fitted candidates, the best first.
+    next_runs, candidates : tuple of NextRun, tuple of CandidateSummary
+        Proposed runs and checks, the most discriminating first; what was fitted, the best first.
     untestable : dict of Remark
         Why these runs cannot test an effect, by its name.
-    notes : tuple of Remark
-        What a reader should know of the data and of the fit.
-    not_claimed : tuple of Remark
-        Conclusions that the report does not support.
+    notes, not_claimed : tuple of Remark
+        What to know of the data and of the fit; conclusions that the report does not support.
     variance_components : dict of float
         Estimated noise scales, run-to-run standard deviations and autocorrelation.
     misfit : NoiseAgreement, optional
         Residuals of the soil alone under the declared noise, and with scatter.
     trends : tuple of SoilTrend
         Trends of the soil with the order of runs and rows, the most significant first.
-    gap_probability : float
-        Posterior probability that noise and scatter alone do not explain what the soil leaves.
-    remainder_probability : float
-        Posterior probability of a smooth discrepancy beside what is shown.
     """
 
     status: str
@@ -267,7 +305,6 @@ class GapReport(Result):
     reasons: tuple[Remark, ...] = ()
     where: tuple[RegionScore, ...] = ()
     gap: dict[str, GapReduction] = field(default_factory=dict)
-    gap_beside_remainder: dict[str, GapReduction] = field(default_factory=dict)
     soil_before: dict[str, EstimatedValue] = field(default_factory=dict)
     soil_after: dict[str, EstimatedValue] = field(default_factory=dict)
     mimic_radius: float = 0.0
@@ -286,7 +323,7 @@ class GapReport(Result):
 
     def report(self) -> Report:
         """Verdict, soil and effects, readings beside the model, where it disagrees, and by what."""
-        from soilml.gap.report.report import gap_report
+        from soilml.gap.report import gap_report
 
         return gap_report(self)
 
@@ -323,17 +360,27 @@ class GapReport(Result):
     @property
     def soil_tests(self) -> list[SoilTestAgreement]:
         """The tests of the model's soil, beside the soil before and after."""
-        return soil_test_agreement(self.model, self.soil_before, self.soil_after)
+        tests, pairs = self.model.soil_tests, []
+        for soil in (self.soil_before, self.soil_after):
+            values = np.asarray([estimate.value for estimate in soil.values()])
+            pairs.append(deviations(tests, self.model.soil, list(soil), values).tolist())
+        return [
+            SoilTestAgreement(
+                test.label(),
+                test.unit,
+                test.measured,
+                *(test.measured * float(np.exp(z * test.scatter)) for z in both),
+                *both,
+            )
+            for test, *both in zip(tests, *pairs, strict=True)
+        ]
 
     def as_json(self) -> dict[str, Any]:
         """The content of gap.json."""
         from soilml import __version__
 
-        content: dict[str, Any] = as_json_entry(self)
-        return content | {
-            "soil_tests": as_json_entry(self.soil_tests),
-            "soilml_version": __version__,
-        }
+        more = {"soil_tests": as_json_entry(self.soil_tests), "soilml_version": __version__}
+        return {**as_json_entry(self), **more}
 
 
 def as_json_entry(value: Any) -> Any:

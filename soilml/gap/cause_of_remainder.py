@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from soilml.arrays import Floats
-from soilml.gap.evidence.held_out import held_out_folds
-from soilml.gap.evidence.stage_changes import stage_changes
-from soilml.gap.report.remainder_cause import RemainderCause
+from soilml.gap.held_out import held_out_folds
+from soilml.gap.results import RemainderCause
+from soilml.gap.stage_changes import OPERATING, stage_changes
 from soilml.inference.conditional import conditional
 from soilml.inference.constants import IN_CATALOGUE, UNKNOWN_CAUSE, UNKNOWN_SCALE
 from soilml.inference.evidence import LinearisedFit
@@ -38,25 +38,31 @@ STATED_ODDS, VARIABLE_ODDS = 10.0, 3.0
 #: Prior probability that the remainder has no single stage.
 NO_STAGE = 0.5
 #: What an error of slip or load may depend on: they are not measured in the contact.
-OPERATING, OF_OPERATION = "slip or load", ("slip", "load", "slip and load", "progress")
+OF_OPERATION = ("slip", "load", "slip and load", "progress")
 #: Change of a channel, in its noise, from which it is said to share the cause.
 NOTICED = 0.5
 SEVERAL = "several causes"
 
 
+def _amplitude_penalty() -> Floats:
+    """-2 ln of the prior probability of each of `AMPLITUDES`: that of a discrepancy's."""
+    edges = np.concatenate([[0.0], np.sqrt(AMPLITUDES[1:] * AMPLITUDES[:-1]), [np.inf]])
+    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
+    mass = np.diff((1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown)
+    return np.asarray(-2.0 * np.log(mass))
+
+
+AMPLITUDE_PENALTY = _amplitude_penalty()
+
+
 @dataclass(frozen=True)
 class StageHypothesis:
-    """A change at one stage that is a smooth function of one variable.
-
-    columns: Changes (m, k) of the readings with k independent standard normal weights.
-    value: -2 ln of the evidence, up to a constant that all share.
-    """
+    """A change at one stage that is a smooth function of one variable."""
 
     stage: str
-    what: str
     variable: str
-    columns: Floats
-    value: float = np.inf
+    columns: Floats  # changes (m, k) of the readings with k independent standard normal weights
+    value: float = np.inf  # -2 ln of the evidence, up to a constant that all share
     at: Hyperparameters | None = None
     amplitude: float = 0.0
 
@@ -96,9 +102,9 @@ def described_cause(posterior: Posterior, node: Explanation, seed: int) -> Remai
     gain = _predictive_gain(posterior, node, best, seed)
     if not gain > 0.0:
         return None
-    variable, share = _likeliest(
-        {v: [one.value for one in own if one.variable == v] for v in {o.variable for o in own}}
-    )
+    variables = dict.fromkeys(one.variable for one in own)
+    logs = {v: _log_mean(one.value for one in own if one.variable == v) for v in variables}
+    variable, share = _normalised(logs)
     told = share > VARIABLE_ODDS / (1.0 + VARIABLE_ODDS)
     channels = _changed_channels(posterior, node, best)
     probability *= IN_CATALOGUE  # as of any cause that is stated
@@ -112,46 +118,42 @@ def likeliest_stage(none: float, found: Sequence[StageHypothesis]) -> tuple[str,
     Several causes together, which have the probability `NO_STAGE` beforehand, are no stage: where
     they are likeliest, the probability is zero.
     """
-    values = {s: [one.value for one in found if one.stage == s] for s in {o.stage for o in found}}
-    if not values:
+    stages = dict.fromkeys(one.stage for one in found)
+    if not stages:
         return SEVERAL, 0.0
-    logs = {s: _log_mean(v) + np.log((1.0 - NO_STAGE) / len(values)) for s, v in values.items()}
-    logs[SEVERAL] = _log_mean([none]) + float(np.log(NO_STAGE))
-    return _normalised(logs)
-
-
-def _likeliest(values: Mapping[str, Sequence[float]]) -> tuple[str, float]:
-    return _normalised({name: _log_mean(own) for name, own in values.items()})
+    each = np.log((1.0 - NO_STAGE) / len(stages))
+    logs = {s: _log_mean(one.value for one in found if one.stage == s) + each for s in stages}
+    best, share = _normalised({SEVERAL: _log_mean([none]) + np.log(NO_STAGE), **logs})
+    return best, 0.0 if best == SEVERAL else share
 
 
 def _normalised(logs: Mapping[str, float]) -> tuple[str, float]:
-    weights = {name: float(np.exp(own - max(logs.values()))) for name, own in logs.items()}
-    best = max(weights, key=lambda name: weights[name])
-    if best == SEVERAL:
-        return best, 0.0
-    return best, weights[best] / sum(weights.values())
+    """The likeliest by logarithms of probabilities, and its share."""
+    best = max(logs, key=lambda name: logs[name])
+    return best, 1.0 / sum(float(np.exp(own - logs[best])) for own in logs.values())
 
 
-def _log_mean(values: Sequence[float]) -> float:
+def _log_mean(values: Iterable[float]) -> float:
     """Logarithm of the mean tempered likelihood of values of -2 ln p."""
-    logs = -0.5 * TEMPERING * np.asarray(values)
-    return float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
+    logs = -0.5 * TEMPERING * np.asarray(list(values))
+    return float(np.logaddexp.reduce(logs) - np.log(len(logs)))
 
 
 def _predictive_gain(
     posterior: Posterior, node: Explanation, best: StageHypothesis, seed: int
 ) -> float:
     """Log density of rows kept back with the change, above that without; nil without such rows."""
-    parts = held_out_folds(posterior.terms.readings, seed)
+    parts = held_out_folds(posterior.terms.readings, seed).values()
     assert best.at is not None
-    models = [(node.linear, node.at), (_with_change(node.linear, best), best.at)]
-    sums = []
-    for folds in parts.values():
-        without, having = (
-            sum(_log_density(model, at, folds.fold == k) for k in folds.predicted)
-            for model, at in models
+    changed, at = _with_change(node.linear, best), best.at
+    sums = [
+        sum(
+            _log_density(changed, at, folds.fold == k)
+            - _log_density(node.linear, node.at, folds.fold == k)
+            for k in folds.predicted
         )
-        sums.append(having - without)
+        for folds in parts
+    ]
     return float(np.mean(sums)) if sums else 0.0
 
 
@@ -195,19 +197,18 @@ def hypotheses(posterior: Posterior, node: Explanation) -> list[StageHypothesis]
     found = []
     for change in stage_changes(fit.fitted(), readings):
         if change.along:
-            found.append(StageHypothesis(change.stage, change.what, change.along, change.columns))
+            found.append(StageHypothesis(change.stage, change.along, change.columns))
             continue
         for name, columns in variables.items():
             if change.stage != OPERATING or name in OF_OPERATION:
-                own = change.columns * columns
-                found.append(StageHypothesis(change.stage, change.what, name, own))
+                found.append(StageHypothesis(change.stage, name, change.columns * columns))
     for i, channel in enumerate(readings.channels):
         own = readings.channel == i
-        gain = np.where(own, USUAL_GAIN * fit.prediction, 0.0)
-        added = np.where(own, usual[i], 0.0)
         for name, columns in variables.items():
-            found.append(StageHypothesis(channel, "gain", name, gain[:, None] * columns))
-            found.append(StageHypothesis(channel, "added", name, added[:, None] * columns))
+            for size in (USUAL_GAIN * fit.prediction, usual[i]):  # a gain, or what is added
+                found.append(
+                    StageHypothesis(channel, name, np.where(own, size, 0.0)[:, None] * columns)
+                )
     return found
 
 
@@ -277,15 +278,3 @@ def _evidence(model: LinearisedFit, products: Floats) -> Floats:
     step = np.linalg.solve(moving, gradient[..., None])[..., 0]
     gain = (gradient * step).sum(axis=1)
     return np.asarray(products[:, p, p] - gain + np.linalg.slogdet(curvature)[1])
-
-
-def _amplitude_penalty() -> Floats:
-    """-2 ln of the prior probability of each of `AMPLITUDES`: that of a discrepancy's."""
-    edges = np.concatenate([[0.0], np.sqrt(AMPLITUDES[1:] * AMPLITUDES[:-1]), [np.inf]])
-    usual, unknown = 1.0 - np.exp(-edges), 2.0 / np.pi * np.arctan(edges / UNKNOWN_SCALE)
-    mass = np.diff((1.0 - UNKNOWN_CAUSE) * usual + UNKNOWN_CAUSE * unknown)
-    return np.asarray(-2.0 * np.log(mass))
-
-
-#: -2 ln of the prior probability of each of `AMPLITUDES`.
-AMPLITUDE_PENALTY = _amplitude_penalty()

@@ -21,10 +21,12 @@ from soilml.physics.gears.rigid_wheel import RigidWheel, WheelArc
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import Operating
 
+#: Stages of a model.
+GEOMETRY, NORMAL, SHEAR = "contact geometry", "normal stress", "shear stress"
+OPERATING = "slip or load"
 #: Functions of depth, or of shear displacement, along the contact, from the smallest share of the
 #: largest one to it; their width is the distance of two in the logarithm.
 ALONG, SMALLEST_SHARE = 5, 0.04
-
 #: Largest shear displacement of these functions, in shear moduli: strength is mobilised there.
 SHEARED = 8.0
 
@@ -38,19 +40,11 @@ class StageChange(Effect):
 
 @dataclass(frozen=True)
 class Change:
-    """What one change does to the readings.
-
-    stage: Of the model: contact geometry, normal stress, shear stress, or slip or load.
-    what: What of the stage it changes.
-    columns: Changes (m, k) of the readings: one for a change of the same size in all rows, several
-        for functions along the contact.
-    along: Variable along the contact that it depends on, or empty.
-    """
+    """What one change does to the readings."""
 
     stage: str
-    what: str
-    columns: Floats
-    along: str = ""
+    columns: Floats  # (m, k): one of the same size in all rows, or of functions along the contact
+    along: str = ""  # variable along the contact that it depends on, or empty
 
 
 def stage_changes(case: Case, readings: Readings) -> list[Change]:
@@ -58,29 +52,21 @@ def stage_changes(case: Case, readings: Readings) -> list[Change]:
 
     Changes without an equilibrium, or without influence, are left out.
     """
-    kinds = [*_PLAIN, *_along_contact(case, readings)]
-    models = (case.model, *case.gears.values())
-    kinds = [k for k in kinds if all(k.effect.applies_to(m.gear) for m in models)]
-    signatures, _ = effect_signatures(case, readings, {k.effect.name: k.effect for k in kinds})
-    found = {s.name: s.column for s in signatures}
-    groups: dict[tuple[str, str, str], list[Floats]] = {}
-    for kind in kinds:
-        if kind.effect.name in found:
-            key = kind.stage, kind.what, kind.along
-            groups.setdefault(key, []).append(found[kind.effect.name])
-    return [
-        Change(stage, what, np.stack(columns, axis=1), along)
-        for (stage, what, along), columns in groups.items()
-        if not along or len(columns) > 1
-    ]
-
-
-@dataclass(frozen=True)
-class _Kind:
-    stage: str
-    what: str
-    effect: type[Effect]
-    along: str = ""
+    gears = [model.gear for model in (case.model, *case.gears.values())]
+    kinds = [*((stage, "", [e]) for stage, e in _PLAIN if all(map(e.applies_to, gears)))]
+    depth = float(np.nanmax(np.asarray(forces(case, readings.at).sinkage), initial=0.0))
+    if depth > 0.0:
+        sheared = SHEARED * float(np.max(np.asarray(case.soil.shear_modulus)))
+        kinds.append((NORMAL, "depth", [_by_depth(i, depth) for i in range(ALONG)]))
+        kinds.append((SHEAR, "shear displacement", [_by_shear(i, sheared) for i in range(ALONG)]))
+    effects = {e.name: e for _, _, own in kinds for e in own}
+    found = {s.name: s.column for s in effect_signatures(case, readings, effects)[0]}
+    changes = []
+    for stage, along, own in kinds:
+        columns = [found[e.name] for e in own if e.name in found]
+        if len(columns) > bool(along):
+            changes.append(Change(stage, np.stack(columns, axis=1), along))
+    return changes
 
 
 def _effect(
@@ -140,32 +126,16 @@ def _load(at: Operating, load_case: LoadCase, size: Real) -> Operating:
     return replace(at, load=at.load * (1.0 + size))
 
 
-_WHEEL = (RigidWheel,)
 _PLAIN = [
-    _Kind("normal stress", "its size", _effect("change-normal", "on_stress", _normal, 0.1)),
-    _Kind("shear stress", "its size", _effect("change-shear", "on_stress", _shear, 0.1)),
-    _Kind("contact geometry", "entry", _effect("change-entry", "on_contact", _entry, 0.1, _WHEEL)),
-    _Kind("contact geometry", "exit", _effect("change-exit", "on_contact", _exit, 0.2, _WHEEL)),
-    _Kind("contact geometry", "peak", _effect("change-peak", "on_contact", _peak, 0.1, _WHEEL)),
-    _Kind("contact geometry", "lever", _effect("change-lever", "on_contact", _lug, 0.05, _WHEEL)),
-    _Kind("slip or load", "slip", _effect("change-slip", "on_operating", _slip, 0.02)),
-    _Kind("slip or load", "load", _effect("change-load", "on_operating", _load, 0.05)),
+    (NORMAL, _effect("change-normal", "on_stress", _normal, 0.1)),
+    (SHEAR, _effect("change-shear", "on_stress", _shear, 0.1)),
+    (GEOMETRY, _effect("change-entry", "on_contact", _entry, 0.1, (RigidWheel,))),
+    (GEOMETRY, _effect("change-exit", "on_contact", _exit, 0.2, (RigidWheel,))),
+    (GEOMETRY, _effect("change-peak", "on_contact", _peak, 0.1, (RigidWheel,))),
+    (GEOMETRY, _effect("change-lever", "on_contact", _lug, 0.05, (RigidWheel,))),
+    (OPERATING, _effect("change-slip", "on_operating", _slip, 0.02)),
+    (OPERATING, _effect("change-load", "on_operating", _load, 0.05)),
 ]
-
-
-def _along_contact(case: Case, readings: Readings) -> list[_Kind]:
-    """Changes of the stresses by functions of depth and of shear displacement in the contact."""
-    soil, force = case.soil, forces(case, readings.at)
-    depth = float(np.nanmax(np.asarray(force.sinkage), initial=0.0))
-    if not depth > 0.0:
-        return []
-    sheared = SHEARED * float(np.max(np.asarray(soil.shear_modulus)))
-    found = []
-    for i in range(ALONG):
-        found.append(_Kind("normal stress", "its law", _by_depth(i, depth), "depth"))
-        by_shear = _by_shear(i, sheared)
-        found.append(_Kind("shear stress", "its law", by_shear, "shear displacement"))
-    return found
 
 
 def _bump(values: Array, number: int, largest: float) -> Array:
@@ -180,8 +150,7 @@ def _bump(values: Array, number: int, largest: float) -> Array:
 @cache
 def _by_depth(number: int, largest: float) -> type[Effect]:
     def apply(stress: Stress, load_case: LoadCase, size: Real) -> Stress:
-        factor = 1.0 + size * _bump(stress.contact.depth, number, largest)
-        return with_normal(stress, stress.normal * factor, load_case.soil)
+        return _normal(stress, load_case, size * _bump(stress.contact.depth, number, largest))
 
     return _effect(f"change-normal-{number}", "on_stress", apply, 0.1)
 
@@ -189,7 +158,7 @@ def _by_depth(number: int, largest: float) -> type[Effect]:
 @cache
 def _by_shear(number: int, largest: float) -> type[Effect]:
     def apply(stress: Stress, load_case: LoadCase, size: Real) -> Stress:
-        factor = 1.0 + size * _bump(stress.contact.shear_displacement, number, largest)
-        return replace(stress, shear=stress.shear * factor)
+        bump = _bump(stress.contact.shear_displacement, number, largest)
+        return _shear(stress, load_case, size * bump)
 
     return _effect(f"change-shear-{number}", "on_stress", apply, 0.1)
