@@ -20,14 +20,6 @@ if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
     from soilml.remarks import Remark
 
-#: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
-FUSION_RULES = (
-    "correlated",
-    "prior-once",
-    "covariance-intersection",
-    "inverse-variance",
-    "pairwise",
-)
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
@@ -96,7 +88,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         help="another model file to fuse with; can be repeated",
     )
-    parser.add_argument("--rule", help=f"fusion rule of --with: {', '.join(FUSION_RULES)}")
     parser.add_argument(
         "--model",
         dest="case",
@@ -177,7 +168,7 @@ def run(args: argparse.Namespace) -> int:
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, own = _row_estimates(estimators, table, usable, args.rule, case)
+        columns, own = _row_estimates(estimators, table, usable, case)
     else:
         columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
     remarks += own
@@ -209,18 +200,13 @@ def run(args: argparse.Namespace) -> int:
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
     from soilml.onboard import table_estimates
-    from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
     from soilml.onboard.joint_errors import are_comparable
-    from soilml.onboard.multi_sensor import CORRELATED
 
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
-    if args.rule is not None and not args.others:
-        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.others:
         raise InputError("--with fuses single rows; omit --by")
-    known = are_comparable([e.errors for e in estimators])
-    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
+    if not are_comparable([e.errors for e in estimators]):
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
@@ -233,7 +219,6 @@ def _row_estimates(
     estimators: list[Estimator],
     table: Table,
     usable: list[NDArray[np.bool_]],
-    rule: str | None,
     case: Case | None,
 ) -> tuple[dict[str, Any], list[Remark]]:
     """Columns with a line for every row, blank where no model has all its readings, and remarks."""
@@ -252,7 +237,7 @@ def _row_estimates(
     columns |= {column(name): table[column(name)] for name in inputs}
     estimate, files = estimates[0], None
     if len(estimators) > 1:
-        combined = fuse_estimates(estimates, rule)
+        combined = fuse_estimates(estimates)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
     for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)

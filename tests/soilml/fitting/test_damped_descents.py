@@ -9,9 +9,9 @@ from soilml.fitting import damped_descents
 from soilml.fitting.coordinates import select_free
 from soilml.fitting.damped_descents import (
     bounded_steps,
+    descend,
     descend_together,
     in_step,
-    descend,
 )
 from soilml.fitting.least_squares import LeastSquaresProblem
 from soilml.fitting.readings import stack_readings
