@@ -18,6 +18,7 @@ from soilml.errors import InputError
 from soilml.io.bounds import KEPT_VALUES, LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
 from soilml.io.csv_by_arrow import blocks_of_cells
+from soilml.io.spreadsheet import sheet_rows
 from soilml.log_import.readers.blocks_of_text import BLOCK, find_blocks
 from soilml.log_import.readers.text_layout import (
     MISSING,
@@ -67,6 +68,18 @@ def read_delimited_text(
     if encoding not in ("utf-8", "utf-8-sig"):
         notes.append(Remark("encoding", f"read as {encoding}", severity="note"))
     return recordings_of(path, text.splitlines(), notes)
+
+
+def read_spreadsheet_log(path: Path) -> list[Recording]:
+    """The table of a sheet (`BOOK.xlsx#SHEET`), whose header and units are found as those of a log.
+
+    Raises `InputError` where the sheet has no samples, and as `sheet_rows` does.
+    """
+    rows = sheet_rows(path)
+    width = max(map(len, rows), default=0)
+    # cells hold no tab; a quotation mark, as of inches, must not seem to open a quoted cell
+    lines = ["\t".join([*row, *[""] * (width - len(row))]).replace('"', "''") for row in rows]
+    return recordings_of(path, lines, ())
 
 
 def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Recording | None:
