@@ -45,7 +45,7 @@ class _Arrays:
         self.values = self.parts = 0
 
     def tag(self, data: mmap.mmap | bytes, at: int) -> tuple[int, int, int, int]:
-        """Type of an element, where its content begins, its bytes, and where the next one begins."""
+        """Type of an element, where its content begins, its bytes, and where the next begins."""
         kind, size = struct.unpack_from(f"{self.order}II", data, at)
         if kind >> 16:  # a small element, whose content is in its tag
             return kind & 0xFFFF, at + 4, kind >> 16, at + 8
