@@ -17,8 +17,7 @@ from soilml.log_import.channels.runs import Run
 from soilml.log_import.channels.wheel_quantities import Conversion, gear_of
 from soilml.log_import.mapping.channel_map import ChannelMap
 from soilml.log_import.mapping.log_map import WheelMap
-from soilml.log_import.windows.mean_errors import mean_error, pooled_errors
-from soilml.log_import.windows.slip_errors import travel_ratio
+from soilml.log_import.windows.mean_errors import mean_error, pooled_errors, travel_ratio
 from soilml.log_import.windows.steady import Stretch
 from soilml.quantities import column
 from soilml.remarks import Remark
