@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import whole_number_from
-from soilml.cli.options import InputFile, add_workers_option
+from soilml.cli.options import ANY, InputFile
 from soilml.errors import InputError
 from soilml.io.atomic_files import create_folder, output_files
 
@@ -55,44 +55,15 @@ time per estimate.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "files",
-        type=InputFile,
-        metavar="FILE",
-        nargs="*",
-        help="MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ... "
-        "(default: the released models)",
-    )
-    parser.add_argument(
-        "-o", "--out", metavar="FOLDER", help=f"output folder (default for the benchmark: {FOLDER})"
-    )
-    parser.add_argument(
-        "--sets",
-        type=whole_number_from(1),
-        metavar="N",
-        help="use only the first N sets of each size",
-    )
-    parser.add_argument(
-        "--limit",
-        metavar="FILE.parquet",
-        help="compute the Bayes limit of the benchmark and write it to this file, nothing else",
-    )
-    parser.add_argument(
-        "--bayes-limit",
-        type=InputFile,
-        metavar="FILE.parquet",
-        help="Bayes limit to use, written by --limit (default: the packaged one)",
-    )
-    parser.add_argument(
-        "--analytic-sets",
-        type=whole_number_from(1),
-        metavar="N",
-        help="own data: number of sets of each size for the analytic methods (default: up to "
-        "120, as many as they do in a minute or two)",
-    )
-    add_workers_option(parser)
+ARGUMENTS = (
+    ("files FILE", "MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ...", InputFile, ANY),
+    ("--out FOLDER", f"output folder (default for the benchmark: {FOLDER})"),
+    ("--sets N", "use only the first N sets of each size", whole_number_from(1)),
+    ("--limit FILE.parquet", "compute the Bayes limit of the benchmark into this file alone"),
+    ("--bayes-limit FILE.parquet", "a file of --limit (default: the packaged one)", InputFile),
+    ("--analytic-sets N", "own data: sets of each size for analytic methods", whole_number_from(1)),
+    "workers",
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:
