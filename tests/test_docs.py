@@ -21,7 +21,7 @@ RUN = (
     "docs/how-to/import.md",
     "docs/how-to/judge-a-model.md",
     "docs/how-to/pull.md",
-    "docs/how-to/soil-map.md",
+    "docs/how-to/drive.md",
     "docs/how-to/train.md",
     "docs/papers/comin2017.md",
     "docs/papers/nagatani2009.md",

@@ -33,7 +33,6 @@ COMMANDS = _RENAMED | {
 OPTIONS: Mapping[str, Mapping[str, str]] = {
     "adapt": {"--soil": "--truth"},
     "bevameter": {"--json": "--out"},
-    "compare": {"--against": "--bayes-limit"},
     "drive slip": {"--json": "--out"},
     "estimate": {"--case": "--model"},
     "export c": {"--rows": "--step-rows"},

@@ -39,8 +39,6 @@ USES = {
     "tornado": "serve",
     "tifffile": "map",
     "threadpoolctl": "gap, generate, train",
-    "dask": "generate --engine dask",
-    "distributed": "generate --engine dask",
 }
 NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
 
