@@ -11,7 +11,6 @@ from soilml.cli.options import InputFile, OutputFile
 
 if TYPE_CHECKING:
     from soilml.report.page import Content
-    from soilml.rover_design.report import DesignReport
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
@@ -83,12 +82,11 @@ def run(args: argparse.Namespace) -> int:
 
     need("scipy", "plan wheels")
     from soilml.report.page import json_text
-    from soilml.rover_design.presentation import report_of_design
-    from soilml.rover_design.report import design_report
+    from soilml.rover_design import design
 
     study = _study(args)
     with stage_progress() as progress:
-        found: DesignReport = design_report(
+        found = design(
             study,
             designs=args.designs,
             draws=args.draws,
@@ -96,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
             progress=progress,
         )
     content = found.as_json()
-    report = report_of_design(found, f"Wheels for {Path(args.study).name}")
+    report = found.report(f"Wheels for {Path(args.study).name}")
     files: dict[str | None, Content] = {
         args.out: json_text(content),
         args.picture: report.pictures[0].save,
