@@ -25,6 +25,7 @@ _HOME = {
     "GaussianRegressor": "training.regressors.gaussian_regressor",
     "LSSVM": "training.regressors.lssvm",
     "LinearGaussian": "training.regressors.linear_gaussian",
+    "ScikitLearn": "training.regressors.scikit_learn",
 }
 
 

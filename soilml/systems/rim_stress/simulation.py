@@ -1,7 +1,8 @@
-"""A simulated rover on a known soil: climbs and stresses to test the identification."""
+"""Simulated wheels and rovers on a known soil: readings, climbs and stresses to test with."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,16 +11,16 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import FitError, InputError
-from soilml.systems.rim_stress.ability import slope_pull
-from soilml.systems.rim_stress.climb import (
+from soilml.systems.rim_stress.ability import pull_and_slope_at
+from soilml.systems.rim_stress.climbs import (
     WHEELS,
     Climb,
     Rover,
     ShearParameters,
     Uncertainty,
     WheelRun,
+    wheel_components,
 )
-from soilml.systems.rim_stress.climb_balances import wheel_components
 from soilml.systems.rim_stress.force_balance import (
     MohrCoulomb,
     SteadyRun,
@@ -27,13 +28,53 @@ from soilml.systems.rim_stress.force_balance import (
     magnification,
     pull_under,
 )
-from soilml.systems.rim_stress.sensor_readings import SensingWheel
-from soilml.systems.rim_stress.stress_profile import StressProfile
+from soilml.systems.rim_stress.stress import SensingWheel, SensorReadings, StressProfile
 
 #: Slopes of the test field and artificial slips on the flat, as in Nagatani et al., sections 3, 5.
 SLOPES = tuple(np.deg2rad([0.0, 4.0, 8.0, 10.0, 12.0]).tolist())
 ARTIFICIAL_SLIPS = (0.04, 0.13, 0.36, 0.68)
 SAMPLING = 0.0083  # rad between samples: a rim speed of 9.15 mm/s, r = 0.055 m, sampled every 50 ms
+CHORDS = 48  # Points across the diameter of a sensor
+HALVINGS = 40  # Bisection steps for the middle of an arc
+Columns = dict[str, list[object]]
+
+
+def simulate_readings(
+    profile: StressProfile,
+    wheel: SensingWheel,
+    *,
+    turns: int = 9,
+    crown: float = 0.0,
+    lugs: tuple[float, float] = (0.0, 0.0),
+    seed: int = 0,
+) -> SensorReadings:
+    r"""Simulate the readings of a true stress profile, each turn at a random phase.
+
+    A sensor averages the stress over its disc, less the part carried by the lugs; noise, deadband
+    and saturation follow. At y half widths from the middle of the rim the stress is
+    (1 + crown (1 - 3 y^2)) times the profile's, so that its mean over the width is unchanged.
+    `lugs` are the fractions of the stress that lugs carry at the entry and at the exit of the arc.
+    References: Nagatani et al. 2009, sections III to V; the distributions across the rim and along
+    the lugs are our own.
+    """
+    rng = np.random.default_rng(seed)
+    samples = int(2.0 * math.pi / wheel.step)
+    phase = rng.uniform(0.0, 1.0, (turns, 1))
+    angle = math.pi - (np.arange(samples) + phase) * wheel.step
+    at, normal = profile.angle, profile.normal
+    forward = np.clip(
+        (at - profile.exit_angle) / (profile.entry_angle - profile.exit_angle), 0.0, 1.0
+    )
+    sensed = normal * (1.0 - (lugs[1] + (lugs[0] - lugs[1]) * forward))
+    offset, share = wheel.chords(CHORDS)
+    mean = np.interp(angle[..., None] + offset, at, sensed, left=0.0, right=0.0) @ share
+    over = 1.0 + crown * (1.0 - 3.0 * wheel.across**2)
+    force = wheel.area * mean[..., None] * over
+    force = force + rng.normal(0.0, 1.0, force.shape) * wheel.noise
+    force = np.where(force < wheel.deadband, 0.0, np.minimum(force, wheel.saturation))
+    number = np.broadcast_to(np.arange(1.0, wheel.sensors + 1.0), force.shape)
+    wide = np.broadcast_to(angle[..., None], force.shape)
+    return SensorReadings(wide.ravel(), number.ravel(), force.ravel())
 
 
 @dataclass(frozen=True)
@@ -51,17 +92,14 @@ class StressArc:
     rear_exponent: float = 1.4
     front_exponent: float = 0.9
 
-    def entry_angle(self, slip: float) -> float:
-        """Entry angle at a slip, rad."""
-        return self.entry + self.shift * float(max(slip, 0.0) ** self.shift_exponent)
-
-    def stress(self, slip: float, angle: Floats) -> Floats:
-        """Shape of the stress at angles (p,), with maximum 1."""
-        entry = self.entry_angle(slip)
-        x = np.clip((angle - entry + self.width) / self.width, 0.0, 1.0)
+    def stress(self, slip: float, angle: Floats | None = None) -> StressProfile:
+        """Stress at angles (p,), rad, by default over the arc; its maximum is 1."""
+        entry = self.entry + self.shift * float(max(slip, 0.0) ** self.shift_exponent)
+        at = np.linspace(entry - self.width, entry, 101) if angle is None else angle
+        x = np.clip((at - entry + self.width) / self.width, 0.0, 1.0)
         peak = self.rear_exponent / (self.rear_exponent + self.front_exponent)
         largest = peak**self.rear_exponent * (1.0 - peak) ** self.front_exponent
-        return np.asarray(x**self.rear_exponent * (1.0 - x) ** self.front_exponent / largest)
+        return StressProfile(at, x**self.rear_exponent * (1.0 - x) ** self.front_exponent / largest)
 
 
 @dataclass(frozen=True)
@@ -70,8 +108,8 @@ class SimulatedRover:
 
     `noise` describes its sensors: the relative error of the speed is uniform within sqrt(3) times
     its standard deviation; the entry angle is not measured but follows from the noisy stress.
-    `stress` is the relative error of each sample, `noise.front_load` the relative difference
-    between the magnifications of front and rear wheels.
+    `noise.front_load` is the relative difference between the magnifications of front and rear
+    wheels, which sense the stress over `magnification`.
     """
 
     rover: Rover = field(
@@ -82,23 +120,20 @@ class SimulatedRover:
     shear: ShearParameters = (0.0, float(np.deg2rad(38.0)), 0.0072)
     arcs: tuple[StressArc, StressArc] = (StressArc(), StressArc(entry=0.31, width=0.50))
     noise: Uncertainty = field(default_factory=Uncertainty)
-    stress: float = 0.05
     magnification: float = 1.3
 
     @cached_property
     def curve(self) -> tuple[Floats, Floats, Floats]:
         """Slip of all wheels (n,), true pull on level ground (N) and slope (rad) climbed at it."""
-        cohesion, friction, modulus = self.shear
-        slips = np.linspace(0.005, 0.9, 100)
-        pull_and_slope = []
-        for slip in slips:
-            wheels = [
-                wheel_components(self._exact(arc, slip), self.rover, modulus) for arc in self.arcs
-            ]
-            share = self.rover.front_share or 0.5
-            forces = slope_pull(self.rover, wheels, cohesion, np.tan(friction), share)
-            pull_and_slope.append((forces.pull(0.0), forces.equilibrium_slope()))
-        return slips, *np.asarray(pull_and_slope, dtype=np.float64).T
+        slips, share = np.linspace(0.005, 0.9, 100), self.rover.front_share
+        found = [
+            pull_and_slope_at(
+                slip, [arc.stress(slip) for arc in self.arcs], self.rover, self.shear, share
+            )
+            for slip in slips.tolist()
+        ]
+        pull, slope = np.asarray(found, dtype=np.float64).T
+        return slips, pull, slope
 
     def slip_at(self, slope: float) -> float:
         """The smallest slip at which the rover climbs a slope; raises `InputError` if none."""
@@ -125,60 +160,78 @@ class SimulatedRover:
         for slope in slopes:
             slip = self.slip_at(slope)
             for turn in range(repeats):
-                error = scale + np.sqrt(3.0) * self.noise.speed * rng.uniform(-1.0, 1.0)
-                wheels = [
-                    self.measure(wheel, slip, slope, rng, speed_error=error) for wheel in WHEELS
-                ]
+                error = scale + self._speed_error(rng)
+                front, rear = (self.measure(i, slip, slope, rng, error) for i in (0, 1))
                 name = f"{np.rad2deg(slope):.3g}deg_{turn + 1}"
-                reading = slope + self.noise.slope * rng.normal()
-                climbs.append(Climb(name, float(reading), wheels[0], wheels[1]))
+                reading = slope + self.noise.slope_rad * rng.normal()
+                climbs.append(Climb(name, float(reading), front, rear))
         return climbs
 
     def simulate_artificial_slip(
         self, rng: np.random.Generator, slips: Sequence[float] = ARTIFICIAL_SLIPS, repeats: int = 5
     ) -> tuple[list[WheelRun], list[WheelRun]]:
         """Stress on front and on rear wheels at artificial slips on level ground."""
-        by_wheel: tuple[list[WheelRun], list[WheelRun]] = ([], [])
-        for runs, wheel in zip(by_wheel, WHEELS, strict=True):
-            for slip in slips:
-                for _ in range(repeats):
-                    error = np.sqrt(3.0) * self.noise.speed * rng.uniform(-1.0, 1.0)
-                    runs.append(self.measure(wheel, slip, 0.0, rng, speed_error=error))
-        return by_wheel
+        front, rear = (
+            [
+                self.measure(i, slip, 0.0, rng, self._speed_error(rng))
+                for slip in slips
+                for _ in range(repeats)
+            ]
+            for i in (0, 1)
+        )
+        return front, rear
+
+    def _speed_error(self, rng: np.random.Generator) -> float:
+        return float(np.sqrt(3.0) * self.noise.speed_m_s.share * rng.uniform(-1.0, 1.0))
 
     def measure(
-        self,
-        wheel: str,
-        slip: float,
-        slope: float,
-        rng: np.random.Generator,
-        *,
-        speed_error: float = 0.0,
+        self, i: int, slip: float, slope: float, rng: np.random.Generator, speed_error: float
     ) -> WheelRun:
-        """Measured slip, and measured stress: the true one over M, with noise."""
+        """Slip and stress as wheel i of `WHEELS` measures them: the true stress over M, noise."""
         cohesion, friction, modulus = self.shear
-        i = WHEELS.index(wheel)
-        parts = wheel_components(self._exact(self.arcs[i], slip), self.rover, modulus)
+        true = WheelRun(slip, self.arcs[i].stress(slip))
+        parts = wheel_components(true, self.rover, modulus)
         scale = magnification(parts, self.rover.loads(slope)[i], cohesion, np.tan(friction))
         # front and rear differ by front_load, so that each deviates by front_load / sqrt(2)
         deviation = self.noise.front_load * rng.normal() / np.sqrt(2.0)
         of_sensors = self.magnification * np.exp(deviation)
         angle: Floats = SAMPLING * (np.arange(-30.0, 115.0) + rng.random())
-        normal = scale / of_sensors * self.arcs[i].stress(slip, angle)
-        normal = normal * (1.0 + self.stress * np.clip(rng.normal(size=len(normal)), -3.0, 3.0))
-        return WheelRun(
-            slip=1.0 - (1.0 - slip) * (1.0 + speed_error),
-            profile=StressProfile(angle, normal),
-            normal_std=self.stress * normal,
-        )
-
-    def _exact(self, arc: StressArc, slip: float) -> WheelRun:
-        entry = arc.entry_angle(slip)
-        angle = np.linspace(entry - arc.width, entry, 101)
-        return WheelRun(slip, StressProfile(angle, arc.stress(slip, angle)))
+        normal = scale / of_sensors * self.arcs[i].stress(slip, angle).normal
+        noise = self.noise.normal_Pa.share
+        normal = normal * (1.0 + noise * np.clip(rng.normal(size=len(normal)), -3.0, 3.0))
+        read = 1.0 - (1.0 - slip) * (1.0 + speed_error)
+        return WheelRun(read, StressProfile(angle, normal), noise * normal)
 
 
-HALVINGS = 40  # Bisection steps for the middle of an arc
+def climb_tables(
+    climbs: Sequence[Climb],
+    front: Sequence[WheelRun] = (),
+    rear: Sequence[WheelRun] = (),
+    *,
+    rim_speed: float,
+) -> tuple[Columns, Columns]:
+    """Tables (climbs, stresses) of columns as they are read, with speeds by that of the rim (m/s).
+
+    `front` and `rear` are stresses at artificial slip, which become separate runs.
+    """
+    climbed = [(c, w, run) for c in climbs for w, run in zip(WHEELS, c.wheels, strict=True)]
+    runs: Columns = {
+        "run": [c.name for c, _, _ in climbed],
+        "wheel": [wheel for _, wheel, _ in climbed],
+        "slope_rad": [c.slope for c, _, _ in climbed],
+        "speed_m_s": [rim_speed * (1.0 - run.slip) for _, _, run in climbed],
+        "rim_speed_m_s": [rim_speed for _ in climbed],
+    }
+    stressed = [(c.name, wheel, run) for c, wheel, run in climbed]
+    for wheel, artificial in zip(WHEELS, (front, rear), strict=True):
+        stressed += [(f"flat_{wheel}_{i}", wheel, run) for i, run in enumerate(artificial, 1)]
+    samples = [
+        (name, wheel, run.slip, float(angle), float(normal))
+        for name, wheel, run in stressed
+        for angle, normal in zip(run.profile.angle, run.profile.normal, strict=True)
+    ]
+    names = ("run", "wheel", "slip", "angle_rad", "normal_Pa")
+    return runs, {n: list(own) for n, own in zip(names, zip(*samples, strict=True), strict=True)}
 
 
 def parabolic_arc(
