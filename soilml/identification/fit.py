@@ -338,10 +338,8 @@ def identifiability_remarks(name: str, fraction: float, one_load: bool = False) 
 def trade_offs(fit: Fit) -> list[Remark]:
     """That two parameters compensate each other."""
     correlation = fit.correlation
-    text = (
-        "{} and {} trade off (correlation {:+.2f}): a combination of the two is identified better "
-    )
-    text += "than either"
+    text = "{} and {} trade off (correlation {:+.2f}): a combination of the two is identified "
+    text += "better than either"
     return [
         Remark("trade-off", text.format(a, b, correlation[i, j]), (a, b))
         for (i, a), (j, b) in combinations(enumerate(fit.names), 2)
