@@ -17,7 +17,7 @@ from soilml.fitting.operating_points import gear_numbers
 from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.numerics.smooth_process import independent_process_columns, slip_load_points
-from soilml.quantities import QUANTITIES, column
+from soilml.quantities import column
 from soilml.remarks import Remark
 
 #: Usual model error of a channel in an analysis of gaps, where the case does not state another.
@@ -177,34 +177,17 @@ def _learned_columns(learned: Remainder, readings: Readings, channel: int) -> Fl
     return np.concatenate(parts, axis=1)
 
 
-def included_discrepancy(case: Case, readings: Readings) -> list[Remark]:
-    """A remark with the standard deviation of each channel's discrepancy; none without one."""
-    texts, learned = [], _learned(case)
-    for i, name in enumerate(readings.channels):
-        own = case.discrepancy.get(column(name), Discrepancy())
-        amplitude = own.amplitude(range_with_zero(readings.measured[readings.channel == i]))
-        if column(name) in learned:
-            texts.append(f"{name} by its [remainder]")
-        elif amplitude > 0.0:
-            texts.append(f"{name} {amplitude:.3g} {QUANTITIES[name].unit}")
-    text = f"errors of the model are included in std: {', '.join(texts)}"
-    return [Remark("discrepancy-included", text, severity="note")] if texts else []
-
-
 def ignored_discrepancy(
     case: Case, what: str, consequence: str = "its intervals are too narrow"
 ) -> list[Remark]:
     """A remark that `what` ignores [discrepancy]; none for a case without one."""
     declared = (key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0)
-    names = [key for key in declared if key not in _learned(case)]
+    learned = [] if case.remainder is None else case.remainder.columns
+    names = [key for key in declared if key not in learned]
     if not names:
         return []
     text = f"{what} ignores the [discrepancy] of {', '.join(names)}: {consequence}"
     return [Remark("discrepancy-ignored", text, tuple(names))]
-
-
-def _learned(case: Case) -> Sequence[str]:
-    return [] if case.remainder is None else case.remainder.columns
 
 
 def noise_of_operation(

@@ -21,7 +21,6 @@ from soilml.physics.gears.rigid_wheel import WheelArc, entry_angle
 from soilml.physics.load_case import LoadCase
 from soilml.physics.operating_point import MOST_SLIP, Operating
 from soilml.physics.soils import Soil
-from soilml.remarks import Remark
 
 #: Standard deviations of errors that the readings of a drive usually have in common: wheel speed
 #: over ground speed, effective radius and gear ratios, current to torque, mass and load transfer,
@@ -62,13 +61,6 @@ USUAL_LAW_ERRORS = {"strength": 0.02, "strength_by_load": 0.0175, "law_of_shear"
 def declared_errors(case: Case) -> dict[str, float]:
     """Errors of the sensors that the case declares in [bias], standard deviations by name."""
     return {name: std for name, std in common_errors(case.bias).items() if std > 0.0}
-
-
-def included_bias(case: Case) -> list[Remark]:
-    """A remark with the declared errors that all rows share; none without one."""
-    texts = [f"{key} {bias.as_setting()}" for key, bias in case.bias.items() if bias.as_setting()]
-    text = f"errors that all rows share are included in std: {', '.join(texts)}"
-    return [Remark("bias-included", text, severity="note")] if texts else []
 
 
 def usual_errors(case: Case, load: NDArray[np.float64], unknown: Sequence[str]) -> dict[str, float]:

@@ -17,10 +17,8 @@ from soilml.config.given_case import GivenCase, as_case
 from soilml.config.remainder import SAME_ROWS
 from soilml.errors import FitError, InputError, solvable
 from soilml.fitting.coordinates import Coordinate, select_free
-from soilml.fitting.covariance import ignored_discrepancy, included_discrepancy
 from soilml.fitting.fitted_readings import FittedReadings
 from soilml.fitting.readings import Readings
-from soilml.fitting.shared_errors import included_bias
 from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import condensing
 from soilml.identification.averaged import averaged
@@ -135,9 +133,8 @@ def identify(
         fit = _within_priors(fit, selected)
     remarks = [
         *([SAME_ROWS] if case.remainder is not learned else []),
-        *_method_limits(fit, readings, free),
-        *_about_discrepancy(case, fit, readings),
-        *_about_soil_tests(case, fit),
+        *_ignored(case, fit, readings),
+        *_disagreeing_tests(case, fit),
         *readings.notes,
     ]
     shown = (
@@ -155,48 +152,31 @@ def _within_priors(fit: Fit, selected: Sequence[Coordinate]) -> Fit:
     return replace(fit, low=np.maximum(low, ends[:, 0]), high=np.minimum(high, ends[:, 1]))
 
 
-def _method_limits(fit: Fit, readings: Readings, free: Sequence[str] | None) -> list[Remark]:
-    """Parameters not requested, and noise that a closed form does not propagate."""
-    remarks = []
-    if free is not None and (others := [name for name in fit.names if name not in free]):
-        text = (
-            f"{', '.join(others)} identified too, although not requested: the {fit.method} method "
-            f"identifies {', '.join(fit.names)} together"
-        )
-        remarks.append(Remark("identified-together", text, tuple(others), "note"))
-    if fit.method in CLOSED_FORM and (np.any(readings.slip_std) or np.any(readings.load_std)):
-        text = f"the {fit.method} method does not propagate noise of slip and load into std"
-        remarks.append(Remark("input-noise-ignored", text))
-    return remarks
-
-
-def _about_discrepancy(case: Case, fit: Fit, readings: Readings) -> list[Remark]:
-    """Whether discrepancy and bias of the case are in the intervals."""
-    if fit.method in CLOSED_FORM:
-        bias_ignored = f"the {fit.method} method ignores [bias]"
-        return [
-            *ignored_discrepancy(case, f"the {fit.method} method"),
-            *([Remark("bias-ignored", bias_ignored)] if case.bias else []),
-        ]
-    return [*included_discrepancy(case, readings), *included_bias(case)]
-
-
-def _about_soil_tests(case: Case, fit: Fit) -> list[Remark]:
-    """Whether tests of the soil take part, and which ones the rows disagree with."""
-    if not case.soil_tests:
+def _ignored(case: Case, fit: Fit, readings: Readings) -> list[Remark]:
+    """What a closed form leaves out of what the case and the rows declare."""
+    if fit.method not in CLOSED_FORM:
         return []
-    if fit.method in CLOSED_FORM:
-        text = f"the {fit.method} method ignores [[soil.test]]"
-        return [Remark("soil-tests-ignored", text)]
+    declared = [key for key, one in case.discrepancy.items() if one.amplitude(1.0) > 0.0]
+    ignored = [f"the [discrepancy] of {', '.join(declared)}"] if declared else []
+    ignored += ["[bias]"] if case.bias else []
+    ignored += ["[[soil.test]]"] if case.soil_tests else []
+    ignored += (
+        ["noise of slip and load"] if readings.slip_std.any() or readings.load_std.any() else []
+    )
+    text = f"the {fit.method} method ignores {', '.join(ignored)}: its intervals are too narrow"
+    return [Remark("ignored-setting", text)] if ignored else []
+
+
+def _disagreeing_tests(case: Case, fit: Fit) -> list[Remark]:
+    """Tests of the soil that the rows disagree with."""
     values = dict(zip(fit.names, fit.values, strict=True))
-    return [
-        Remark(
-            "soil-test-disagrees",
-            f"the rows disagree with a test of the soil: {text}; an effect may be missing from "
-            "the model, or the test was made on another soil",
-        )
-        for text in disagreeing_soil_tests(case, values)
-    ]
+    text = (
+        "the rows disagree with a test of the soil: {}; an effect may be missing from the model, "
+        "or the test was made on another soil"
+    )
+    closed = fit.method in CLOSED_FORM
+    found = [] if closed else disagreeing_soil_tests(case, values)
+    return [Remark("soil-test-disagrees", text.format(one)) for one in found]
 
 
 __all__ = ["METHODS", "Fit", "identify"]

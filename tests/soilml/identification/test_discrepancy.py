@@ -54,7 +54,6 @@ def test_a_declared_error_widens_the_intervals_and_explains_the_residuals(case):
     assert remarked(identify(case, table, method="nonlinear").warnings, "times the declared noise")
     fit = identify(replace(case, discrepancy=USUAL), table, method="nonlinear")
     assert not remarked(fit.warnings, "times the declared noise")
-    assert remarked(fit.warnings, "errors of the model are included in std: torque")
     noise_only = identify(
         *measured(case, TRUTH, np.random.default_rng(4), error=0.0), method="nonlinear"
     )
