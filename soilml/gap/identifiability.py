@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,10 @@ from soilml.io.read_table import Rows, as_table
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.remarks import Remark
+from soilml.report.figure_style import AFTER, UNCHANGED
+from soilml.report.report import Picture, Report
+from soilml.report.tables import Column, ReportTable
 from soilml.results import Result
-
-if TYPE_CHECKING:
-    from soilml.report.report import Report
 
 #: Approximate 95 % quantile of the largest score of the catalogue in data without a gap.
 DETECTION_THRESHOLD = 3.0
@@ -38,6 +38,7 @@ POWER_QUANTILE = 0.8416
 #: Separation, in sigma, from which an effect can be named, and below which two effects are
 #: indistinguishable.
 NAMEABLE_SIGMA, SAME_CLASS_SIGMA = 3.0, 2.0
+_MOST_RUNS = 5  # Runs to add that are listed
 LISTED_RIVALS = 3  # Rivals that are listed for each effect
 LEAST_LEFT = 1e-6  # Signal beside the soil, in sigma, up to which no size is detectable
 
@@ -76,9 +77,7 @@ class Audit(Result):
 
     def report(self) -> Report:
         """Which effects could be named, and the runs that would add most."""
-        from soilml.gap.audit_report import audit_report
-
-        return audit_report(self, NAMEABLE_SIGMA)
+        return audit_report(self)
 
     def frame_columns(self) -> dict[str, Any]:
         """A row for each effect: size and unit, signals in sigma, and whether it could be named."""
@@ -283,3 +282,92 @@ def indistinguishable_classes(
         tuple(n for n, k in zip(columns, label, strict=True) if k == g) for g in np.unique(label)
     ]
     return tuple(sorted(g for g in groups if len(g) > 1))
+
+
+def audit_report(found: Audit) -> Report:
+    """The report of an audit: which effects could be named, and the runs that would add most."""
+    named = [e.name for e in found.effects if e.nameable]
+    count = len(found.effects) + len(found.untestable)
+    gaining = [run for run in found.added_runs if run.gained]
+    verdict = f"These runs could name {len(named)} of {count} effects; no single run adds one."
+    if gaining:
+        kind = gaining[0].kind.replace("_", " ")
+        verdict = f"These runs could name {len(named)} of {count} effects; "
+        verdict += f"add {kind} to name {len(gaining[0].gained)} more."
+    effects = found.effects
+    tables = []
+    if gaining:
+        shown = gaining[:_MOST_RUNS]
+        tables.append(
+            ReportTable(
+                "Runs to add",
+                [
+                    Column("kind", [run.kind for run in shown]),
+                    Column("effects more", [len(run.gained) for run in shown]),
+                    Column("what", [f"{run.text}: {', '.join(run.gained)}" for run in shown]),
+                ],
+                "Effects that could then be named.",
+            )
+        )
+    if effects:
+        units = [e.unit for e in effects]
+        rivals = [", ".join(f"{n} {c:.2f}" for n, c in e.rivals[:1]) for e in effects]
+        tables.append(
+            ReportTable(
+                "Effects",
+                [
+                    Column("effect", [e.name for e in effects]),
+                    Column("nameable", [e.nameable for e in effects]),
+                    Column("left", [e.residual_signal for e in effects], digits=3),
+                    Column("apart", [e.separating_snr for e in effects], digits=3),
+                    Column("size", [e.size for e in effects], units, digits=3),
+                    Column("detectable", [e.detectable_size for e in effects], units,
+                           digits=2, sizes=[e.size for e in effects]),
+                    Column("absorbed", [e.absorbed for e in effects], "share", digits=2),
+                    Column("rival", rivals),
+                ],
+                "Signals in sigma at the reference size: left beside the soil, and apart from the "
+                "most similar effect. Absorbed: the share that the soil imitates.",
+            )
+        )  # fmt: skip
+    details = [("Effects that cannot be distinguished", [", ".join(c) for c in found.classes])]
+    details.append(
+        ("Effects that cannot be tested", [f"{n}: {why}" for n, why in found.untestable.items()])
+    )
+    return Report(
+        kind="plan",
+        verdict=verdict,
+        lines=[f"They could name: {', '.join(named)}."] if named else [],
+        tables=tables,
+        pictures=[_picture(found)] if effects else [],
+        details=[entry for entry in details if entry[1]],
+        status=f"{len(named)} of {count}",
+        title="Effects that a design could name",
+    )
+
+
+def _picture(found: Audit) -> Picture:
+    effects = found.effects
+
+    def draw(axes: Any) -> None:
+        panel, y = np.ravel(axes)[0], np.arange(len(effects))
+        left = [e.residual_signal for e in effects]
+        apart = [e.separating_snr for e in effects]
+        panel.barh(y - 0.19, left, 0.36, color=UNCHANGED, label="that the soil cannot imitate")
+        panel.barh(
+            y + 0.19, apart, 0.36, color=AFTER, label="that separates it from its nearest rival"
+        )
+        panel.axvline(NAMEABLE_SIGMA, color="black", lw=1.2)
+        panel.set_xscale("symlog", linthresh=1.0)
+        panel.set_xlim(left=0.0)
+        panel.xaxis.set_major_formatter("{x:g}")
+        panel.set_yticks(y, [e.name for e in effects])
+        panel.set_ylim(len(effects) - 0.5, -0.5)
+        panel.set_xlabel(
+            f"signal at the reference size, σ; line: {NAMEABLE_SIGMA:g} σ name an effect"
+        )
+        panel.legend(loc="lower right")  # the best separated stand above
+
+    size = (5.6, 1.0 + 0.34 * len(effects))
+    alt = "signal of each effect beside the soil, and beside its nearest rival"
+    return Picture("Signals of the effects", draw, 1, 1, size, alt)

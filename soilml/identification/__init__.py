@@ -160,9 +160,8 @@ def _ignored(case: Case, fit: Fit, readings: Readings) -> list[Remark]:
     ignored = [f"the [discrepancy] of {', '.join(declared)}"] if declared else []
     ignored += ["[bias]"] if case.bias else []
     ignored += ["[[soil.test]]"] if case.soil_tests else []
-    ignored += (
-        ["noise of slip and load"] if readings.slip_std.any() or readings.load_std.any() else []
-    )
+    noisy = readings.slip_std.any() or readings.load_std.any()
+    ignored += ["noise of slip and load"] if noisy else []
     text = f"the {fit.method} method ignores {', '.join(ignored)}: its intervals are too narrow"
     return [Remark("ignored-setting", text)] if ignored else []
 
