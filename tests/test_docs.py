@@ -82,6 +82,7 @@ def test_the_answer_of_a_design_is_what_the_command_prints(monkeypatch, tmp_path
     command = re.findall(r"```\nsoilml (plan wheels .*)\n```", page)[1].split()
     assert main([*command, "--out", str(tmp_path / "design.json")]) == 0
     verdict = capsys.readouterr().out.splitlines()[0]
+    (printed,) = blocks("docs/how-to/choose-wheels.md", "text")[1].splitlines()
     # searches and quantiles may differ by rounding between processors
     shown, expected = (re.findall(r"-?\d+(?:\.\d+)?", line) for line in (verdict, printed))
     assert [float(x) for x in shown] == pytest.approx([float(x) for x in expected], rel=0.1)

@@ -12,7 +12,6 @@ from scipy.stats import t as student
 from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.onboard.estimate import PriorSummary
-from soilml.onboard.fusion_rules import RULES
 from training.calibration.recalibration import (
     CalibratedRegressor,
     Metrics,
@@ -56,7 +55,7 @@ class CrossFit:
     estimator: CalibratedRegressor  # the only regressor, or the ensemble of all
     members: tuple[CalibratedRegressor, ...]
     left_out: LeftOut  # by the estimator
-    #: of single rows: of each member, of each fusion rule, and of the estimator
+    #: of single rows: of each member, and of the estimator
     scores: dict[str, Metrics]
 
 
@@ -90,18 +89,10 @@ def cross_fit(
     estimator, mean, std = members[0], means[0], stds[0]
     if len(members) > 1:
         own_means, own_stds = (np.stack(own)[:, some] for own in (means, stds))
-        for rule in dict.fromkeys([*RULES, spec.rule]):
-            fused = fuse_members(members, rule, own_means, own_stds, truth)
-            claimed = fused.combine(own_means, own_stds)
-            again = calibrated(fused, *claimed, truth)
-            widened = claimed[0], claimed[1] * again.std_scale
-            if not few:
-                scores[f"{rule}, as claimed"] = compute_metrics(truth, *claimed, prior.std)
-                scores[f"{rule}, recalibrated"] = compute_metrics(truth, *widened, prior.std)
-            if rule == spec.rule:
-                estimator = again
-                mean, std = fused.combine(np.stack(means), np.stack(stds))
-                std = std * again.std_scale
+        fused = fuse_members(members, own_means, own_stds, truth)
+        estimator = calibrated(fused, *fused.combine(own_means, own_stds), truth)
+        mean, std = fused.combine(np.stack(means), np.stack(stds))
+        std = std * estimator.std_scale
     scores["estimator"] = compute_metrics(truth, mean[some], std[some], prior.std)
     return CrossFit(estimator, tuple(members), _left_out(mean, std, data, some, prior, few), scores)
 

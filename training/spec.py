@@ -13,7 +13,6 @@ from soilml.config.measurement_noise import take_noise
 from soilml.errors import InputError
 from soilml.io.toml_settings import Settings, read_settings
 from soilml.onboard.features import inputs_of
-from soilml.onboard.fusion_rules import RULES
 from soilml.onboard.set_contract import RESPONSE_CHANNELS, SENSOR_ERROR_INPUTS
 from soilml.quantities import SHEAR, column
 from training.dataset import PER_ROW, check_targets
@@ -45,7 +44,6 @@ class Spec:
     features: tuple[str, ...]
     targets: tuple[str, ...]
     regressors: tuple[FeatureSubset, ...]  # not fitted yet
-    rule: str  # fusion rule of several regressors
     text: str  # content of the file as JSON with sorted keys
     #: settings of the set posterior, for targets with one value per run
     set_posterior: ResponseSettings | None = None
@@ -84,9 +82,6 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
     seed = int(settings.take("seed", int, SEED, 0))
     if not 0 <= seed < 2**32:
         settings.fail(f"seed is {seed}; needed is {SEED}")
-    rule = settings.text("rule", "best-linear")
-    if rule not in RULES:
-        settings.fail(f"rule is {rule!r}; there are: {', '.join(RULES)}")
     regressors: list[FeatureSubset] = []
     for entry in settings.tables("regressor"):
         regressors.append(_take_subset(entry, seed, features, [r.name for r in regressors]))
@@ -103,7 +98,6 @@ def read_spec(path: str | os.PathLike[str]) -> Spec:
         features=tuple(features),
         targets=tuple(targets),
         regressors=tuple(regressors),
-        rule=rule,
         text=json.dumps(settings.content, sort_keys=True),
         set_posterior=response,
     )

@@ -46,7 +46,7 @@ class TrainedModel:
     domain: TrainingDomain  # where estimates are in range
     prior: PriorSummary  # prior of the targets
     data: Dataset
-    #: of single rows: of each member, of each fusion rule, and of the estimator
+    #: of single rows: of each member, and of the estimator
     scores: dict[str, Metrics]
     members: tuple[CalibratedRegressor, ...]  # the single regressors
     left_out: LeftOut  # estimates of all rows by fits that have not seen their runs

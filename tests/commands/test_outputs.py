@@ -65,9 +65,9 @@ def test_no_command_writes_over_what_it_reads(folder, capsys, small_model, small
 def test_a_target_in_the_way_is_found_before_any_work_and_nothing_is_replaced(
     folder, capsys, small_data
 ):
-    (folder / "o.png").mkdir()
+    (folder / "o.md").mkdir()
     (folder / "o.onnx").write_text("good")
-    refused(["train", "spec.toml", str(small_data), "o.onnx"], capsys, "o.png is a folder")
+    refused(["train", "spec.toml", str(small_data), "o.onnx"], capsys, "o.md is a folder")
     assert (folder / "o.onnx").read_text() == "good"
     os.mkfifo(folder / "o.csv")
     refused([*SIMULATE, "--out", "o.csv"], capsys, "o.csv is a device, pipe")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import InputFile
+from soilml.cli.options import SEVERAL, InputFile
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
@@ -24,16 +24,10 @@ their errors, which are in the files. docs/how-to/deploy.md describes it.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model",
-        type=InputFile,
-        nargs="+",
-        metavar="MODEL.onnx",
-        help="model files, 2 to 4, named as the C files that export c writes for them",
-    )
-    parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
+ARGUMENTS = (
+    ("model MODEL.onnx", "files, 2 to 4, named as their C files", InputFile, SEVERAL),
+    ("out OUT.c", "C file to write; OUT.h is written beside it"),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

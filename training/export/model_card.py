@@ -103,7 +103,7 @@ def _summary(trained: TrainedModel, metadata: Mapping[str, str]) -> list[str]:
     regressors = ", ".join(_describe(member.regressor) for member in trained.members)
     text = f"Estimates {outputs} from one reading of {inputs}. Regressors: {regressors}."
     if len(trained.members) > 1:
-        text += f" Fused by the rule `{trained.spec.rule}`."
+        text += " They are fused by the covariance of their errors."
     return [text, "", PER_ROW if trained.spec.per_row else SINGLE_READING, ""]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,10 +107,6 @@ class GaussianMLP(GaussianRegressor):
     def fitted_settings(self) -> str:
         """Layer widths."""
         return f"hidden {' x '.join(str(h) for h in self.hidden)}"
-
-    def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """None: fitting again takes too long."""
-        return None
 
 
 def _slopes(outputs: Singles, z: Singles, mean_only: bool) -> Singles:

@@ -184,13 +184,6 @@ class GaussianRegressor(MultiOutputMixin, RegressorMixin, BaseEstimator, ABC):  
         """Size and chosen hyperparameters of the fitted regressor, for the model card."""
         return ""
 
-    def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """Hyperparameters that stay fixed when it is fitted again to fewer rows.
-
-        None where fitting again takes too long for a learning curve.
-        """
-        return {}
-
 
 @dataclass(frozen=True)
 class FeatureSubset:

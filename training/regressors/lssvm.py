@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, final
+from typing import ClassVar, final
 
 import numpy as np
 
@@ -130,14 +130,6 @@ class LSSVM(GaussianRegressor):
         """Solution, number of centres, gamma and width."""
         e = self.expansion_
         return f"{e.solution}, {len(e.centres)} centres, gamma {e.gamma:.3g}, width {e.width:.3g}"
-
-    def learning_curve_parameters(self) -> dict[str, Any] | None:
-        """The chosen gamma, width and solution; None where fitting again takes too long."""
-        found = self.expansion_
-        if found.solution == "exact":
-            return None
-        chosen = {"gamma": found.gamma, "width": found.width, "solution": found.solution}
-        return {key: value for key, value in chosen.items() if key in self.get_params()}
 
 
 class FixedSizeLSSVM(LSSVM):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import InputFile, add_ignore_extra_option, add_seed_option, folder_outputs
+from soilml.cli.options import REQUIRED, InputFile, folder_outputs
 from soilml.io.atomic_files import write_files
 
 #: Files of the folder of --out.
@@ -42,20 +42,14 @@ curve.csv and climbs.csv.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("rover", type=InputFile, metavar="ROVER.toml", help="rover, soil and noise")
-    parser.add_argument("runs", type=InputFile, metavar="RUNS.csv", help="climbs, CSV or Parquet")
-    parser.add_argument(
-        "--stress",
-        type=InputFile,
-        metavar="STRESS.csv",
-        required=True,
-        help="stress on the rims, CSV or Parquet",
-    )
-    add_seed_option(parser)
-    add_ignore_extra_option(parser)
-    parser.add_argument("-o", "--out", metavar="FOLDER", help="folder for the four files")
+ARGUMENTS = (
+    ("rover ROVER.toml", "rover, soil and noise", InputFile),
+    ("runs RUNS.csv", "climbs, CSV or Parquet", InputFile),
+    ("--stress STRESS.csv", "stress on the rims, CSV or Parquet", InputFile, REQUIRED),
+    "seed",
+    "ignore-extra",
+    ("--out FOLDER", "folder for the four files"),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_output, add_report_option, add_row_options
+from soilml.cli.options import OPTIONAL, REPEATED, InputFile, OutputFile
 from soilml.errors import InputError, TableError
 
 if TYPE_CHECKING:
@@ -20,14 +20,6 @@ if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
     from soilml.remarks import Remark
 
-#: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
-FUSION_RULES = (
-    "correlated",
-    "prior-once",
-    "covariance-intersection",
-    "inverse-variance",
-    "pairwise",
-)
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
@@ -72,47 +64,17 @@ print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("trained", type=InputFile, metavar="MODEL.onnx", help="trained model file")
-    parser.add_argument(
-        "runs",
-        nargs="?",
-        type=InputFile,
-        metavar="RUNS.csv",
-        help="measured rows: CSV, Parquet or .xlsx; without it, print what the file is for",
-    )
-    parser.add_argument(
-        "--by",
-        metavar="COLUMN",
-        help="one estimate for each value of this column, such as run; all: one of all rows",
-    )
-    parser.add_argument(
-        "--with",
-        dest="others",
-        type=InputFile,
-        metavar="OTHER.onnx",
-        action="append",
-        default=[],
-        help="another model file to fuse with; can be repeated",
-    )
-    parser.add_argument("--rule", help=f"fusion rule of --with: {', '.join(FUSION_RULES)}")
-    parser.add_argument(
-        "--model",
-        dest="case",
-        type=InputFile,
-        metavar="MODEL.toml",
-        help="your wheel and effects, which are compared with those of the model file; for a file "
-        "for wheels of any size, also your soil, priors and noise",
-    )
-    parser.add_argument(
-        "--exact-model",
-        action="store_true",
-        help="assume a perfect model of wheel and soil, as for one checked on a known soil",
-    )
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.csv", "write the estimates to this file")
-    add_report_option(parser)
+ARGUMENTS = (
+    ("trained MODEL.onnx", "trained model file", InputFile),
+    ("runs RUNS.csv", "measured rows; without them, what the file is for", InputFile, OPTIONAL),
+    ("--by COLUMN", "one estimate for each value of this column, such as run, or all"),
+    ("--with OTHER.onnx", "a file to fuse with; can be repeated", InputFile, REPEATED),
+    ("--model MODEL.toml", "your wheel, effects, soil, priors and noise", InputFile),
+    "exact-model",
+    "rows",
+    ("--out FILE.csv", "write the estimates to this file", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -130,7 +92,7 @@ def run(args: argparse.Namespace) -> int:
     )
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.advice_after_results import trained_case
+    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.bounds import ESTIMATES
@@ -140,9 +102,9 @@ def run(args: argparse.Namespace) -> int:
     from soilml.quantities import column
     from soilml.remarks import texts
 
-    estimators = [Estimator.load(file) for file in (args.trained, *args.others)]
+    estimators = [Estimator.load(file) for file in (args.trained, *args.with_)]
     _check_options(args, estimators)
-    if args.runs is None and args.case is None:
+    if args.runs is None and args.model is None:
         show("\n".join(presentation.description(estimator).text for estimator in estimators))
         return 0
     read = {name: column(name) for estimator in estimators for name in estimator.inputs}
@@ -152,15 +114,15 @@ def run(args: argparse.Namespace) -> int:
     if args.runs is not None:
         table = read_rows(args, (*needed, *sorted({*read.values()} - {*needed})), filled)
         ESTIMATES.check(table.source, len(table))
-    if args.case is not None:
-        case = read_case_of_rows(args, args.case, table)
+    if args.model is not None:
+        case = read_case_of_rows(args, args.model, table)
         if table is not None and not any(map(trained_remainder, estimators)):
             learned, case = case.remainder, case.without_remainder_of(table)
             own = [SAME_ROWS] if case.remainder is not learned else []
     if args.exact_model:
         estimators = [with_exact_model(estimator) for estimator in estimators]
     estimators, remarks = estimators_for_case(
-        estimators, case, args.case, pooled=args.by is not None
+        estimators, case, args.model, pooled=args.by is not None
     )
     remarks = [*map(presentation.description, estimators), *remarks, *own]
     if table is None:
@@ -177,7 +139,7 @@ def run(args: argparse.Namespace) -> int:
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, own = _row_estimates(estimators, table, usable, args.rule, case)
+        columns, own = _row_estimates(estimators, table, usable, case)
     else:
         columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
     remarks += own
@@ -209,18 +171,13 @@ def run(args: argparse.Namespace) -> int:
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
     from soilml.onboard import table_estimates
-    from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
     from soilml.onboard.joint_errors import are_comparable
-    from soilml.onboard.multi_sensor import CORRELATED
 
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
-    if args.rule is not None and not args.others:
-        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
-    if args.by is not None and args.others:
+    if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
-    known = are_comparable([e.errors for e in estimators])
-    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
+    if not are_comparable([e.errors for e in estimators]):
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
@@ -233,13 +190,12 @@ def _row_estimates(
     estimators: list[Estimator],
     table: Table,
     usable: list[NDArray[np.bool_]],
-    rule: str | None,
     case: Case | None,
 ) -> tuple[dict[str, Any], list[Remark]]:
     """Columns with a line for every row, blank where no model has all its readings, and remarks."""
     import numpy as np
 
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.multi_sensor import fuse_estimates
     from soilml.quantities import column
@@ -252,7 +208,7 @@ def _row_estimates(
     columns |= {column(name): table[column(name)] for name in inputs}
     estimate, files = estimates[0], None
     if len(estimators) > 1:
-        combined = fuse_estimates(estimates, rule)
+        combined = fuse_estimates(estimates)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
     for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)
@@ -305,7 +261,7 @@ def _group_estimates(
     import numpy as np
 
     from soilml.cli.progress import row_progress
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from soilml.cli.options import SEVERAL
 from soilml.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
@@ -139,14 +140,13 @@ MEASURED = ("run", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
 RATE, STAGE, RADIUS = 50.0, 6.0, 0.15  # Rows a second, seconds at each slip, m
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "words",
-        nargs="+",
-        metavar="[NAME] FOLDER",
-        help=f"{', '.join(EXAMPLES)} (default: campaign), and the folder for its files",
-    )
+ARGUMENTS = (
+    (
+        "words [NAME] FOLDER",
+        f"{', '.join(EXAMPLES)} (default: campaign), and the folder for its files",
+        SEVERAL,
+    ),
+)
 
 
 def outputs(args: argparse.Namespace) -> list[Path]:

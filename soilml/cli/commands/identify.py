@@ -6,14 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import (
-    add_by_option,
-    add_effects_option,
-    add_model_and_runs,
-    add_output,
-    add_report_option,
-    add_row_options,
-)
+from soilml.cli.options import OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -64,23 +57,17 @@ the prior; +- is the expected error. Read the warnings.
 """
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    add_model_and_runs(parser)
-    parser.add_argument(
-        "--method",
-        default="averaged",
-        help="averaged (default), posterior, nonlinear, linear or newton",
-    )
-    parser.add_argument(
-        "--free", metavar="A,B,...", help="parameters to identify (default: those with a prior)"
-    )
-    add_effects_option(parser)
-    add_by_option(parser)
-    parser.add_argument("--mean", action="store_true", help="with --by: the mean of the groups too")
-    add_row_options(parser)
-    add_output(parser, "--out", "FILE.json", "write the result to this file")
-    add_report_option(parser)
+ARGUMENTS = (
+    "model-and-runs",
+    ("--method NAME (averaged)", "averaged, posterior, nonlinear, linear or newton"),
+    "free",
+    "effects",
+    "by",
+    ("--mean", "with --by: the mean of the groups too"),
+    "rows",
+    ("--out FILE.json", "write the result to this file", OutputFile),
+    "report",
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -106,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     if args.mean and args.by is None:
         raise InputError("--mean averages groups: name their column, such as --by run")
     need("scipy", "identify")
-    from soilml.experiment_design.advice_after_results import advice_after_fit
+    from soilml.experiment_design.next_rows import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.report import fit_report, group_report, soil_entries

@@ -8,7 +8,7 @@ import textwrap
 from collections import Counter
 from typing import TYPE_CHECKING
 
-from soilml.cli.options import add_output
+from soilml.cli.options import OPTIONAL, OutputFile
 from soilml.papers.published import PAPERS
 
 if TYPE_CHECKING:
@@ -46,12 +46,12 @@ WIDTH = 100
 OMITTED = ("given", "not_computed")  # Statuses of rows that --all alone lists
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument("paper", nargs="?", help=f"paper to compute: {', '.join(PAPERS)}")
-    parser.add_argument("--all", action="store_true", help="list every number")
-    parser.add_argument("--summary", action="store_true", help="print the counts by status alone")
-    add_output(parser, "--out", "FILE.csv", "write every number to this file")
+ARGUMENTS = (
+    ("paper", f"paper to compute: {', '.join(PAPERS)}", OPTIONAL),
+    ("--all", "list every number"),
+    ("--summary", "print the counts by status alone"),
+    ("--out FILE.csv", "write every number to this file", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from soilml.cli.option_values import NumberFrom
-from soilml.cli.options import InputFile, add_effects_option, add_gear_option, add_output
+from soilml.cli.options import REQUIRED, InputFile, OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -39,52 +39,22 @@ _ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version be
 MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "model", type=InputFile, metavar="MODEL.toml", help="gear, soil and effects"
-    )
-    parser.add_argument(
-        "--slip",
-        metavar="S,...",
-        required=True,
-        help="slip ratios, above 0 driving, below 0 braking",
-    )
-    parser.add_argument("--load", metavar="N,...", required=True, help="vertical loads in N")
-    parser.add_argument(
-        "--speed",
-        type=NumberFrom(-100.0, 100.0, "m/s"),
-        metavar="M_S",
-        help="speed in m/s, below 0 in reverse",
-    )
-    parser.add_argument(
-        "--pass",
-        dest="passes",
-        type=NumberFrom(1.0, 1e4),
-        help="number of the pass: 1 on undisturbed soil",
-    )
-    parser.add_argument(
-        "--slip-angle",
-        type=NumberFrom(-91.0, 91.0, "degrees"),
-        metavar="DEG",
-        help="angle between wheel plane and path, in degrees",
-    )
-    add_effects_option(parser)
-    add_gear_option(parser)
-    parser.add_argument(
-        "--run", dest="label", metavar="NAME", help="add a first column `run` with this name"
-    )
-    parser.add_argument(
-        "--std", action="store_true", help="add the std of the model's error from [remainder]"
-    )
-    parser.add_argument(
-        "--efficiency", action="store_true", help="add tractive efficiency and pull efficiency"
-    )
-    parser.add_argument(
-        "--balance", action="store_true", help="add how a track stands: shares of the load, trim"
-    )
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw the columns against slip")
+ARGUMENTS = (
+    ("model MODEL.toml", "gear, soil and effects", InputFile),
+    ("--slip S,...", "slip ratios, above 0 driving, below 0 braking", REQUIRED),
+    ("--load N,...", "vertical loads in N", REQUIRED),
+    ("--speed M_S", "speed in m/s, below 0 in reverse", NumberFrom(-100.0, 100.0, "m/s")),
+    ("--pass N", "number of the pass: 1 on undisturbed soil", NumberFrom(1.0, 1e4)),
+    ("--slip-angle DEG", "between wheel plane and path", NumberFrom(-91.0, 91.0, "degrees")),
+    "effects",
+    "gear",
+    ("--run NAME", "add a first column `run` with this name", {"dest": "label"}),
+    ("--std", "add the std of the model's error from [remainder]"),
+    ("--efficiency", "add tractive efficiency and pull efficiency"),
+    ("--balance", "add how a track stands: shares of the load, trim"),
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw the columns against slip", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -97,8 +67,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
+    from soilml.fitting.global_optimum import missing_peak
     from soilml.fitting.simulation import simulate
-    from soilml.fitting.uncarried_loads import missing_peak
     from soilml.io.bounds import ROWS
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating
@@ -123,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     angle = None if args.slip_angle is None else np.deg2rad(args.slip_angle)
     if angle is not None and 0.0 < abs(args.slip_angle) <= _ONCE_RADIANS:
         tell(f"! --slip-angle is in degrees now: {args.slip_angle:g} degrees")
-    known = {"speed": args.speed, "pass_number": args.passes, "slip_angle": angle}
+    known = {"speed": args.speed, "pass_number": args.pass_, "slip_angle": angle}
     options: dict[str, Any] = {**known, "run": args.label, "with_std": args.std}
     options["with_efficiency"] = args.efficiency
     with progress_bar(f"simulating {slip.size} rows", slip.size) as done:

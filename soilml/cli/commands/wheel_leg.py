@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from soilml.cli.options import InputFile, add_by_option, add_ignore_extra_option, add_output
+from soilml.cli.options import InputFile, OutputFile
 from soilml.errors import InputError
 
 if TYPE_CHECKING:
@@ -48,41 +48,18 @@ another train a file on its strides: soilml train slip_torque.
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments."""
-    parser.add_argument(
-        "runs", type=InputFile, metavar="STRIDES.csv", help="strides: CSV, Parquet or .xlsx"
-    )
-    parser.add_argument(
-        "--torque-model",
-        default="simplified",
-        metavar="NAME",
-        help="terramechanics, empirical or simplified (default), which needs one stride",
-    )
-    parser.add_argument(
-        "--vibration-model",
-        default="linear",
-        metavar="NAME",
-        help="planar, or linear (default), which needs one stride",
-    )
-    parser.add_argument(
-        "--assume",
-        metavar="NAME=VALUE,...",
-        help="n, cohesion (Pa) or shear_modulus (m) of the soil, where they are known",
-    )
-    parser.add_argument(
-        "--wheel",
-        metavar="R,B,N",
-        help="radius and width (m) and load (N) of the heavy rover's wheel "
-        "(default: 0.15,0.18,490.5)",
-    )
-    parser.add_argument(
-        "--known", metavar="SOIL", help="name of table I, or degrees,Pa: give the slip on this soil"
-    )
-    add_by_option(parser)
-    add_ignore_extra_option(parser)
-    add_output(parser, "--out", "FILE.csv", "write the table to this file")
-    add_output(parser, "--picture", "FILE.png", "draw the soil by sensor, or the slip by stride")
+ARGUMENTS = (
+    ("runs STRIDES.csv", "strides: CSV, Parquet or .xlsx", InputFile),
+    ("--torque-model NAME (simplified)", "terramechanics, empirical or simplified"),
+    ("--vibration-model NAME (linear)", "planar, or linear, which needs one stride"),
+    ("--assume NAME=VALUE,...", "n, cohesion (Pa) or shear_modulus (m) where they are known"),
+    ("--wheel R,B,N", "of the heavy rover: m, m and load in N (default: 0.15,0.18,490.5)"),
+    ("--known SOIL", "name of table I, or degrees,Pa: give the slip on this soil"),
+    "by",
+    "ignore-extra",
+    ("--out FILE.csv", "write the table to this file", OutputFile),
+    ("--picture FILE.png", "draw the soil by sensor, or the slip by stride", OutputFile),
+)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,7 +9,6 @@ from onnx.reference import ReferenceEvaluator
 
 from soilml import Estimator
 from soilml.onboard.features import compute_features
-from soilml.onboard.fusion_rules import RULES
 from training.dataset import read_dataset
 from training.export.model_file import export_model
 from training.spec import read_spec
@@ -47,9 +46,8 @@ def trained(tmp_path, data_path, text):
 def specs():
     for kind, text in MEMBERS.items():
         yield pytest.param(text, id=kind)
-    for rule in RULES:
-        members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
-        yield pytest.param(f'rule = "{rule}"\n{members}', id=rule)
+    members = MEMBERS["fixed-size-lssvm"] + MEMBERS["mlp"] + MEMBERS["linear"]
+    yield pytest.param(members, id="fused")
 
 
 @pytest.mark.parametrize("text", list(specs()))
