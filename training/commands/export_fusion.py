@@ -1,4 +1,4 @@
-"""`soilml export fusion`: the fusion of several model files as C code."""
+"""`soilml export fusion`: the fusion of two model files as C code."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
 
 DESCRIPTION = """\
-Write the fusion of files that estimate the same quantity from different
+Write the fusion of two files that estimate the same quantity from different
 sensors, such as slip from torque and from vibration, as the C file OUT.c and
 its header OUT.h. They use the structs that export-c writes for each file.
 
@@ -29,9 +29,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "model",
         type=InputFile,
-        nargs="+",
+        nargs=2,
         metavar="MODEL.onnx",
-        help="model files, 2 to 4, named as the C files that export c writes for them",
+        help="two model files, named as the C files that export c writes for them",
     )
     parser.add_argument("out", metavar="OUT.c", help="C file to write; OUT.h is written beside it")
 
