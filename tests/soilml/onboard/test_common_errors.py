@@ -82,14 +82,6 @@ def test_intervals_hold_where_the_bearing_is_another(estimator, wheel_posterior)
     assert usual.min() > 0.7
 
 
-def test_a_model_with_errors_increases_the_covariance(estimator, wheel_posterior):
-    run, _ = simulated_run(wheel_posterior, 16)
-    exact = estimator.on(**EXACT)
-    sizes = [exact.on(model_error=size).run(**run).covariance for size in (0.0, 0.5, 1.0)]
-    areas = [np.linalg.det(covariance) for covariance in sizes]
-    assert areas[1] > 2.0 * areas[0] and areas[2] > 1.5 * areas[1]
-
-
 def test_the_size_of_the_errors_of_the_model_is_inferred_unless_told(estimator, wheel_posterior):
     run, _ = simulated_run(wheel_posterior, 16)
     assert estimator.sets.common_errors[MODEL_ERROR_INPUT] == INFERRED
