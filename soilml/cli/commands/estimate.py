@@ -34,41 +34,27 @@ Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
 are those of the onboard runtime.
 
   soilml estimate exported/wheel.onnx
-  soilml estimate exported/wheel.onnx RUNS.csv --out estimates.csv
-  soilml estimate exported/wheel.onnx RUNS.csv --by run
+  soilml estimate exported/wheel.onnx RUNS.csv --by run --out estimates.csv
   soilml estimate exported/any_wheel.onnx RUNS.csv --model MODEL.toml --by run
   soilml estimate slip_torque.onnx RUNS.csv --with slip_vibration.onnx
 
 Without a table, one line says what the file is for: wheel, effects and priors.
 --model compares them with those of your model file, and refuses another wheel.
 
-Each row of the table gives mean, standard deviation (_std) and 90 % interval
-(_p05, _p95) of every parameter, and in_range. in_range is 0 where the readings
-lie outside the training data; the estimate is then the prior.
+Each row gives mean, standard deviation (_std) and 90 % interval (_p05, _p95) of
+every parameter, and in_range: 0 where the readings lie outside the training
+data; the estimate is then the prior. A single row is close to the prior. --by
+run pools all rows of a run, and --by all those of all runs, on one soil.
 
-One row gives one equation for three unknowns, so the estimate of a single row
-is close to the prior. --by run pools all rows of a run, which is far more
-accurate, and --by all those of all runs, which must then be on one soil.
 sinkage_m, drawbar_pull_N and <column>_std are used where the table has them,
-slip_std and load_N_std included. Rows out of range are set aside; the estimate
-of a run is the prior where they are more than half of its rows, and widened as
-far as the misfit says where no soil explains the others. The interval includes
-errors of the model of wheel and soil, whose size follows from the residuals of
-the run. --exact-model leaves them out, for a model that was checked on a known
-soil; a [discrepancy] or [remainder] of --model takes their place. With a file of
-a set posterior, disagrees is 1 where the rows of a run fit no exact model, as
-those of one sound run in a hundred: check units, sensors and wheel. A row with
-a blank reading, or whose status is not ok, gets a blank estimate. Slip differs
-from row to row and has no --by.
+slip_std and load_N_std included. The interval includes errors of the model,
+whose size follows from the residuals; --exact-model leaves them out. disagrees
+is 1 where the rows of a run fit no exact model: check units, sensors, wheel.
+A row with a blank reading, or whose status is not ok, gets a blank estimate.
 
---with fuses, row by row, model files that estimate the same parameters from
-other sensors: slip files of one data file by the correlation of their errors,
-others as if their errors were independent; files that read the same sensors
-are then refused. A file takes no part in a row where its reading is blank or
-out of range; the column `files` counts those that do. Standard error reports
-which parameters are not determined, and the next measurement that would help.
-Only numpy and onnxruntime are needed, but for --report, a page to read and
-print. CSV files are in SI units; a terminal shows kPa, degrees and mm.
+--with fuses, row by row, files that estimate the same parameters from other
+sensors; the column `files` counts those that took part. Only numpy and
+onnxruntime are needed, but for --report. CSV files are in SI units.
 """
 
 

@@ -25,41 +25,29 @@ Predict the drawbar pull of a running gear against slip on the soil of the
 measured rows, and the slope that a vehicle with such gears can climb, both
 with 90 % bands.
 
-  soilml pull MODEL.toml RUNS.csv --picture pull.png
   soilml pull MODEL.toml RUNS.csv --load 80,120 --slip-limit 0.3 --out pull.csv
   soilml pull MODEL.toml RUNS.csv --from exported/wheel.onnx
-
-RUNS.csv is that of `soilml identify`: run, slip, load_N, torque_Nm and, where
-measured, drawbar_pull_N and sinkage_m. The soil (--free names its parameters),
-effects that the model may lack, and its smooth error are drawn together from
-one posterior given the rows, or the soil from the estimate of a trained model
-(--from). All rows are assumed to come from one soil, unless --by run asks for a
-result for each run. A MODEL.toml of gap with several [[explanation]] predicts
-by their mixture.
-
-Loads are those of the rows, unless --load names others. Slips reach 0.6, the
-highest measured slip, or --slip-limit. On a slope, a wheel carries the
-component of its load normal to the slope and pulls the component along it. The
-bands include errors of the model, but neither load transfer nor side slopes.
-
-A model file with [rover] answers for the whole rover, unless --load or --gear
-names one wheel: the slip that slopes need, the margin of pull, the work of the
-wheels for each metre, the steepest slope and the best slip, with the load of
-each wheel on the slope.
-
   soilml pull ROVER.toml RUNS.csv --slope 0,10,15 --gravity moon
   soilml pull MODEL.toml RUNS.csv --load 20 --gravity 1.62 --tested-at 9.81
 
---gravity predicts for another gravity than that of the rows, which is that of
-[rover], else the Earth's, or --tested-at. Loads are those of the prediction.
-How a soil changes with gravity is disputed: by default the law is open, and
-the bands contain that doubt; --gravity-law constant or proportional is one of
-the two schools.
+RUNS.csv is that of `soilml identify`. Soil, effects that the model may lack and
+its smooth error are drawn from one posterior given the rows, or the soil from
+the estimate of a trained file (--from). All rows are assumed to come from one
+soil, unless --by run asks for a result for each run.
+
+Loads are those of the rows, unless --load names others; slips reach 0.6, the
+highest measured slip, or --slip-limit. The bands include errors of the model,
+but neither load transfer nor side slopes.
+
+A model file with [rover] answers for the whole rover, unless --load or --gear
+names one wheel: the slip that slopes need, the margin of pull, the work of the
+wheels for each metre, the steepest slope and the best slip.
+
+--gravity predicts for another gravity than that of the rows. How a soil changes
+with it is disputed: by default the law is open, and in the bands.
 
 pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
-measurement. A value with a warning that it is not known is no more accurate
-than the prior. The CSV file has a row for each load and slip, in SI units.
---report writes a page to read and print.
+measurement. The CSV file has a row for each load and slip, in SI units.
 """
 MAX_LOADS = 8  # Largest number of loads
 
