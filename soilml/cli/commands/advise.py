@@ -77,13 +77,11 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Rate all candidates and write the table."""
-    from functools import partial
-
     import numpy as np
 
     from soilml.cli.option_values import parse_names, parse_numbers
     from soilml.cli.options import available_effects
-    from soilml.cli.output import save_columns, show_rows, tell, write_columns, write_set
+    from soilml.cli.output import deliver, tell, write_columns
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
@@ -155,9 +153,7 @@ def run(args: argparse.Namespace) -> int:
     if args.all:
         rows = [("candidate", c) for c in sorted(advice.choices, key=lambda c: c.overall)]
     columns = advice_columns(advice, rows)
-    write_set({args.out: partial(save_columns, columns), args.picture: report.pictures[0].save})
-    content = {name: np.asarray(values).tolist() for name, values in columns.items()}
-    show_rows(report, columns, content, args.out)
+    deliver(args, report, columns=columns)
     return 0
 
 

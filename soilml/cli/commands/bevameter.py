@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 from soilml.cli.options import SEVERAL, InputFile, OutputFile
 from soilml.errors import InputError, MissingLibraryError, SoilmlError, TableError
-from soilml.io.atomic_files import save_text
 
 if TYPE_CHECKING:
     from soilml.io.table import Table
@@ -64,12 +63,11 @@ ARGUMENTS = (
 def run(args: argparse.Namespace) -> int:
     """Fit the tests, print the result and write the files."""
     from soilml.cli.options import available_effects, is_json
-    from soilml.cli.output import show_result, tell, write_set
+    from soilml.cli.output import deliver, tell
     from soilml.cli.progress import working
     from soilml.config.case import read_case
     from soilml.identification.bevameter import bevameter
     from soilml.identification.bevameter.soil_section import missing_values, model_file_text
-    from soilml.report.page import json_text
 
     as_json = args.out is not None and is_json(args)
     plates, shear, left = _tables(args)
@@ -77,15 +75,12 @@ def run(args: argparse.Namespace) -> int:
     with working("fitting the tests"):
         result = bevameter(plates, shear, case)
     result = replace(result, remarks=(*left, *result.remarks))
-    report = result.report()
-    write_set({args.picture: report.pictures[0].save})
-    if as_json:
-        save_text(args.out, json_text(result.as_json()))
-    elif args.out is not None:
-        save_text(args.out, model_file_text(result, case, ", ".join(args.tables)))
+    others = {}
+    if args.out is not None and not as_json:
+        others = {args.out: model_file_text(result, case, ", ".join(args.tables))}
         if case is None and (missing := missing_values(result)):
             tell(f"{args.out} lacks {', '.join(missing)}: add them, or give --model")
-    show_result(report, result.as_json())
+    deliver(args, result.report(), result.as_json(), others=others)
     return 0
 
 

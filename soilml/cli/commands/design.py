@@ -10,7 +10,6 @@ from soilml.cli.option_values import NumberFrom, parse_names, whole_number_from
 from soilml.cli.options import InputFile, OutputFile
 
 if TYPE_CHECKING:
-    from soilml.report.page import Content
     from soilml.rover_design.study import DesignStudy
 
 FORMATS = ("table", "json")
@@ -68,12 +67,11 @@ ARGUMENTS = (
 
 def run(args: argparse.Namespace) -> int:
     """Compare the designs and write the result."""
-    from soilml.cli.output import show_result, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.progress import stage_progress
     from soilml.optional_imports import need
 
     need("scipy", "plan wheels")
-    from soilml.report.page import json_text
     from soilml.rover_design import design
 
     study = _study(args)
@@ -85,14 +83,8 @@ def run(args: argparse.Namespace) -> int:
             optimise=not args.sweep_only,
             progress=progress,
         )
-    content = found.as_json()
     report = found.report(f"Wheels for {Path(args.study).name}")
-    files: dict[str | None, Content] = {
-        args.out: json_text(content),
-        args.picture: report.pictures[0].save,
-    }
-    write_with_report(args, files, lambda: (report, content), study.soil.files)
-    show_result(report, content)
+    deliver(args, report, found.as_json(), read=study.soil.files)
     return 0
 
 

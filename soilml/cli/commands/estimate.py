@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -79,12 +78,7 @@ def run(args: argparse.Namespace) -> int:
     need("onnxruntime", "estimate")
     import numpy as np
 
-    from soilml.cli.output import (
-        save_columns,
-        show,
-        show_rows,
-        write_with_report,
-    )
+    from soilml.cli.output import deliver, show
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
     from soilml.experiment_design.advice_after_results import trained_case
@@ -151,15 +145,11 @@ def run(args: argparse.Namespace) -> int:
 
     title = f"Estimates of {Path(args.runs).name} by {Path(args.trained).name}"
     report = presentation.estimate_report(columns, remarks, estimators[0], args.by, title)
-    content = {k: np.asarray(v).tolist() for k, v in columns.items()}
-    notes = [remark.as_json() for remark in remarks]
-    write_with_report(
-        args,
-        {args.out: partial(save_columns, columns)},
-        lambda: (report, {"columns": content, "notes": notes}),
-        [str(e.path) for e in estimators],
-    )
-    show_rows(report, columns, content, args.out)
+    content = {
+        "columns": {k: np.asarray(v).tolist() for k, v in columns.items()},
+        "notes": [remark.as_json() for remark in remarks],
+    }
+    deliver(args, report, content, columns, [str(e.path) for e in estimators])
     return 0
 
 
@@ -261,7 +251,7 @@ def _group_estimates(
     """Columns with a line for every value of a column, from all its usable rows, and remarks."""
     import numpy as np
 
-    from soilml.cli.progress import row_progress
+    from soilml.cli.progress import working
     from soilml.experiment_design.advice_after_results import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
@@ -279,8 +269,8 @@ def _group_estimates(
     ]
     box = {} if case is None else narrower_priors(estimator, case)
     counts = np.asarray([len(rows) for _, rows in groups])
-    with row_progress(f"estimating by {by}", estimator, int(counts.sum())) as counted:
-        estimate = table_estimates.estimates_of_runs(counted, readings, box)
+    with working(f"estimating by {by}"):
+        estimate = table_estimates.estimates_of_runs(estimator, readings, box)
     outside = estimate.rows_set_aside
     position = {name: i for i, name in enumerate(names)}
     answered = np.asarray([name in position for name in order])

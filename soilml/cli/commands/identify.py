@@ -65,7 +65,7 @@ def run(args: argparse.Namespace) -> int:
 
     from soilml.cli.option_values import parse_names
     from soilml.cli.options import available_effects
-    from soilml.cli.output import show_result, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.tables import (
         print_table_hints,
         read_case_of_rows,
@@ -77,7 +77,6 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.read_table import RUNS
     from soilml.optional_imports import need
     from soilml.remarks import texts
-    from soilml.report.page import json_text
 
     if args.mean and args.by is None:
         raise InputError("--mean averages groups: name their column, such as --by run")
@@ -120,7 +119,6 @@ def run(args: argparse.Namespace) -> int:
             mean = GroupFits(tuple(fits.values())).average
             content["mean"] = mean.as_json() | soil_entries(case, mean, with_draws=False)
         report = group_report(fits, failed, args.by, title, mean)
-    write_with_report(args, {args.out: json_text(content)}, lambda: (report, content))
-    show_result(report, {k: content[k] for k in content if k != "draws"})
+    deliver(args, report, content)
     tell_failures(args.by, failed)
     return 0

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from soilml.config.case import Case
     from soilml.io.table import Table
     from soilml.onboard.estimator import Estimator
-    from soilml.report.page import Content
     from soilml.traction.report import PullReport
     from soilml.traction.rover_report import RoverReport
 
@@ -169,7 +168,7 @@ def _write_results(
     found: Mapping[str, PullReport | RoverReport],
     failed: Mapping[str, str],
 ) -> None:
-    """Write --out, --picture and --report as one set; then text, or CSV into a pipe.
+    """Deliver the results.
 
     found: Results by group of --by; one under "" without groups.
     failed: Why other groups have none.
@@ -178,9 +177,8 @@ def _write_results(
 
     import numpy as np
 
-    from soilml.cli.output import show_result, show_rows, write_with_report
+    from soilml.cli.output import deliver
     from soilml.cli.tables import tell_failures
-    from soilml.io.text_tables import csv_text
     from soilml.report.report import by_group
 
     parts: list[dict[str, Any]] = []
@@ -201,13 +199,5 @@ def _write_results(
         "warnings": {n: [remark.as_json() for remark in r.remarks] for n, r in reports.items()},
         "failed": dict(failed),
     }
-    files: dict[str | None, Content] = {
-        args.out: csv_text(columns),
-        args.picture: report.pictures[0].save,
-    }
-    write_with_report(args, files, lambda: (report, content))
-    if args.out is None and args.report is None:
-        show_rows(report, columns, content)
-    else:
-        show_result(report, content)
+    deliver(args, report, content, columns)
     tell_failures(args.by, failed)

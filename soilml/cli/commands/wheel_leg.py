@@ -123,7 +123,7 @@ def _known_soil(text: str) -> tuple[float, float]:
 
 def _soil(args: argparse.Namespace, table: Table) -> int:
     """The soil by each sensor and fused, and what it means for a heavy rover."""
-    from soilml.cli.output import write_rows
+    from soilml.cli.output import deliver
     from soilml.cli.tables import result_by_group
     from soilml.systems.wheel_legs import Mobility, StrideSoil, mobility, soil_of_strides
     from soilml.systems.wheel_legs.strides import stride_report
@@ -137,7 +137,7 @@ def _soil(args: argparse.Namespace, table: Table) -> int:
 
     found, failed = result_by_group(args, table, "estimating", estimate)
     report, rows = stride_report(found, failed, args.by)
-    write_rows(report, rows, args.out, args.picture)
+    deliver(args, report, columns=rows)
     return 0
 
 
