@@ -15,7 +15,7 @@ from soilml.fitting.usable_readings import usable_readings
 from soilml.identification import METHODS
 from soilml.io.table import Table
 from soilml.numerics.prior import Prior
-from soilml.physics.effects.exit_angle import ExitAngle
+from soilml.physics.effects.contact_shape import ExitAngle
 from soilml.physics.effects.sensors import SlipOffset
 
 TRUTH = {"cohesion": 812.0, "friction_angle": 0.6, "shear_modulus": 0.012}
