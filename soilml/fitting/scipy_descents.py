@@ -12,7 +12,7 @@ from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import Linearisation
 from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.numerics.prior import UNIFORM_PRECISION
-from soilml.numerics.resampling import latin_hypercube
+from soilml.numerics.quantiles import latin_hypercube
 
 POINTS, SEED = 64, 7  # Points of the priors, by Latin hypercube, that may be starts
 STARTS = 4  # How many of the best of them are descended from

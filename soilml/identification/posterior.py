@@ -21,7 +21,7 @@ from soilml.fitting.scipy_descents import descend
 from soilml.fitting.uncarried_loads import raise_uncarried
 from soilml.identification.fit import WIDENED, Fit, with_warnings
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.resampling import latin_hypercube, systematic_resampling
+from soilml.numerics.quantiles import latin_hypercube, systematic_resampling
 from soilml.quantities import column
 from soilml.remarks import Remark
 

@@ -69,7 +69,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.atomic_files import write_files
     from soilml.onboard.estimator import Estimator
     from soilml.optional_imports import need
-    from soilml.soil_maps.drive import NEEDED
+    from soilml.soil_maps.local_soils import NEEDED
     from soilml.soil_maps.presentation import FILES, map_files, map_json
     from soilml.soil_maps.raster import read_elevation
     from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map
