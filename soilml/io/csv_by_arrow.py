@@ -114,9 +114,9 @@ def _column(file: Path, name: str, cells: Any) -> Column:
     """Cells as `read_csv` has them: text, or numbers with NaN where blank."""
     if name in TEXT:
         coded = cells.dictionary_encode()
-        shown = [text or "" for text in coded.dictionary.to_pylist()]
-        _need(not any('"' in text for text in shown))
-        texts = [cell_as_text(text.strip()) for text in shown]
+        shown = [cell or "" for cell in coded.dictionary.to_pylist()]
+        _need('"' not in "".join(shown))
+        texts = [cell_as_text(cell.strip()) for cell in shown]
         column: Column = text_column(texts, lambda _: str(file))[coded.indices.to_numpy()]
         return column
     values = np.asarray(cells.to_numpy(zero_copy_only=False), dtype=np.float64)

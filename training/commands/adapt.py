@@ -26,8 +26,7 @@ is then trained and not judged.
 FOLDER receives report.html (start here), adapt.json, adapted.onnx with its card
 adapted.md, adapted.c and adapted.h, adapted.toml (the model with the effect),
 the recipes and rows of both files, before.onnx, campaign.csv and kept_back.csv,
-and the files of `soilml gap` in FOLDER/gap. The same command continues after an
-interruption: steps whose inputs are the same are kept.
+and the files of `soilml gap` in FOLDER/gap.
 
 The exit status is 0 also where the analysis supports no change, which is a
 result, and 2 for bad input. --suspected adds the first suspect where the
@@ -37,7 +36,7 @@ columns such as cohesion_Pa do the same for each run.
 """
 #: Files of the folder, beside those of the folder `gap` in it.
 FILES = (
-    *("report.html", "adapt.json", "steps.json", "campaign.csv", "kept_back.csv", "adapted.toml"),
+    *("report.html", "adapt.json", "campaign.csv", "kept_back.csv", "adapted.toml"),
     *(f"adapted{end}" for end in (".onnx", ".md", ".c", ".h", "_recipe.toml", "_rows.parquet")),
     *(f"before{end}" for end in (".onnx", ".md", "_recipe.toml", "_rows.parquet")),
 )

@@ -85,8 +85,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.experiment_design import advise, candidate_grid
-    from soilml.experiment_design.advice_after_results import mean_covariates
-    from soilml.experiment_design.next_rows import COUNT, known_soil
+    from soilml.experiment_design.next_rows import COUNT, known_soil, mean_covariates
     from soilml.experiment_design.presentation import (
         advice_columns,
         best_rows,

@@ -94,8 +94,4 @@ def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
         from soilml.config.wheeled_rover import GRAVITY
 
         return GRAVITY
-    if dest == "rule":
-        from soilml.onboard.multi_sensor import ACROSS_FILES
-
-        return ACROSS_FILES
     return ("run", "gear") if dest == "by" else ()

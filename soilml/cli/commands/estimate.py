@@ -19,14 +19,6 @@ if TYPE_CHECKING:
     from soilml.onboard.estimator import Estimator
     from soilml.remarks import Remark
 
-#: Names of `soilml.onboard.multi_sensor.ACROSS_FILES`, which takes a numerical library to import.
-FUSION_RULES = (
-    "correlated",
-    "prior-once",
-    "covariance-intersection",
-    "inverse-variance",
-    "pairwise",
-)
 FORMATS = ("table", "csv", "json")
 DESCRIPTION = """\
 Estimate soil parameters, or slip, with the model file MODEL.onnx. The results
@@ -62,7 +54,6 @@ ARGUMENTS = (
     ("runs RUNS.csv", "measured rows; without them, what the file is for", InputFile, OPTIONAL),
     ("--by COLUMN", "one estimate for each value of this column, such as run, or all"),
     ("--with OTHER.onnx", "a file to fuse with; can be repeated", InputFile, REPEATED),
-    ("--rule NAME", f"fusion rule of --with: {', '.join(FUSION_RULES)}"),
     ("--model MODEL.toml", "your wheel, effects, soil, priors and noise", InputFile),
     "exact-model",
     "rows",
@@ -81,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.output import deliver, show
     from soilml.cli.tables import print_table_hints, read_case_of_rows, read_rows
     from soilml.config.remainder import SAME_ROWS
-    from soilml.experiment_design.advice_after_results import trained_case
+    from soilml.experiment_design.expected_answers import trained_case
     from soilml.identification.model_error_inputs import trained_remainder, with_exact_model
     from soilml.identification.trained_estimator import check_table_wheel, estimators_for_case
     from soilml.io.bounds import ESTIMATES
@@ -128,7 +119,7 @@ def run(args: argparse.Namespace) -> int:
         wanted = ", ".join(column(n) for n in estimators[0].inputs)
         raise TableError(f"{table.source}: no row has all readings that the model needs: {wanted}")
     if args.by is None:
-        columns, own = _row_estimates(estimators, table, usable, args.rule, case)
+        columns, own = _row_estimates(estimators, table, usable, case)
     else:
         columns, own = _group_estimates(estimators[0], table, usable[0], args.by, case)
     remarks += own
@@ -156,18 +147,13 @@ def run(args: argparse.Namespace) -> int:
 def _check_options(args: argparse.Namespace, estimators: list[Estimator]) -> None:
     """Raise `InputError` for options that cannot be combined."""
     from soilml.onboard import table_estimates
-    from soilml.onboard.fusion_rules import COVARIANCE_INTERSECTION
     from soilml.onboard.joint_errors import are_comparable
-    from soilml.onboard.multi_sensor import CORRELATED
 
     if args.runs is None and any((args.by, args.where, args.out, args.report)):
         raise InputError("RUNS.csv is missing: --by, --where, --out and --report are for its rows")
-    if args.rule is not None and not args.with_:
-        raise InputError("--rule is the fusion rule of --with; give --with OTHER.onnx")
     if args.by is not None and args.with_:
         raise InputError("--with fuses single rows; omit --by")
-    known = are_comparable([e.errors for e in estimators])
-    if args.rule != COVARIANCE_INTERSECTION and not (known and args.rule in (None, CORRELATED)):
+    if not are_comparable([e.errors for e in estimators]):
         table_estimates.check_independent(estimators)
     if args.by is not None and estimators[0].per_row:
         raise InputError(
@@ -180,13 +166,12 @@ def _row_estimates(
     estimators: list[Estimator],
     table: Table,
     usable: list[NDArray[np.bool_]],
-    rule: str | None,
     case: Case | None,
 ) -> tuple[dict[str, Any], list[Remark]]:
     """Columns with a line for every row, blank where no model has all its readings, and remarks."""
     import numpy as np
 
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.onboard import presentation, table_estimates
     from soilml.onboard.multi_sensor import fuse_estimates
     from soilml.quantities import column
@@ -199,7 +184,7 @@ def _row_estimates(
     columns |= {column(name): table[column(name)] for name in inputs}
     estimate, files = estimates[0], None
     if len(estimators) > 1:
-        combined = fuse_estimates(estimates, rule)
+        combined = fuse_estimates(estimates)
         estimate, files = combined.estimate, combined.used.sum(axis=0)
     for key, values in presentation.estimate_columns(estimate).items():
         columns[key] = np.where(answered, values, np.nan)
@@ -252,7 +237,7 @@ def _group_estimates(
     import numpy as np
 
     from soilml.cli.progress import working
-    from soilml.experiment_design.advice_after_results import advice_after_estimate
+    from soilml.experiment_design.next_rows import advice_after_estimate
     from soilml.identification.model_error_inputs import readings_with_model_error
     from soilml.identification.trained_estimator import narrower_priors
     from soilml.io.table import ALL

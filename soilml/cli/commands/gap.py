@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     for library in ("scipy", "jinja2", "matplotlib"):
         need(library, "gap")
     from soilml.gap import gap
-    from soilml.gap.report.report import gap_files
+    from soilml.gap.report import gap_files
 
     table, costs = read_rows(args, RUNS), parse_costs(args)
     effects = available_effects(args)

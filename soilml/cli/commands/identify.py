@@ -81,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
     if args.mean and args.by is None:
         raise InputError("--mean averages groups: name their column, such as --by run")
     need("scipy", "identify")
-    from soilml.experiment_design.advice_after_results import advice_after_fit
+    from soilml.experiment_design.next_rows import advice_after_fit
     from soilml.experiment_design.presentation import advice_as_json, next_row_remarks
     from soilml.identification import identify
     from soilml.identification.report import fit_report, group_report, soil_entries

@@ -63,8 +63,8 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import progress_bar
     from soilml.config.case import read_case_of_one_gear
     from soilml.fitting.covariance import ignored_discrepancy
+    from soilml.fitting.global_optimum import missing_peak
     from soilml.fitting.simulation import simulate
-    from soilml.fitting.uncarried_loads import missing_peak
     from soilml.io.bounds import ROWS
     from soilml.io.table import fault_of_text
     from soilml.physics.operating_point import Operating

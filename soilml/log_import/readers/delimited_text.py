@@ -18,6 +18,7 @@ from soilml.errors import InputError
 from soilml.io.bounds import KEPT_VALUES, LOG_BYTES, LOG_VALUES
 from soilml.io.cell_text import read_number, read_numbers
 from soilml.io.csv_by_arrow import blocks_of_cells
+from soilml.io.spreadsheet import sheet_rows
 from soilml.log_import.readers.blocks_of_text import BLOCK, find_blocks
 from soilml.log_import.readers.text_layout import (
     MISSING,
@@ -69,6 +70,18 @@ def read_delimited_text(
     return recordings_of(path, text.splitlines(), notes)
 
 
+def read_spreadsheet_log(path: Path) -> list[Recording]:
+    """The table of a sheet (`BOOK.xlsx#SHEET`), whose header and units are found as those of a log.
+
+    Raises `InputError` where the sheet has no samples, and as `sheet_rows` does.
+    """
+    rows = sheet_rows(path)
+    width = max(map(len, rows), default=0)
+    # cells hold no tab; a quotation mark, as of inches, must not seem to open a quoted cell
+    lines = ["\t".join([*row, *[""] * (width - len(row))]).replace('"', "''") for row in rows]
+    return recordings_of(path, lines, ())
+
+
 def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Recording | None:
     """A long log of plain cells, by pyarrow in blocks; None for one that has to be read by lines.
 
@@ -113,8 +126,8 @@ def _plain_recording(path: Path, progress: Callable[[int], None] | None) -> Reco
                 skip_empty=True,
             ):  # fmt: skip
                 for name in layout.names:
-                    cells = batch.column(name).to_numpy(zero_copy_only=False)[first::every]
-                    found[name].append(cells)
+                    cells = batch.column(name).to_numpy(zero_copy_only=False)
+                    found[name].append(cells[first::every].copy())  # else a view keeps all
                 first = (first - len(batch)) % every
     except (ImportError, ValueError):  # pyarrow's own errors are kinds of `ValueError`
         return None

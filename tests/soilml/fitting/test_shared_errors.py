@@ -139,13 +139,6 @@ def test_what_is_declared_or_unknown_is_no_usual_error(case):
     assert "slip_bias" not in usual_errors(with_effect, load, ["cohesion"])
 
 
-def test_a_closed_form_takes_the_model_as_right(case):
-    table = measured(case, np.random.default_rng(4))
-    biased = replace(case, bias={"slip": Noise(constant=0.01)})
-    fit = identify(biased, table, method="newton")
-    assert "bias-ignored" in {remark.code for remark in fit.warnings}
-
-
 def test_columns_are_differences_of_readings_with_and_without_each_error(case):
     at = Operating(slip=SLIPS, load=LOADS)
     data = usable_readings(case, measured(case, np.random.default_rng(1), tuple(CHANNELS)))
