@@ -20,8 +20,6 @@ released model files and file names. For a shell, and for good:
 
 Print it again after an update of soilml, which may have other commands.
 """
-
-
 ARGUMENTS = (("shell", "bash, zsh or fish", {"choices": ("bash", "zsh", "fish")}),)
 
 

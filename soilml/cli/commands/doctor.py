@@ -39,8 +39,6 @@ USES = {
     "threadpoolctl": "gap, generate, train",
 }
 NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
-
-
 ARGUMENTS = ()
 
 

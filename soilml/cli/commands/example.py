@@ -128,8 +128,6 @@ LOADS = (40.0, 55.0, 70.0, 85.0, 100.0, 115.0)  # N
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
 MEASURED = ("run", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
 RATE, STAGE, RADIUS = 50.0, 6.0, 0.15  # Rows a second, seconds at each slip, m
-
-
 ARGUMENTS = (
     (
         "words [NAME] FOLDER",

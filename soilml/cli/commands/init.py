@@ -29,8 +29,6 @@ LENGTHS = {
     "track": "distance of the left wheels from the right ones",
     "height": "height of the centre of mass above the ground",
 }
-
-
 ARGUMENTS = (
     ("out MODEL.toml", "the file to write"),
     ("--radius M", "wheel radius in m, or such as '15 cm'"),

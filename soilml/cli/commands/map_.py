@@ -33,8 +33,6 @@ map.png and map.json. With --elevation, a GeoTIFF of heights in the same
 coordinates, headings.tif has slope, probability, slip and work along eight
 headings, and the occupancy is that of the worst of them.
 """
-
-
 ARGUMENTS = (
     ("rover ROVER.toml", "wheel, soil, rover", InputFile),
     ("runs DRIVE.csv", "rows with positions", InputFile),

@@ -27,8 +27,6 @@ Torques weigh the soils of the prior. The result has a row for each time;
 flags say which rows are refused (standing, hard floor) and where the slip is
 not determined. FILE.json has the same with remarks.
 """
-
-
 ARGUMENTS = (
     ("rover ROVER.toml", "rover and prior", InputFile),
     ("drive DRIVE.csv", "a row for each time and wheel", InputFile),
