@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.resampling import systematic_resampling
+from soilml.numerics.quantiles import systematic_resampling
 from soilml.onboard.set_contract import ABSENT_STD, RESPONSE_CHANNELS
 from training.set_posterior.families.coordinates import NORMAL_TRUNCATION
 from training.set_posterior.families.wheel_family import SimulatedSets, WheelFamily

@@ -16,15 +16,15 @@ from scipy.special import ndtri
 from slip_drives import GRAVITY, MASS, SLIPS, ground_forces, loads
 
 from soilml import Estimator, SoilTracker, read_case
-from soilml.soil_maps.ability import map_ability
-from soilml.soil_maps.drive import MapDrive, read_map_drive
-from soilml.soil_maps.field import SoilField
+from soilml.soil_maps.field import SoilField, map_ability
 from soilml.soil_maps.held_out import torque_score
 from soilml.soil_maps.local_soils import (
+    MapDrive,
     coordinates,
     follow,
     local_soils,
     moments,
+    read_map_drive,
     with_exact_sensors,
 )
 

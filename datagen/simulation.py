@@ -22,7 +22,7 @@ from soilml.config.case import Case
 from soilml.config.measurement_noise import Discrepancy
 from soilml.errors import InputError
 from soilml.fitting.predictions import forces_of_one_gear
-from soilml.numerics.smooth_functions import SmoothFunctions
+from soilml.numerics.smooth_process import SmoothFunctions
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import COVARIATES, Operating
 from soilml.quantities import CHANNELS, COLUMNS, QUANTITIES, column

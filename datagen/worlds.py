@@ -20,8 +20,7 @@ from soilml.config.measurement_noise import Discrepancy, range_with_zero
 from soilml.errors import InputError
 from soilml.fitting.candidate_effects import candidate_effects, with_effect
 from soilml.io.toml_settings import Settings
-from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
 from soilml.parameters import declared
 from soilml.physics.contact import Force
 from soilml.physics.effects import Effect, EffectCard

@@ -45,7 +45,7 @@ ALLOWED_OUTSIDE_BOARD = {
     "soilml/soil_maps/workflow.py": {"scipy"},
     "soilml/report/page.py": {"jinja2"},
     "soilml/report/figure_style.py": {"matplotlib"},
-    "soilml/report/parameter_figure.py": {"matplotlib"},
+    "soilml/report/column_figure.py": {"matplotlib"},
     "soilml/gap/pictures.py": {"matplotlib"},
     "soilml/log_import/figures.py": {"matplotlib"},
     "soilml/log_import/readers/bags.py": {"rosbags", "mcap", "mcap_protobuf"},

@@ -41,8 +41,6 @@ of the friction angle that sliding soil loses), turning (rad/s), foot_mass
 that the model lacks (effect = 0.4) or a smooth error (error = 0.5). The same
 recipe and seed give the same bytes, on any number of processes (--workers).
 """
-
-
 ARGUMENTS = (
     ("recipe RECIPE.toml", "recipe file, or the name of a packaged recipe", InputFile),
     ("out OUT.parquet", "file to write"),

@@ -18,8 +18,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.io.table import Table
 from soilml.io.toml_settings import Settings
-from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, squared_exponential
+from soilml.numerics.smooth_process import SmoothFunctions, process_columns, squared_exponential
 from soilml.physics.contact import Force
 from soilml.quantities import CHANNELS, column
 from soilml.remarks import Remark

@@ -16,7 +16,7 @@ from soilml.experiment_design.parameter_samples import ParameterSamples
 from soilml.fitting.covariance import noise_of_operation
 from soilml.fitting.predictions import predict_channels
 from soilml.fitting.readings import LEAST_RELATIVE_STD, Readings
-from soilml.numerics.resampling import systematic_resampling
+from soilml.numerics.quantiles import systematic_resampling
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column
 

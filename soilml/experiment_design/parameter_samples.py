@@ -16,7 +16,7 @@ from soilml.identification.averaged import soil_samples
 from soilml.identification.condensing import condensed
 from soilml.identification.posterior import PosteriorSamples, prior_fractions
 from soilml.numerics.maximum_entropy import prior_quantiles
-from soilml.numerics.resampling import latin_hypercube
+from soilml.numerics.quantiles import latin_hypercube
 
 SAMPLES = 2048  # Default number of samples
 

@@ -12,7 +12,7 @@ from soilml.errors import FitError
 from soilml.fitting.damped_descents import APART, descend
 from soilml.fitting.least_squares import LeastSquaresProblem, Solution
 from soilml.fitting.predictions import forces
-from soilml.numerics.resampling import latin_hypercube
+from soilml.numerics.quantiles import latin_hypercube
 from soilml.physics.operating_point import Operating
 from soilml.row_status import Status
 

@@ -21,7 +21,7 @@ from soilml.fitting.predictions import predict
 from soilml.fitting.readings import Readings
 from soilml.identification.fit import WIDENED, Fit, with_warnings
 from soilml.numerics.importance_sampling import ImportanceSample, importance_sample
-from soilml.numerics.resampling import latin_hypercube, systematic_resampling
+from soilml.numerics.quantiles import latin_hypercube, systematic_resampling
 from soilml.quantities import column
 from soilml.remarks import Remark
 

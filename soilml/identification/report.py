@@ -10,9 +10,8 @@ import numpy as np
 
 from soilml.parameters import declared
 from soilml.physics.soils import Soil
-from soilml.report.corner_figure import corner_picture
+from soilml.report.column_figure import ParameterIntervals, corner_picture
 from soilml.report.numbers import channel_name, format_quantity
-from soilml.report.parameter_figure import ParameterIntervals
 from soilml.report.report import Report, by_group
 from soilml.report.tables import Column, ReportTable
 

@@ -44,8 +44,8 @@ from soilml.inference.priors import (
     prior_of_hyperparameters,
 )
 from soilml.inference.scatter_elimination import Eliminated, Products
-from soilml.numerics.bounded_descent import Point, bounded_minimum
 from soilml.numerics.prior import UNIFORM_PRECISION
+from soilml.numerics.root_finding import Point, bounded_minimum
 
 Booleans = NDArray[np.bool_]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from soilml.arrays import Floats
-from soilml.numerics.resampling import effective_size, latin_hypercube, weighted_quantiles
+from soilml.numerics.quantiles import effective_size, latin_hypercube, weighted_quantiles
 
 #: Samples of the first round, stratified over the cube, and of each round after it.
 FIRST_ROUND, LATER_ROUND = 2048, 2048

@@ -11,7 +11,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.numerics.prior import Prior
-from soilml.numerics.resampling import effective_size
+from soilml.numerics.quantiles import effective_size
 
 #: Grid points along the prior: their spacing, 0.05 % of the range, is the least std resolved.
 GRID_POINTS = 2000

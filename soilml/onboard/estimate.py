@@ -346,7 +346,7 @@ class Estimate(Result):
 
     def report(self) -> Report:
         """The verdict, each quantity of a single estimate, and intervals beside the prior."""
-        from soilml.report.parameter_figure import ParameterIntervals
+        from soilml.report.column_figure import ParameterIntervals
         from soilml.report.report import Report
         from soilml.report.tables import ReportTable
 

@@ -15,8 +15,8 @@ from soilml.onboard.estimate import Estimate, Reason
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, column
 from soilml.remarks import NEXT_ROW, Remark
+from soilml.report.column_figure import ParameterIntervals
 from soilml.report.numbers import shown_unit, significant
-from soilml.report.parameter_figure import ParameterIntervals
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
 

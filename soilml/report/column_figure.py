@@ -1,19 +1,31 @@
-"""Columns of a table as a picture: a panel for each quantity, a line for each group of rows."""
+"""Pictures: columns of a table in panels, intervals of parameters, the joint density of draws."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from soilml.report.figure_style import AFTER, BEFORE, PRIOR, UNCHANGED
-from soilml.report.numbers import pretty, shown_column, significant
+from soilml.report.figure_style import AFTER, BEFORE, PRIOR, UNCHANGED, short_label, take_axes
+from soilml.report.numbers import (
+    parameter_name,
+    pretty,
+    shown_column,
+    shown_unit,
+    significant,
+    with_unit,
+)
 from soilml.report.report import Picture
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 Columns = Mapping[str, Any]
+Floats = NDArray[np.float64]
 
 #: Colours of lines, told apart by colour-blind readers (Okabe and Ito 2008).
 COLOURS = (AFTER, BEFORE, "#009e73", "#b03a7c", "#56b4e9", UNCHANGED, "#d55e00", "#8a7a00")
@@ -150,3 +162,145 @@ def _cell(name: str, value: Any) -> str:
     words, comma, unit = label.partition(", ")
     number = significant(factor * float(value), 3)
     return f"{number} {unit}" if comma else f"{words} {number}"
+
+
+MOST_LINES = 12  # Most results that are lines with labels; more are points over their number
+_LONG = 41  # Characters of a label from which on all are small, so that room is left for the panels
+
+
+@dataclass(frozen=True)
+class ParameterIntervals:
+    """Estimates of p parameters in g results, in SI units.
+
+    names, units: Of the parameters (p,).
+    labels: Of the results (g,).
+    values, low, high: Estimates and ends of their 90 % intervals, (g, p); NaN where there is none.
+    prior_low, prior_high: Ends of what was known before, (p,); NaN where that is not stated.
+    """
+
+    names: Sequence[str]
+    units: Sequence[str]
+    labels: Sequence[str]
+    values: Floats
+    low: Floats
+    high: Floats
+    prior_low: Floats
+    prior_high: Floats
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of axes."""
+        return len(self.names), 1
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of a figure, inches."""
+        lines = min(max(len(self.labels), 1), MOST_LINES)
+        height = 0.95 + 0.28 * (lines - 1) if len(self.labels) <= MOST_LINES else 1.9
+        return 7.2, height * len(self.names) + 0.25
+
+    def plot(self, ax: Any = None) -> NDArray[Any]:
+        """Draw a panel for each parameter; returns axes (p,), `ax` takes as many."""
+        axes = take_axes(ax, len(self.names), 1, self.size)[:, 0]
+        for k, panel in enumerate(axes):
+            self._draw(panel, k)
+        return np.asarray(axes)
+
+    def picture(self) -> Picture:
+        """The figure with its caption."""
+        caption = "Grey: the range of the prior." if np.isfinite(self.prior_low).any() else ""
+        text = f"Estimates and 90 % intervals of {', '.join(map(parameter_name, self.names))}"
+        return Picture(
+            "Estimates and 90 % intervals", self.plot, *self.shape, self.size, text, caption
+        )
+
+    def _draw(self, panel: Axes, k: int) -> None:
+        from matplotlib.ticker import MaxNLocator
+
+        scale = [v for v in (*self.values[:, k], self.prior_high[k]) if np.isfinite(v)]
+        factor, unit = shown_unit(self.units[k], max(map(abs, scale), default=1.0))
+        value, low, high = (factor * v[:, k] for v in (self.values, self.low, self.high))
+        prior = factor * self.prior_low[k], factor * self.prior_high[k]
+        many = len(self.labels) > MOST_LINES
+        place = np.arange(1, len(self.labels) + 1)
+        known = np.isfinite(value)
+        errors = np.maximum(np.stack([value - low, high - value]), 0.0)[:, known]
+        style: dict[str, Any] = {"color": AFTER, "elinewidth": 1.2 if many else 3, "lw": 0}
+        if many:
+            panel.errorbar(place[known], value[known], errors, fmt=".", ms=4, **style)
+            if np.isfinite(prior).all():
+                panel.axhspan(*prior, color=PRIOR, lw=0, zorder=0)
+            panel.set_ylabel(pretty(unit))
+            panel.xaxis.set_major_locator(MaxNLocator(integer=True))
+            panel.set_xlabel("number of the result" if k == len(self.names) - 1 else "")
+        else:
+            panel.errorbar(value[known], place[known], xerr=errors, fmt="o", ms=6, **style)
+            if np.isfinite(prior).all():
+                panel.axvspan(*prior, color=PRIOR, lw=0, zorder=0)
+            panel.set_ylim(len(self.labels) + 0.6, 0.4)
+            shown = [short_label(label) for label in self.labels] if len(place) > 1 else []
+            panel.set_yticks(place if shown else [], shown)
+            if max(map(len, shown), default=0) > _LONG:
+                panel.tick_params(axis="y", labelsize=8)
+        panel.set_title(pretty(with_unit(parameter_name(self.names[k]), unit)))
+
+
+_LEVELS = (0.5, 0.9)  # Shares of the draws within the contours
+_BINS = 24
+
+
+def corner_picture(names: Sequence[str], units: Sequence[str], draws: Floats) -> Picture:
+    """A corner plot of equally likely draws (n, p) in SI units; see `plot_corner`."""
+    p = len(names)
+    correlation = np.corrcoef(draws.T).reshape(p, p) if p > 1 else np.ones((1, 1))
+    pairs = [
+        f"{names[i]} and {names[j]} {correlation[i, j]:+.2f}" for i in range(p) for j in range(i)
+    ]
+    text = f"correlations: {'; '.join(pairs)}" if pairs else f"density of {names[0]}"
+
+    def draw(ax: Any) -> None:
+        plot_corner(names, units, draws, ax)
+
+    caption = "Diagonal: densities. Below it: draws of each pair, with contours of 50 and 90 %."
+    return Picture("The soil", draw, p, p, (2.5 * p, 2.3 * p), text, caption, whole=True)
+
+
+def plot_corner(names: Sequence[str], units: Sequence[str], draws: Floats, ax: Any = None) -> Any:
+    """Draw densities on the diagonal and pairs below it; axes (p, p), see `take_axes`."""
+    p = len(names)
+    axes = take_axes(ax, p, p, (2.5 * p, 2.3 * p))
+    largest = np.abs(draws).max(axis=0)
+    shown = [shown_unit(unit, size) for unit, size in zip(units, largest, strict=True)]
+    values = draws * np.asarray([factor for factor, _ in shown])
+    labels = [
+        with_unit(pretty(parameter_name(n).split()[-1]), pretty(u))
+        for n, (_, u) in zip(names, shown, strict=True)
+    ]
+    for i in range(p):
+        for j in range(p):
+            panel = axes[i, j]
+            if j > i:
+                panel.set_axis_off()
+                continue
+            if i == j:
+                panel.hist(values[:, i], _BINS, color=AFTER, alpha=0.7)
+                panel.set_yticks([])
+                panel.set_title(pretty(parameter_name(names[i])), fontsize=10)
+            else:
+                _pair(panel, values[:, j], values[:, i])
+                if j == 0:
+                    panel.set_ylabel(labels[i])
+            if i == p - 1:
+                panel.set_xlabel(labels[j])
+    return axes
+
+
+def _pair(panel: Any, x: Floats, y: Floats) -> None:
+    panel.plot(x, y, ".", color=UNCHANGED, ms=2, alpha=0.35, rasterized=False)
+    count, xs, ys = np.histogram2d(x, y, _BINS // 2)
+    ordered = np.sort(count.ravel())[::-1]
+    above = np.cumsum(ordered) / max(ordered.sum(), 1.0)
+    levels = sorted({float(ordered[np.searchsorted(above, share)]) for share in _LEVELS})
+    if levels and levels[0] < count.max() and len(set(levels)) == len(levels):
+        centres = [0.5 * (e[1:] + e[:-1]) for e in (xs, ys)]
+        panel.contour(*centres, count.T, levels=levels, colors=AFTER, linewidths=1.2)

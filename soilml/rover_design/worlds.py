@@ -17,8 +17,7 @@ from soilml.fitting.coordinates import select_free
 from soilml.fitting.shared_errors import USUAL_MODEL_ERRORS, ModelledErrors, without_errors
 from soilml.io.read_table import RUNS, read_table
 from soilml.numerics.prior import Prior
-from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
 from soilml.parameters import declared
 from soilml.physics.effects import EFFECTS, Effect
 from soilml.physics.effects.grousers import Grousers

@@ -73,18 +73,6 @@ def _header(file: Path) -> set[str]:
     return {cell.strip().strip("\"'") for cell in re.split(r"[,;\t]", line)}
 
 
-def _identify(request: Mapping[str, Any]) -> list[str]:
-    return ["identify", *_model_and_rows(request), "--report", OUT]
-
-
-def _gap(request: Mapping[str, Any]) -> list[str]:
-    return ["gap", *_model_and_rows(request), "--out", OUT]
-
-
-def _pull(request: Mapping[str, Any]) -> list[str]:
-    return ["pull", *_model_and_rows(request), "--report", OUT]
-
-
 def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
     from soilml.config.case import read_case
 
@@ -92,10 +80,6 @@ def _model_and_rows(request: Mapping[str, Any]) -> list[str]:
     read_case(model, with_bias=True, files=NO_FILES, with_explanations=True)
     run = request.get("run")
     return [MODEL_FILE, request["names"][0], *([f"--where=run={run}"] if run else [])]
-
-
-def _draft(request: Mapping[str, Any]) -> list[str]:
-    return ["import", "--init", *request["names"], "--out", f"{OUT}/{MAP_FILE}"]
 
 
 def _import(request: Mapping[str, Any]) -> list[str]:
@@ -133,10 +117,6 @@ def _init(request: Mapping[str, Any]) -> list[str]:
     return words
 
 
-def _example(request: Mapping[str, Any]) -> list[str]:
-    return ["example", OUT]
-
-
 def _text_file(name: str, text: object) -> Path:
     """A text box of the page as a file of this name, so that errors name it."""
     if not isinstance(text, str) or not text.strip():
@@ -150,14 +130,14 @@ def _text_file(name: str, text: object) -> Path:
 
 #: Words of the command by the kind of a job.
 KINDS: Mapping[str, Callable[[Mapping[str, Any]], list[str]]] = {
-    "identify": _identify,
-    "gap": _gap,
-    "pull": _pull,
-    "draft": _draft,
+    "identify": lambda r: ["identify", *_model_and_rows(r), "--report", OUT],
+    "gap": lambda r: ["gap", *_model_and_rows(r), "--out", OUT],
+    "pull": lambda r: ["pull", *_model_and_rows(r), "--report", OUT],
+    "draft": lambda r: ["import", "--init", *r["names"], "--out", f"{OUT}/{MAP_FILE}"],
     "import": _import,
     "wheels": _wheels,
     "init": _init,
-    "example": _example,
+    "example": lambda _: ["example", OUT],
 }
 #: Kinds of jobs that read no dropped file.
 WITHOUT_FILES = ("wheels", "init", "example")

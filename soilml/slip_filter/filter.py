@@ -13,7 +13,7 @@ import numpy as np
 from soilml.arrays import Floats
 from soilml.config.wheeled_rover import DriveErrors
 from soilml.numerics.prior import Prior
-from soilml.numerics.resampling import effective_size, weighted_quantiles
+from soilml.numerics.quantiles import effective_size, weighted_quantiles
 from soilml.slip_filter.force_table import ForceTable
 
 CHANGE = 0.01  # Probability that a row is on another soil than the row before

@@ -12,9 +12,8 @@ from soilml.config.case import Case
 from soilml.onboard.estimator import Estimator
 from soilml.onboard.set_contract import LEAST_STD
 from soilml.physics.operating_point import MOST_SLIP, Operating
-from soilml.soil_maps.drive import MapDrive
 from soilml.soil_maps.field import SoilField
-from soilml.soil_maps.local_soils import FollowedRows, LocalSoils, moments, soil_values
+from soilml.soil_maps.local_soils import FollowedRows, LocalSoils, MapDrive, moments, soil_values
 from soilml.traction.draws import SoilDraws
 
 PIECES, HELD = 24, 4  # Pieces of equal length of the path, of which every fourth is held out

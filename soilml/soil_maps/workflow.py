@@ -20,15 +20,15 @@ from soilml.onboard.estimator import Estimator
 from soilml.quantities import NOT_IDENTIFIED_ABOVE, QUANTITIES
 from soilml.remarks import Remark
 from soilml.results import Result
-from soilml.soil_maps.ability import MapAbility, map_ability
-from soilml.soil_maps.drive import MapDrive, read_map_drive
-from soilml.soil_maps.field import SoilField
+from soilml.soil_maps.field import MapAbility, SoilField, map_ability
 from soilml.soil_maps.held_out import HeldOutScore, held_out_score
 from soilml.soil_maps.local_soils import (
     FollowedRows,
     LocalSoils,
+    MapDrive,
     follow,
     local_soils,
+    read_map_drive,
     soil_values,
     with_exact_sensors,
 )

@@ -16,8 +16,7 @@ from soilml.fitting.operating_points import operating_points, rows_by_gear
 from soilml.fitting.predictions import forces_of_one_gear
 from soilml.fitting.readings import declared_std
 from soilml.io.table import Table
-from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
 from soilml.physics.contact import Force
 from soilml.physics.operating_point import Operating
 from soilml.quantities import CHANNELS, column

@@ -24,9 +24,8 @@ from soilml.inference.draws import Draws
 from soilml.inference.gaussian_terms import FIXED
 from soilml.inference.posterior import Posterior, infer
 from soilml.inference.problem import InferenceProblem
-from soilml.numerics.resampling import systematic_resampling
-from soilml.numerics.smooth_functions import SmoothFunctions
-from soilml.numerics.smooth_process import process_columns, slip_load_points
+from soilml.numerics.quantiles import systematic_resampling
+from soilml.numerics.smooth_process import SmoothFunctions, process_columns, slip_load_points
 from soilml.physics.effects import EFFECTS
 from soilml.processes import threads_for
 from soilml.quantities import column

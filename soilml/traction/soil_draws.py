@@ -41,7 +41,7 @@ from soilml.io.table import Table
 from soilml.numerics.importance_sampling import importance_sample
 from soilml.numerics.maximum_entropy import moment_matched_weights
 from soilml.numerics.prior import Prior
-from soilml.numerics.resampling import systematic_resampling
+from soilml.numerics.quantiles import systematic_resampling
 from soilml.onboard.estimator import Estimator
 from soilml.quantities import column
 from soilml.remarks import Remark

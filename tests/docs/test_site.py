@@ -14,7 +14,6 @@ import soilml
 from soilml.cli import main
 from soilml.cli.main import COMMANDS, parser
 from soilml.cli.old_spellings import present_words
-from soilml.quantities import QUANTITIES
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "docs/site"))
@@ -117,13 +116,6 @@ def test_every_message_belongs_to_one_group_of_the_page():
     found = list(error_listing.messages())
     assert len(found) > 400
     assert error_listing.faults(error_listing.PAGE.read_text(), found) == []
-
-
-def test_every_quantity_is_on_the_page_of_symbols():
-    page = (ROOT / "docs/reference/symbols.md").read_text()
-    for quantity in QUANTITIES.values():
-        unit = "" if quantity.unit == "-" else f" ({quantity.unit})"
-        assert f"`{quantity.column}`{unit}: {quantity.text}\n" in page
 
 
 def test_every_public_name_is_in_the_reference():

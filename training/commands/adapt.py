@@ -41,8 +41,6 @@ FILES = (
     *(f"before{end}" for end in (".onnx", ".md", "_recipe.toml", "_rows.parquet")),
 )
 LEAST_ROWS, MOST_ROWS = 2000, 10**9  # Synthetic rows of a file
-
-
 ARGUMENTS = (
     "model-and-runs",
     ("--out FOLDER", "folder for all files", REQUIRED),

@@ -40,8 +40,6 @@ posterior mean of the same sets, which no estimator can beat on average.
 
 Writes report.html (start here), compare.json, compare.csv and compare.png.
 """
-
-
 ARGUMENTS = (
     ("files FILE", "MODEL.onnx ..., or MODEL.toml TEST.parquet MODEL.onnx ...", InputFile, ANY),
     ("--out FOLDER", f"output folder (default for the benchmark: {FOLDER})"),

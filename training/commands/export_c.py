@@ -33,8 +33,6 @@ docs/how-to/deploy.md describes them, with an example in C and one in C++.
 #: Rows of one step that the working memory may be asked for, and rows that a tracker remembers.
 MOST_ROWS = 4096
 LEAST_LENGTH = 16  # Fewest rows that a tracker remembers
-
-
 ARGUMENTS = (
     ("model MODEL.onnx", "a model file", InputFile),
     ("out OUT.c", "C file to write; OUT.h is written beside it"),

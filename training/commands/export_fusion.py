@@ -22,8 +22,6 @@ its header OUT.h. They use the structs that export-c writes for each file.
 slip_fuse() weighs the estimates by their variances and by the correlation of
 their errors, which are in the files. docs/how-to/deploy.md describes it.
 """
-
-
 ARGUMENTS = (
     ("first FIRST.onnx", "a file, named as its C file", InputFile),
     ("second SECOND.onnx", "the other one", InputFile),

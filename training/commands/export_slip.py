@@ -23,8 +23,6 @@ OUT.onnx with numpy and onnxruntime alone; OUT.c needs the C library alone.
 """
 SOILS = 1024
 STEEPEST = 25.0  # Degrees; pitch to either side for which loads are tabulated
-
-
 ARGUMENTS = (
     ("rover ROVER.toml", "rover and prior", InputFile),
     ("out OUT.onnx", "file to write", OutputFile),

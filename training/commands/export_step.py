@@ -18,8 +18,6 @@ docs/reference/onnx.md says how its memory is fed from step to step. Python
 uses MODEL.onnx itself; soilml export c writes C that needs no library.
 """
 MOST_ROWS = 4096  # Rows that one step may take
-
-
 ARGUMENTS = (
     ("model MODEL.onnx", "a model file", InputFile),
     ("out OUT.onnx", "file to write", OutputFile),

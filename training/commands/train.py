@@ -39,8 +39,6 @@ command writes the model card OUT.md. A spec contains
   small = true                       # for a microcontroller: fewer monomials,
   terms = 14                         # 10 to 25, and fewer points (docs/how-to/deploy.md)
 """
-
-
 ARGUMENTS = (
     ("spec SPEC.toml", "spec file, or the name of a packaged spec", InputFile),
     ("data DATA.parquet", "data written by soilml generate, or measured", InputFile, OPTIONAL),

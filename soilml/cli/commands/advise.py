@@ -54,8 +54,6 @@ TRANSFER = {
     "scaled_error_N": "scaled_error",
     "speed_ratio": "speed_ratio",
 }
-
-
 ARGUMENTS = (
     "model-and-any-runs",
     ("--slip S,...", "candidate slips: A,B,... or start:stop:count"),

@@ -26,8 +26,6 @@ rival cannot explain: an effect can be named from about 3. `detectable` is the
 smallest size that is noticed in four of five data sets. With --cost, runs to
 add are ranked by the effects that they gain per cost.
 """
-
-
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil and noise", InputFile),
     ("design DESIGN.csv", "planned rows: CSV, Parquet or .xlsx", InputFile),

@@ -48,8 +48,6 @@ LIMITS = {
     "normal_stress_Pa": (0.0, math.inf, "a normal stress above zero, in Pa"),
     "inner_radius_m": (-1e-9, 10.0, "a radius in m"),
 }
-
-
 ARGUMENTS = (
     ("tables TABLE.csv", "plate tests, shear tests, or both; CSV or Parquet", InputFile, SEVERAL),
     ("--model MODEL.toml", "whose gear, noise and other soil values to take", InputFile),

@@ -36,8 +36,6 @@ is no climb (imposed slip on level ground).
 Each slope gives one equation, so three unknowns need three slopes. The bands
 are 90 % intervals. FOLDER receives report.html, climb.json, curve.csv, climbs.csv.
 """
-
-
 ARGUMENTS = (
     ("rover ROVER.toml", "rover, soil and noise", InputFile),
     ("runs RUNS.csv", "climbs, CSV or Parquet", InputFile),

@@ -20,8 +20,6 @@ released model files and file names. For a shell, and for good:
 
 Print it again after an update of soilml, which may have other commands.
 """
-
-
 ARGUMENTS = (("shell", "bash, zsh or fish", {"choices": ("bash", "zsh", "fish")}),)
 
 
@@ -72,26 +70,25 @@ def _complete(action: argparse.Action, command: str) -> None:
 
 def _names(command: str, dest: str, metavar: str) -> Iterable[str]:
     """Names that are known for an argument."""
-    if command == "show soils" or dest == "soil":
-        from soilml.physics.soils import soil_catalogue
+    from soilml.config.wheeled_rover import GRAVITY
+    from soilml.identification import METHODS
+    from soilml.onboard.model_file import released_models
+    from soilml.onboard.multi_sensor import ACROSS_FILES
+    from soilml.physics.effects import EFFECTS
+    from soilml.physics.soils import soil_catalogue
+    from soilml.physics.soils.gravity_law import LAWS
 
-        return soil_catalogue()
-    if command == "show effects" and dest == "name":
-        from soilml.physics.effects import EFFECTS
-
-        return EFFECTS
     if ".onnx" in metavar and "OUT" not in metavar:
-        from soilml.onboard.model_file import released_models
-
         return released_models()
-    if dest == "method":
-        return ("nonlinear", "linear", "newton", "posterior")
-    if dest == "gravity_law":
-        from soilml.physics.soils.gravity_law import LAWS
-
-        return LAWS
-    if dest in ("gravity", "tested_at"):
-        from soilml.config.wheeled_rover import GRAVITY
-
-        return GRAVITY
-    return ("run", "gear") if dest == "by" else ()
+    known: dict[str, Iterable[str]] = {
+        "show soils name": soil_catalogue(),
+        "show effects name": EFFECTS,
+        "soil": soil_catalogue(),
+        "method": METHODS,
+        "gravity_law": LAWS,
+        "gravity": GRAVITY,
+        "tested_at": GRAVITY,
+        "rule": ACROSS_FILES,
+        "by": ("run", "gear"),
+    }
+    return known.get(dest) or known.get(f"{command} {dest}", ())

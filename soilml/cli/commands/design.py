@@ -48,8 +48,6 @@ of `least`; where none does, it is the likeliest. The margin is the largest pull
 less the weight along the slope. The front has the designs that no other one
 beats in both margin and `least`.
 """
-
-
 ARGUMENTS = (
     ("study ROVER.toml", "rover, wheel, soil and goal", InputFile),
     ("--slope DEG", "slope in degrees", NumberFrom(0.0, 60.0, "degrees")),

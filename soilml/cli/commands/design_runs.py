@@ -25,8 +25,6 @@ is printed: it is a part of every interval. A design of --out has no outputs;
 add torque_Nm, drawbar_pull_N and sinkage_m, as far as the simulator has them,
 and store it as the table of [simulator].
 """
-
-
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil, priors and [simulator]", InputFile),
     ("--count N", "number (default: 20 for each input, then 5)", whole_number_from(1, 100_000)),

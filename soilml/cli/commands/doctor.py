@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
-import re
 import sys
 from collections.abc import Iterator
 from importlib import metadata
@@ -41,8 +39,6 @@ USES = {
     "threadpoolctl": "gap, generate, train",
 }
 NEEDED = ("numpy", "onnxruntime")  # The libraries without which nothing works
-
-
 ARGUMENTS = ()
 
 
@@ -51,11 +47,13 @@ def run(args: argparse.Namespace) -> int:
     import platform
 
     from soilml import __version__
+    from soilml.processes import usable_cores
     from soilml.report.aligned_text import format_table
 
     print(f"soilml {__version__}, Python {platform.python_version()}, {platform.platform()}")
-    print(f"{_cores()} usable cores; {sys.executable}\n")
-    print(format_table(("library", "version", "needed for"), list(_libraries()), text_columns=3))
+    print(f"{usable_cores()} usable cores; {sys.executable}\n")
+    rows = [(name, _version(name) or "-", use) for name, use in USES.items()]
+    print(format_table(("library", "version", "needed for"), rows, text_columns=3))
     problems = list(_problems())
     print()
     for text in problems:
@@ -63,11 +61,6 @@ def run(args: argparse.Namespace) -> int:
     if not problems:
         print("released model files give their known answers; nothing is wrong")
     return 1 if problems else 0
-
-
-def _libraries() -> Iterator[tuple[str, str, str]]:
-    for name, use in USES.items():
-        yield name, _version(name) or "-", use
 
 
 def _version(name: str) -> str:
@@ -82,10 +75,6 @@ def _problems() -> Iterator[str]:
     for name in NEEDED:
         if not _version(name):
             yield f"{name} is missing: pip install {name}"
-    for name, least in _least_versions().items():
-        found = _version(name)
-        if found and _numbers(found) < _numbers(least):
-            yield f"{name} is {found}; needed is {least} or newer: pip install -U {name}"
     if not all(_version(name) for name in NEEDED):
         return
     from soilml.onboard.estimator import Estimator
@@ -99,23 +88,3 @@ def _problems() -> Iterator[str]:
             Estimator.load(file)
         except SoilmlError as error:
             yield str(error)
-
-
-def _least_versions() -> dict[str, str]:
-    """The oldest version of each library that this distribution allows."""
-    try:
-        required = metadata.requires("soilml") or []
-    except metadata.PackageNotFoundError:  # a checkout that is not installed
-        return {}
-    found = (re.match(r"([\w.-]+)\s*(?:>=|==)\s*([\d.]+)", text) for text in required)
-    return {match[1]: match[2] for match in found if match is not None}
-
-
-def _numbers(version: str) -> list[int]:
-    """A release number as a list that compares as versions do."""
-    return [int(part) for part in re.findall(r"\d+", version.split("+")[0])[:3]]
-
-
-def _cores() -> int:
-    usable = getattr(os, "sched_getaffinity", None)
-    return len(usable(0)) if usable is not None else os.cpu_count() or 1

@@ -14,8 +14,6 @@ List the effects that [[effect]] in a model file may name.
   soilml show effects slip-sinkage    one effect: parameters, units, bounds,
                                  equation, source
 """
-
-
 ARGUMENTS = (
     ("name", "name of the effect to show", OPTIONAL),
     "effects",

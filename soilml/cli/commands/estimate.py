@@ -47,8 +47,6 @@ A row with a blank reading, or whose status is not ok, gets a blank estimate.
 sensors; the column `files` counts those that took part. Only numpy and
 onnxruntime are needed, but for --report. CSV files are in SI units.
 """
-
-
 ARGUMENTS = (
     ("trained MODEL.onnx", "trained model file", InputFile),
     ("runs RUNS.csv", "measured rows; without them, what the file is for", InputFile, OPTIONAL),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,30 +61,21 @@ rear-right = { position = [-0.4, -0.3] }
 """
 #: Files of each example, and the command that comes next.
 EXAMPLES = {
-    "campaign": (
-        ("model.toml", "runs.csv"),
-        "soilml gap {0}/model.toml {0}/runs.csv --out {0}/gap",
-    ),
-    "log": (
-        ("model.toml", "rig.csv"),
-        "soilml import --init {0}/rig.csv --out {0}/map.toml",
-    ),
-    "rover": (
-        ("rover.toml", "runs.csv"),
-        "soilml pull {0}/rover.toml {0}/runs.csv --slope 0,10,20",
-    ),
+    "campaign": ("model.toml runs.csv", "gap {0}/model.toml {0}/runs.csv --out {0}/gap"),
+    "log": ("model.toml rig.csv", "import --init {0}/rig.csv --out {0}/map.toml"),
+    "rover": ("rover.toml runs.csv", "pull {0}/rover.toml {0}/runs.csv --slope 0,10,20"),
     "sensor-wheel": (
-        ("model.toml", "runs.csv", "readings.csv"),
-        "soilml paper sensor-wheel {0}/model.toml {0}/runs.csv --readings {0}/readings.csv",
+        "model.toml runs.csv readings.csv",
+        "paper sensor-wheel {0}/model.toml {0}/runs.csv --readings {0}/readings.csv",
     ),
     "climb": (
-        ("rover.toml", "runs.csv", "stress.csv"),
-        "soilml paper climb {0}/rover.toml {0}/runs.csv --stress {0}/stress.csv",
+        "rover.toml runs.csv stress.csv",
+        "paper climb {0}/rover.toml {0}/runs.csv --stress {0}/stress.csv",
     ),
-    "wheel-leg": (("strides.csv",), "soilml paper wheel-leg {0}/strides.csv --by run"),
+    "wheel-leg": ("strides.csv", "paper wheel-leg {0}/strides.csv --by run"),
     "track": (
-        ("model.toml", "log.csv"),
-        "soilml paper track {0}/model.toml {0}/log.csv --mass 130 --spacing 0.6",
+        "model.toml log.csv",
+        "paper track {0}/model.toml {0}/log.csv --mass 130 --spacing 0.6",
     ),
 }
 SENSOR_WHEEL = """\
@@ -138,8 +128,6 @@ LOADS = (40.0, 55.0, 70.0, 85.0, 100.0, 115.0)  # N
 SLIPS = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
 MEASURED = ("run", "slip", "load_N", "torque_Nm", "drawbar_pull_N", "sinkage_m")
 RATE, STAGE, RADIUS = 50.0, 6.0, 0.15  # Rows a second, seconds at each slip, m
-
-
 ARGUMENTS = (
     (
         "words [NAME] FOLDER",
@@ -154,7 +142,7 @@ def outputs(args: argparse.Namespace) -> list[Path]:
     from soilml.cli.options import folder_outputs
 
     name, folder = _name_and_folder(args)
-    return folder_outputs("FOLDER", str(folder), EXAMPLES[name][0])
+    return folder_outputs("FOLDER", str(folder), EXAMPLES[name][0].split())
 
 
 def run(args: argparse.Namespace) -> int:
@@ -165,22 +153,13 @@ def run(args: argparse.Namespace) -> int:
 
     need("scipy", "example")
     name, folder = _name_and_folder(args)
-    files = [folder / file for file in EXAMPLES[name][0]]
+    files = [folder / file for file in EXAMPLES[name][0].split()]
     taken = [str(file) for file in files if file.exists()]
     if taken:
         raise InputError(f"{taken[0]} exists; give another folder")
-    make: dict[str, Callable[[], tuple[str, ...]]] = {
-        "campaign": _campaign,
-        "log": _log,
-        "rover": _rover,
-        "sensor-wheel": _sensor_wheel,
-        "climb": _climb,
-        "wheel-leg": _wheel_leg,
-        "track": _track,
-    }
-    texts = make[name]()
+    texts = globals()[f"_{name.replace('-', '_')}"]()
     write_files(dict(zip(files, texts, strict=True)), folders=[folder])
-    show(f"{', '.join(map(str, files))} written. Next: {EXAMPLES[name][1].format(folder)}")
+    show(f"{', '.join(map(str, files))} written. Next: soilml {EXAMPLES[name][1].format(folder)}")
     return 0
 
 

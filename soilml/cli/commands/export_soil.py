@@ -33,8 +33,6 @@ of Chrono, have a default that is named as such; --set gives your value.
 FOLDER has the files, README.md, and export.json with the remarks. A warning
 says where one file hides that a parameter is not determined.
 """
-
-
 ARGUMENTS = (
     ("fit FIT.json", "result of identify, or MODEL.toml", InputFile),
     ("--to TARGET", "chrono, chrono-crm, gazebo, isaac or csv", REQUIRED),

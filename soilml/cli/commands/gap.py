@@ -47,8 +47,6 @@ and name it in the column gear. An effect of one wheel is then grousers@NAME.
 --checked torque-gain=0.003 declares the standard deviation of a sensor's fault
 after calibration. --cost second-pass=3 gives the cost of a kind of run.
 """
-
-
 ARGUMENTS = (
     "model-and-runs",
     ("--out FOLDER", "folder for the four files", REQUIRED),

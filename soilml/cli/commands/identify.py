@@ -44,8 +44,6 @@ The verdict comes first; -v shows all of it, and --out FILE.json has the result
 in SI units. `left of prior` (remaining_fraction in the file) is the width of
 the estimate divided by that of the prior. Read the warnings.
 """
-
-
 ARGUMENTS = (
     "model-and-runs",
     ("--method NAME (averaged)", "averaged, posterior, nonlinear, linear or newton"),

@@ -43,8 +43,6 @@ _SHOWN = ("run", "slip", "slip_std", "load_N", "torque_Nm", "torque_Nm_std", "dr
           "sinkage_m")  # fmt: skip
 _MOST_SHOWN = 40
 _MOST_NAMED = 4  # Most logs that the next command names
-
-
 ARGUMENTS = (
     ("files LOG", "logs, of any kind", InputFile, SEVERAL),
     ("--init", "write a commented map with guesses, and no table"),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 
 from soilml.cli.option_values import whole_number_from
@@ -15,7 +14,6 @@ DESCRIPTION = """\
 Write a model file to begin with: the wheel, a soil with wide priors, the noise
 of the sensors, and the other sections as comments.
 
-  soilml init MODEL.toml                       asks a few questions on a terminal
   soilml init MODEL.toml --radius 0.15 --width 0.12 --soil wong1989/dry_sand
   soilml init MODEL.toml --radius 0.1 --width 0.08 --mass 12 --wheels 4 \\
       --wheelbase 0.4 --track 0.35 --height 0.18
@@ -25,21 +23,12 @@ Without --soil the bearing of the soil is unknown too, and has a prior. With
 wheelbase and track, with the centre of mass above their middle at --height. An
 existing file is not replaced.
 """
-#: The question for each option that is asked for, and the default answer.
-QUESTIONS = {
-    "radius": ("wheel radius in m", ""),
-    "width": ("wheel width in m", ""),
-    "soil": ("soil whose bearing is known, such as wong1989/dry_sand; blank if unknown", ""),
-    "torque_noise": ("standard deviation of torque, such as 2 % or 2 % + 0.05 (N m)", "2 %"),
-}
 #: Lengths that a rover has, and what each is.
 LENGTHS = {
     "wheelbase": "distance of the first axle from the last",
     "track": "distance of the left wheels from the right ones",
     "height": "height of the centre of mass above the ground",
 }
-
-
 ARGUMENTS = (
     ("out MODEL.toml", "the file to write"),
     ("--radius M", "wheel radius in m, or such as '15 cm'"),
@@ -64,25 +53,16 @@ def run(args: argparse.Namespace) -> int:
     file = Path(args.out)
     if file.exists():
         raise InputError(f"{file} exists; give another name, or remove it")
-    given = {key: getattr(args, key) for key in QUESTIONS}
-    if sys.stdin.isatty() and sys.stdout.isatty() and given["radius"] is None:
-        given = {key: value if value is not None else _ask(key) for key, value in given.items()}
     for key in ("radius", "width"):
-        if given[key] is None:
-            raise InputError(f"--{key} is missing; needed is the {QUESTIONS[key][0]}")
-    sizes = {key: _size(key, str(given[key])) for key in ("radius", "width")}
+        if getattr(args, key) is None:
+            raise InputError(f"--{key} is missing; needed is the wheel {key} in m")
+    sizes = {key: _size(key, getattr(args, key)) for key in ("radius", "width")}
     rover = None if args.mass is None else _rover(args)
-    text = _text(given | sizes, rover)
+    text = _text(sizes, args.soil, args.torque_noise or "2 %", rover)
     _check(text)
     save_text(file, text)
     show(f"{file} written. Next: soilml identify {file} RUNS.csv")
     return 0
-
-
-def _ask(key: str) -> str | None:
-    question, default = QUESTIONS[key]
-    answer = input(f"{question}{f' [{default}]' if default else ''}: ").strip() or default
-    return answer or None
 
 
 def _size(key: str, text: str) -> float:
@@ -110,22 +90,20 @@ def _check(text: str) -> None:
             raise InputError(str(error).replace(f"{trial} ", "").replace(str(trial), "")) from None
 
 
-def _text(given: dict[str, str | float | None], rover: str | None) -> str:
+def _text(sizes: dict[str, float], name: str | None, noise: str, rover: str | None) -> str:
     """The model file."""
     from soilml.physics.soils import soil_catalogue
 
-    name = given["soil"]
     catalogue = soil_catalogue()
     if name is not None and name not in catalogue:
         raise InputError(
-            f"no soil {name!r}; {did_you_mean(str(name), catalogue)}`soilml show soils` lists them"
+            f"no soil {name!r}; {did_you_mean(name, catalogue)}`soilml show soils` lists them"
         )
-    noise = str(given["torque_noise"] or "2 %")
     written = noise if is_number(noise) else f'"{noise}"'
     parts = [
         "# Model file of soilml; docs/reference/model-file.md explains every section. SI units.",
-        f'[gear]\ntype = "wheel"\nradius = {given["radius"]} # m\nwidth = {given["width"]} # m',
-        _soil(None if name is None else str(name)),
+        f'[gear]\ntype = "wheel"\nradius = {sizes["radius"]} # m\nwidth = {sizes["width"]} # m',
+        _soil(name),
         "[noise] # standard deviations of the sensors: of the reading, in its unit, or both\n"
         f"torque_Nm = {written}\n"
         '# drawbar_pull_N = "2 % + 0.5"\n# sinkage_m = 0.001\n# slip = 0.01\n# load_N = "1 %"',

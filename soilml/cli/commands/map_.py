@@ -33,8 +33,6 @@ map.png and map.json. With --elevation, a GeoTIFF of heights in the same
 coordinates, headings.tif has slope, probability, slip and work along eight
 headings, and the occupancy is that of the worst of them.
 """
-
-
 ARGUMENTS = (
     ("rover ROVER.toml", "wheel, soil, rover", InputFile),
     ("runs DRIVE.csv", "rows with positions", InputFile),
@@ -69,7 +67,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.io.atomic_files import write_files
     from soilml.onboard.estimator import Estimator
     from soilml.optional_imports import need
-    from soilml.soil_maps.drive import NEEDED
+    from soilml.soil_maps.local_soils import NEEDED
     from soilml.soil_maps.presentation import FILES, map_files, map_json
     from soilml.soil_maps.raster import read_elevation
     from soilml.soil_maps.workflow import CELL, REACH, SLOPES, soil_map

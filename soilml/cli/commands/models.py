@@ -15,8 +15,6 @@ file wherever a command reads a model file:
   soilml estimate wheel             what one file is for
   soilml estimate wheel RUNS.csv    estimates by it
 """
-
-
 ARGUMENTS = ()
 
 

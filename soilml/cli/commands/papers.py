@@ -44,8 +44,6 @@ A number that a paper prints twice, or that follows from another, counts once.
 """
 WIDTH = 100
 OMITTED = ("given", "not_computed")  # Statuses of rows that --all alone lists
-
-
 ARGUMENTS = (
     ("paper", f"paper to compute: {', '.join(PAPERS)}", OPTIONAL),
     ("--all", "list every number"),

@@ -49,8 +49,6 @@ pull, p05, p95 are the median and the 90 % band; `prior` is the band before any
 measurement. The CSV file has a row for each load and slip, in SI units.
 """
 MAX_LOADS = 8  # Largest number of loads
-
-
 ARGUMENTS = (
     "model-and-runs",
     ("--load N,...", "vertical loads in N: A,B,... or start:stop:count"),

@@ -34,8 +34,6 @@ of least slope. One k_x serves up to a slip of about 0.5. The picture has k_x,
 pull and slope (fig. 7 of the source) against slip. A whole rover with two such
 wheels: soilml paper climb.
 """
-
-
 ARGUMENTS = (
     ("model MODEL.toml", "the wheel, and the soil's strength", InputFile),
     ("runs RUNS.csv", "a row for each run", InputFile),

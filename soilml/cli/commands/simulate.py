@@ -33,8 +33,6 @@ shares of the load, trim, sinkage of the rear wheel, tension.
 
 _ONCE_RADIANS = 1.6  # Largest slip angle in radians, the unit of the version before
 MOST_BALANCED = 2000  # Most rows of --balance, whose integrals take some 50 kB each
-
-
 ARGUMENTS = (
     ("model MODEL.toml", "gear, soil and effects", InputFile),
     ("--slip S,...", "slip ratios, above 0 driving, below 0 braking", REQUIRED),

@@ -27,8 +27,6 @@ Torques weigh the soils of the prior. The result has a row for each time;
 flags say which rows are refused (standing, hard floor) and where the slip is
 not determined. FILE.json has the same with remarks.
 """
-
-
 ARGUMENTS = (
     ("rover ROVER.toml", "rover and prior", InputFile),
     ("drive DRIVE.csv", "a row for each time and wheel", InputFile),
@@ -46,11 +44,12 @@ def run(args: argparse.Namespace) -> int:
     from soilml.cli.progress import working
     from soilml.cli.tables import read_long_table
     from soilml.config.case import read_case
-    from soilml.slip_filter.drive import read_drive, slip_of_drive
-    from soilml.slip_filter.presentation import (
+    from soilml.slip_filter.drive import (
         drive_columns,
         drive_json,
+        read_drive,
         report_of_drive,
+        slip_of_drive,
     )
 
     driven = read_long_table(args.drive, ignore_extra=args.ignore_extra)

@@ -20,8 +20,6 @@ that is not printed in the paper and is assumed.
   soilml show soils                      all soils, one line each
   soilml show soils wong1989/dry_sand    one soil, with its source and every value
 """
-
-
 ARGUMENTS = (("name", "PAPER/SOIL, the name of the soil to show", OPTIONAL),)
 
 

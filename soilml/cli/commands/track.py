@@ -28,8 +28,6 @@ predicts of them, and the angles at which the belt meets and leaves the soil
 angles. --grousers adds the pull of discrete grousers (eqs. 10 to 14), with f_g,
 the friction of soil that has yielded, as an input: the paper does not print it.
 """
-
-
 ARGUMENTS = (
     ("model MODEL.toml", "track, soil and its priors", InputFile),
     ("runs LOG.csv", "the log", InputFile),

@@ -32,8 +32,6 @@ stiffness or slip have three values or more, the row's values against them.
 The stress is proportional to the depth: --offset adds the stress at the surface.
 Neighbouring legs do not act on each other, and the body is a plate below the hub.
 """
-
-
 ARGUMENTS = (
     ("--foot A,B,... (LTF)", "feet"),
     ("--legs N,... (5)", "numbers of legs, 1 to 6"),

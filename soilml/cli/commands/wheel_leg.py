@@ -40,8 +40,6 @@ The relations are of one wheel-leg: five legs, Load Testing Feet, 3.75 kg. For
 another train a file on its strides: soilml train slip_torque.
 """
 SENSORS = {"torque_Nm": "torque", "vibration_m_s2": "vibration", "sinkage_m": "sinkage"}
-
-
 ARGUMENTS = (
     ("runs STRIDES.csv", "strides: CSV, Parquet or .xlsx", InputFile),
     ("--torque-model NAME (simplified)", "terramechanics, empirical or simplified"),

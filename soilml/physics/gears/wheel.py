@@ -16,8 +16,8 @@ from soilml.physics.gears.rigid_wheel import (
     differences_from_entry,
     displacement_direction,
     reversals,
+    sliced_contact,
 )
-from soilml.physics.gears.wheel_slices import sliced_contact
 from soilml.physics.operating_point import Operating
 
 #: Nodes in each part of the contact of a driving and of a braking wheel. The accuracy of full

@@ -10,7 +10,7 @@ import numpy as np
 
 from soilml.arrays import Floats
 from soilml.errors import InputError
-from soilml.numerics.resampling import latin_hypercube
+from soilml.numerics.quantiles import latin_hypercube
 from soilml.parameters import Parameter, check, declared
 from soilml.physics.soils.catalogue import Soil
 

@@ -113,19 +113,6 @@ def identify_ground(
     References
     ----------
     Nagatani et al., section 6.
-
-    Examples
-    --------
-    >>> from soilml.systems.rim_stress import SimulatedRover
-    >>> true = SimulatedRover()  # its shear modulus is 7.2 mm
-    >>> rng = np.random.default_rng(0)
-    >>> climbs = true.simulate_climbs(rng, np.deg2rad([0.0, 4.0]).tolist())
-    >>> ground = identify_ground(
-    ...     true.rover, climbs, fixed={"cohesion": 0.0, "friction_angle": 0.6632}
-    ... )
-    >>> modulus = ground.fit["shear_modulus"]
-    >>> round(1e3 * float(modulus.mean), 1), round(1e3 * float(modulus.std), 1)  # mm
-    (7.4, 0.3)
     """
     fixed, prior, noise = dict(fixed or {}), dict(prior or {}), noise or Uncertainty()
     if unknown := sorted((fixed.keys() | prior.keys()) - set(SHEAR)):

@@ -19,8 +19,8 @@ from soilml.physics.pull_efficiency import CLASSES, pull_efficiency, traffic_cla
 from soilml.physics.soils import Soil
 from soilml.quantities import Z_90
 from soilml.remarks import Remark
+from soilml.report.column_figure import ParameterIntervals
 from soilml.report.numbers import format_quantity
-from soilml.report.parameter_figure import ParameterIntervals
 from soilml.report.report import Report
 from soilml.report.tables import ReportTable
 from soilml.systems.wheel_legs.stride_relations import (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.bounded_descent import Point, bounded_minimum
+from soilml.numerics.root_finding import Point, bounded_minimum
 
 
 def valley(x):

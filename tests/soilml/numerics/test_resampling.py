@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from soilml.numerics.quantiles import quantile_band
-from soilml.numerics.resampling import (
+from soilml.numerics.quantiles import (
+    quantile_band,
     systematic_resampling,
 )
 

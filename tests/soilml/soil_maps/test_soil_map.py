@@ -86,7 +86,7 @@ def dem(tmp_path_factory):
 @pytest.fixture(scope="module")
 def found(rover, estimator, dem):
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("soilml.soil_maps.ability.DRAWS", 400)
+        patch.setattr("soilml.soil_maps.field.DRAWS", 400)
         return soil_map(
             read_case(rover),
             two_soils(),
@@ -214,8 +214,8 @@ def test_other_bad_input_is_one_line(rover, estimator, tmp_path, dem):
 def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "drive.csv").write_text(csv_text(two_soils(60)))
-    words = ["map", "drive.csv", "--rover", str(rover), "--from", "wheel", "--cell", "2"]
-    monkeypatch.setattr("soilml.soil_maps.ability.DRAWS", 100)
+    words = ["map", str(rover), "drive.csv", "--from", "wheel", "--cell", "2"]
+    monkeypatch.setattr("soilml.soil_maps.field.DRAWS", 100)
     assert main([*words, "--slope", "0,10", "--out", "map"]) == 0
     said = capsys.readouterr().out
     assert said.startswith("No sharp change of the soil was found") and "1 table more" in said
@@ -224,8 +224,8 @@ def test_the_command_writes_its_folder(rover, tmp_path, capsys, monkeypatch):
     content = json.loads((tmp_path / "map/map.json").read_text())
     assert content["cells"] > 0 and len(content["stretches"]["station_m"]) >= 4
     assert "no-score" in {remark["code"] for remark in content["remarks"]}
-    for missing in (["--rover", "none.toml"], ["--rover", str(rover), "--from", "none.onnx"]):
-        assert main(["map", "drive.csv", *missing]) == 2
+    for missing in (["none.toml"], [str(rover), "--from", "none.onnx"]):
+        assert main(["map", missing[0], "drive.csv", *missing[1:]]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     text = (tmp_path / "drive.csv").read_text().replace("x_m", "east_m")
     (tmp_path / "drive.csv").write_text(text)
