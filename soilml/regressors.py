@@ -20,7 +20,6 @@ from importlib import import_module
 from typing import Any
 
 _HOME = {
-    "FixedSizeLSSVM": "training.regressors.lssvm",
     "GaussianMLP": "training.regressors.gaussian_mlp",
     "GaussianRegressor": "training.regressors.gaussian_regressor",
     "LSSVM": "training.regressors.lssvm",

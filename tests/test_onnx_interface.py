@@ -142,7 +142,7 @@ def test_reasons_and_versions_are_those_of_the_code(small_model):
     assert versions["soilml_format"] == FORMAT and versions["soilml_interface"] == INTERFACE
     metadata = Estimator.load(small_model).metadata
     assert metadata["soilml_format"] == FORMAT and metadata["soilml_interface"] == INTERFACE
-    assert f"`format`, now {MEMORY_FORMAT}" in " ".join(PAGE.split())
+    assert f"begins with its version, now {MEMORY_FORMAT}" in " ".join(PAGE.split())
 
 
 def test_the_minimal_call_is_that_of_the_estimator_and_prints_nothing(whole_file, capfd):

@@ -15,7 +15,7 @@ from soilml.quantities import SHEAR
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
 from training.set_posterior.families.recipe_family import RecipeFamily
 from training.set_posterior.graph import SetPosteriorGraph
-from training.set_posterior.misfit_test import MisfitLimits
+from training.set_posterior.posterior_summary import MisfitLimits
 from training.set_posterior.validation import graph_outputs, posterior_session
 from training.spec import read_any_wheel_spec
 

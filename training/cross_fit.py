@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,8 +20,7 @@ from training.calibration.recalibration import (
 )
 from training.dataset import Dataset
 from training.ensemble import fuse_members
-from training.regressors.gaussian_regressor import FeatureSubset
-from training.regressors.row_groups import few_groups
+from training.regressors.gaussian_regressor import FeatureSubset, few_groups
 from training.spec import Spec
 
 Progress = Callable[[str, int, int], None]
@@ -59,15 +58,12 @@ class CrossFit:
     scores: dict[str, Metrics]
 
 
-def cross_fit(
-    spec: Spec, data: Dataset, prior: PriorSummary, labels: Mapping[str, str], progress: Progress
-) -> CrossFit:
+def cross_fit(spec: Spec, data: Dataset, prior: PriorSummary, progress: Progress) -> CrossFit:
     """Fit regressors to all rows, and calibrate and fuse them by their errors on runs left out.
 
     With few runs the standard deviation is constant: they do not determine how it varies.
 
     spec: Its regressors are fitted in place.
-    labels: What is said of each regressor while it is fitted, by name.
 
     Raises `InputError` where a regressor does not converge.
 
@@ -80,7 +76,7 @@ def cross_fit(
     truth, scores = data.targets[some], {}
     members, means, stds = [], [], []
     for regressor in spec.regressors:
-        mean, std = _fit(regressor, data, groups, few, labels[regressor.name], progress)
+        mean, std = _fit(regressor, data, groups, few, progress)
         member = calibrated(regressor, mean[some], std[some], truth)
         members.append(member)
         means.append(mean)
@@ -102,16 +98,15 @@ def _fit(
     data: Dataset,
     groups: NDArray[np.int64],
     few: bool,
-    label: str,
     progress: Progress,
 ) -> tuple[Floats, Floats]:
     """Fit in place; estimates (n, q) of all rows without their groups, and standard deviations."""
-    progress(f"fitting {label}", 0, 1)
+    progress(f"fitting {regressor.name}", 0, 1)
     mean, std = regressor.fit_left_out(
         data.features,
         data.targets,
         groups,
-        lambda done, total: progress(f"fitting {label}", done, total),
+        lambda done, total: progress(f"fitting {regressor.name}", done, total),
         few,
     )
     if not np.isfinite([mean, std, regressor.predict(data.features)]).all():

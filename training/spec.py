@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 from datagen.recipe import packaged_file
@@ -19,7 +18,7 @@ from training.dataset import PER_ROW, check_targets
 from training.regressors.gaussian_mlp import GaussianMLP
 from training.regressors.gaussian_regressor import FeatureSubset, GaussianRegressor
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.lssvm import LSSVM, FixedSizeLSSVM
+from training.regressors.lssvm import LSSVM
 from training.regressors.scikit_learn import ScikitLearn
 from training.set_posterior.error_scales import USUAL_SCALES, ErrorScale, ErrorScales
 from training.set_posterior.families.dimensionless_family import DimensionlessFamily
@@ -27,7 +26,8 @@ from training.set_posterior.response_surface import ResponseSettings
 
 #: Catalogue of regressors by `[[regressor]] type`: a new one is a file and a line here.
 REGRESSORS: dict[str, type[GaussianRegressor]] = {
-    cls.type_name: cls for cls in (LSSVM, FixedSizeLSSVM, GaussianMLP, LinearGaussian, ScikitLearn)
+    **{cls.type_name: cls for cls in (LSSVM, GaussianMLP, LinearGaussian, ScikitLearn)},
+    "lssvm": LSSVM,
 }
 
 #: Allowed seeds: those of the random generators of all libraries.
@@ -165,11 +165,7 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
     regressor = REGRESSORS[type_name]()
     defaults = regressor.get_params()
     settings.permit(defaults)
-    parameters = {
-        k: _take_parameter(settings, k, v, regressor.choices)
-        for k, v in defaults.items()
-        if k in settings
-    }
+    parameters = {k: _take_parameter(settings, k, v) for k, v in defaults.items() if k in settings}
     settings.finish()
     if "random_state" in defaults and "random_state" not in parameters:
         parameters["random_state"] = seed
@@ -177,15 +173,8 @@ def _take_regressor(settings: Settings, seed: int) -> GaussianRegressor:
     return regressor
 
 
-def _take_parameter(
-    settings: Settings, key: str, default: Any, choices: Mapping[str, tuple[str, ...]]
-) -> Any:
-    """A hyperparameter: a word, whole numbers, a whole number, or a number that is finite."""
-    if key in choices:
-        word = settings.text(key)
-        if word not in choices[key]:
-            settings.fail(f"{key} is {word!r}; there are: {', '.join(choices[key])}")
-        return word
+def _take_parameter(settings: Settings, key: str, default: Any) -> Any:
+    """A hyperparameter: text, a table, whole numbers, a whole number, or a finite number."""
     if isinstance(default, str):
         return settings.text(key)
     if key == "parameters":
@@ -250,7 +239,7 @@ def _take_scales(table: Settings) -> ErrorScales:
     """Read [[set_posterior.model_errors]], the usual scales where it is missing."""
     if "model_errors" not in table:
         return USUAL_SCALES
-    names = [field.name for field in fields(ErrorScale)]
+    names = ErrorScale._fields
     entries = table.tables("model_errors")
     found = [{name: entry.number(name) for name in names} for entry in entries]
     for entry in entries:

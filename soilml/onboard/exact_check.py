@@ -26,7 +26,7 @@ from soilml.onboard.set_posterior import SetPosterior, of_reason
 #: Share of sound sets whose misfit is above the limit of a file, and its standard normal quantile.
 FALSE_ALARM_RATE, ALARM_QUANTILE = 0.01, 2.326
 #: Beyond the largest calibrated number of readings n the limit grows by 1 + 3 / sqrt(n) a reading,
-#: as in the graph (`training.set_posterior.misfit_test`).
+#: as in the graph (`training.set_posterior.posterior_summary`).
 MARGIN = 3.0
 NO_ROWS: dict[str, list[float]] = {name: [] for name in REQUIRED_READINGS}
 

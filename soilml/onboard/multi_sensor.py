@@ -165,9 +165,10 @@ def _fuse_by_correlation(
     mean: Floats, covariance: Floats, files: Sequence[Any]
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
     """Mean, covariance, ends of the interval, and disagreement (n,), of estimates (m, n, ...)."""
-    found = fuse_rows(mean, np.sqrt(np.diagonal(covariance, axis1=2, axis2=3)), files)
-    fused = _mean_correlation(covariance) * found.std[:, :, None] * found.std[:, None, :]
-    return found.mean, fused, found.low, found.high, found.disagreement.max(axis=-1)
+    stds = np.sqrt(np.diagonal(covariance, axis1=2, axis2=3))
+    centre, std, low, high, disagreement = fuse_rows(mean, stds, files)
+    fused = _mean_correlation(covariance) * std[:, :, None] * std[:, None, :]
+    return centre, fused, low, high, disagreement.max(axis=-1)
 
 
 def _fuse_by_variance(

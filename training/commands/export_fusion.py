@@ -1,17 +1,17 @@
-"""`soilml export fusion`: the fusion of several model files as C code."""
+"""`soilml export fusion`: the fusion of two model files as C code."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from soilml.cli.options import SEVERAL, InputFile
+from soilml.cli.options import InputFile
 from soilml.io.atomic_files import atomic_outputs, output_files
 from soilml.io.cell_text import one_line
 from training.export_c.c_names import check_c_name
 
 DESCRIPTION = """\
-Write the fusion of files that estimate the same quantity from different
+Write the fusion of two files that estimate the same quantity from different
 sensors, such as slip from torque and from vibration, as the C file OUT.c and
 its header OUT.h. They use the structs that export-c writes for each file.
 
@@ -25,7 +25,8 @@ their errors, which are in the files. docs/how-to/deploy.md describes it.
 
 
 ARGUMENTS = (
-    ("model MODEL.onnx", "files, 2 to 4, named as their C files", InputFile, SEVERAL),
+    ("first FIRST.onnx", "a file, named as its C file", InputFile),
+    ("second SECOND.onnx", "the other one", InputFile),
     ("out OUT.c", "C file to write; OUT.h is written beside it"),
 )
 
@@ -45,7 +46,7 @@ def run(args: argparse.Namespace) -> int:
     from soilml.onboard.model_file import find_model
     from training.export_c.fusion import write_fusion
 
-    out, files = Path(args.out), [find_model(model) for model in args.model]
+    out, files = Path(args.out), [find_model(model) for model in (args.first, args.second)]
     for name in (out, *(file.with_suffix(".c") for file in files)):
         check_c_name(name)
     estimators = [Estimator.load(file) for file in files]

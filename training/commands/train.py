@@ -32,9 +32,6 @@ command writes the model card OUT.md. A spec contains
   type = "mlp"                       # hidden = [32, 32], epochs, steps, ...
   [[regressor]]
   type = "linear"
-  [[regressor]]
-  type = "lssvm"                     # exact up to 20 000 rows, beyond fixed-size;
-  solution = "exact"                 # or "fixed-size", whatever their number
   [set_posterior]                    # optional: pools all readings of a soil
   designs = 4096                     # by their likelihood, with a learned
   hidden = 64                        # response to slip, load and soil
@@ -79,7 +76,8 @@ def _any_wheel(args: argparse.Namespace) -> int:
     """Train the file for wheels of any size."""
     from soilml.cli.output import tell
     from soilml.cli.progress import stage_progress
-    from training.export.any_wheel_file import any_wheel_card, export_any_wheel
+    from training.export.model_card import any_wheel_card
+    from training.export.model_file import export_any_wheel
     from training.spec import read_any_wheel_spec
     from training.train import train_any_wheel
 

@@ -290,6 +290,25 @@ class Graph:
         return model
 
 
+def without_branches(graph: Any, chosen: Callable[[Any], str]) -> tuple[list[Any], list[Any]]:
+    """Nodes and constants of a graph, with each If node replaced by the branch that is chosen."""
+    from onnx import helper
+
+    nodes: list[Any] = []
+    constants = list(graph.initializer)
+    for node in graph.node:
+        if node.op_type != "If":
+            nodes.append(node)
+            continue
+        branch = next(a.g for a in node.attribute if a.name == chosen(node))
+        inside, of_branch = without_branches(branch, chosen)
+        results = zip([value.name for value in branch.output], node.output, strict=True)
+        nodes += inside
+        nodes += [helper.make_node("Identity", [own], [new], name=new) for own, new in results]
+        constants += of_branch
+    return nodes, constants
+
+
 def needed_nodes(nodes: Iterable[Any], outputs: Iterable[str]) -> tuple[list[Any], set[str]]:
     """The nodes on which outputs depend, in their order, and the names of all values they need."""
     wanted, needed = set(outputs), []

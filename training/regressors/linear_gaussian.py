@@ -8,9 +8,12 @@ import numpy as np
 
 from soilml.arrays import Floats
 from training.onnx_graph.builder import Graph
-from training.regressors.gaussian_regressor import GaussianRegressor, Progress
-from training.regressors.rbf_expansion import log_squared_residuals
-from training.regressors.row_groups import Groups
+from training.regressors.gaussian_regressor import (
+    GaussianRegressor,
+    Groups,
+    Progress,
+    log_squared_residuals,
+)
 
 
 class LinearGaussian(GaussianRegressor):

@@ -13,9 +13,13 @@ from soilml.arrays import Floats
 from soilml.errors import InputError
 from soilml.optional_imports import need
 from training.onnx_graph.builder import OPSET, Graph, session_of
-from training.regressors.gaussian_regressor import GaussianRegressor, Progress
+from training.regressors.gaussian_regressor import (
+    GaussianRegressor,
+    Groups,
+    Progress,
+    folds_of,
+)
 from training.regressors.linear_gaussian import LinearGaussian
-from training.regressors.row_groups import Groups, folds_of
 
 #: Largest difference of the graph from the regressor, in standard deviations of the outputs:
 #: single precision has less, another function has more.
