@@ -122,8 +122,8 @@ def worlds_table() -> str:
             cells = [[c.strip() for c in line] for line in lines]
             found = {c[1]: (c[3], c[-1]) for c in cells if "mean" in c[0]}
             rows.append((f"`wheel`, {short}, {channels}", *found[exact], *found[default]))
-    lines = lines_of("identify-errors", "what is wrong", "channels", "answer")
-    means = [line for line in lines if line["what is wrong"] == "mean"]
+    every = lines_of("identify-errors", "what is wrong", "channels", "answer")
+    means = [line for line in every if line["what is wrong"] == "mean"]
     for channels in dict.fromkeys(line["channels"] for line in means):
         of = {line["answer"]: line for line in means if line["channels"] == channels}
         both = [of[answer][key] for answer in own for key in ("90 % of c, phi, K", "score")]
