@@ -57,7 +57,6 @@ class ArrowStream(Protocol):
 
     def __arrow_c_stream__(self, requested_schema: object = None) -> object:
         """A capsule with an ArrowArrayStream."""
-        ...
 
 
 def arrow_columns(frame: ArrowStream) -> dict[str, Any]:
@@ -136,17 +135,12 @@ def _metadata(table: Any) -> dict[str, str]:
 
 def _check_recipe(path: Path, metadata: dict[str, str]) -> None:
     """Raise `TableError` where the recipe in the metadata is not the one that was written."""
-    recipe = metadata.get("soilml_recipe")
-    if recipe is None:
-        if "soilml_recipe_sha256" in metadata:
-            raise TableError(
-                f"{path}: its metadata have the checksum of a recipe and no recipe; generate it "
-                "again"
-            )
-    elif hashlib.sha256(recipe.encode()).hexdigest() != metadata.get("soilml_recipe_sha256"):
-        raise TableError(
-            f"{path}: the recipe in its metadata does not match its checksum; generate it again"
-        )
+    recipe, stated = metadata.get("soilml_recipe"), metadata.get("soilml_recipe_sha256")
+    fault = "has the checksum of a recipe and no recipe" if stated and recipe is None else ""
+    if recipe is not None and hashlib.sha256(recipe.encode()).hexdigest() != stated:
+        fault = "has a recipe that does not match its checksum"
+    if fault:
+        raise TableError(f"{path}: its metadata {fault}; generate it again")
 
 
 def own_columns(metadata: Mapping[str, str]) -> list[str]:
@@ -167,7 +161,7 @@ def plain_column(file: Path, name: str, column: Any) -> Column:
 
     kind = column.type.value_type if pa.types.is_dictionary(column.type) else column.type
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_null(kind)
-    text = any(f(kind) for f in (pa.types.is_string, pa.types.is_large_string, _is_string_view))
+    text = any(f(kind) for f in (pa.types.is_string, pa.types.is_large_string, _is_view))
     if name not in TEXT:
         if not number:
             raise TableError(f"{file}, column {name}: has type {kind}; needed are numbers")
@@ -190,24 +184,18 @@ def distinct_cells(column: Any) -> tuple[list[Any], Any]:
     """The values of an Arrow column, each once, and the index of that of each row (rows,)."""
     import pyarrow as pa
 
-    if _is_string_view(column.type):  # of polars
+    if _is_view(column.type):  # of polars
         column = column.cast(pa.string())
     if not pa.types.is_dictionary(column.type):
         column = column.dictionary_encode()
-    cells: dict[Any, int] = {}
-    codes = [np.zeros(0, np.int64)]
-    for chunk in column.chunks:
-        own = np.asarray(chunk.indices.fill_null(-1).to_numpy(zero_copy_only=False), np.int64)
-        place = np.zeros(len(chunk.dictionary) + 1, np.int64)  # a blank cell is the last
-        used = np.unique(own)
-        found = chunk.dictionary.take(pa.array(used[used >= 0])).to_pylist()
-        for i, cell in zip(used, [*[None] * int((used < 0).sum()), *found], strict=True):
-            place[i] = cells.setdefault(cell, len(cells))
-        codes.append(place[own])
-    return list(cells), np.concatenate(codes)
+    whole = pa.chunked_array(column).unify_dictionaries().combine_chunks()
+    code = np.asarray(whole.indices.fill_null(-1).to_numpy(zero_copy_only=False), np.int64)
+    used, place = np.unique(code, return_inverse=True)
+    cells = whole.dictionary.take(pa.array(used[used >= 0])).to_pylist()
+    return [*[None] * int((used < 0).sum()), *cells], place
 
 
-def _is_string_view(kind: Any) -> bool:
+def _is_view(kind: Any) -> bool:
     import pyarrow as pa
 
     return bool(pa.types.is_string_view(kind))
